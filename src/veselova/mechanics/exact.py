@@ -1,0 +1,128 @@
+"""Numbers as given: every input becomes an exact rational before anything is rounded.
+
+A decimal string ("0.7") or a ratio ("7/10") is taken at its word; a float is the dyadic rational that it stores.
+The engines round these rationals once, to the precision they work in.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from decimal import Decimal, InvalidOperation
+from fractions import Fraction
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import InvalidInput, shown
+
+__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "to_float"]
+
+Number = int | float | str | Fraction | Decimal
+
+Path = tuple[str | int, ...]
+
+#: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other alphabets.
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
+
+#: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the memory.
+_LARGEST_EXPONENT = 400
+
+#: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
+_LONGEST_NUMERAL = 2100
+
+_REQUIRED = 'a finite real number (a JSON number, or a string such as "0.7" or "7/10")'
+
+
+def exact_number(value: Any, path: Path) -> Fraction:
+    """Return the rational number that ``value`` states exactly.
+
+    Accepts int, float, NumPy real scalars, Fraction, Decimal and strings ("0.7", "-1e-3", "7/10").
+    Raises InvalidInput for booleans, NaN, infinities, anything that is not a number, and numbers beyond float range.
+    """
+    try:
+        number = _parse(value)
+        float(number)
+    except (ValueError, OverflowError, ZeroDivisionError, InvalidOperation, TypeError):
+        raise InvalidInput(path, _REQUIRED, shown(value)) from None
+    return number
+
+
+def _parse(value: Any) -> Fraction:
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError("a boolean is not a number")
+    if isinstance(value, str):
+        return _parse_numeral(value)
+    if isinstance(value, (Fraction, Decimal, float)):
+        return Fraction(value)
+    if isinstance(value, Integral):
+        return Fraction(int(value))
+    if isinstance(value, Real):  # NumPy's other floating types
+        return Fraction(float(value))
+    raise TypeError("not a number")
+
+
+def _parse_numeral(text: str) -> Fraction:
+    if len(text) > _LONGEST_NUMERAL:
+        raise ValueError("numeral too long")
+    parts = text.strip().split("/")
+    if len(parts) > 2 or not all(_DECIMAL.fullmatch(part.strip()) for part in parts):
+        raise ValueError("not a decimal or a ratio")
+    decimals = [Decimal(part.strip()) for part in parts]
+    if any(d and abs(d.adjusted()) > _LARGEST_EXPONENT for d in decimals):
+        raise OverflowError("beyond float range")
+    values = [Fraction(d) for d in decimals]
+    return values[0] if len(values) == 1 else values[0] / values[1]
+
+
+def _items(values: Any, path: Path, required: str) -> list[Any]:
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if isinstance(values, (str, bytes, dict)) or not isinstance(values, Iterable):
+        raise InvalidInput(path, required, shown(values))
+    return list(values)
+
+
+def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fraction, ...]:
+    """Return the entries of a vector as exact rationals; raises InvalidInput when the length is not ``length``."""
+    required = "a list of numbers" if length is None else f"a list of {length} numbers"
+    items = _items(values, path, required)
+    if length is not None and len(items) != length:
+        raise InvalidInput(path, required, f"{len(items)} entries")
+    return tuple(exact_number(item, (*path, i)) for i, item in enumerate(items))
+
+
+def exact_matrix(values: Any, path: Path, size: int) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the rows of a square matrix as exact rationals; raises InvalidInput when it is not size by size."""
+    required = f"{size} rows of {size} numbers"
+    rows = _items(values, path, required)
+    if len(rows) != size:
+        raise InvalidInput(path, required, f"{len(rows)} rows")
+    return tuple(exact_vector(row, (*path, i), size) for i, row in enumerate(rows))
+
+
+def is_matrix(values: Any) -> bool:
+    """Return whether the value is a list of lists: only the outermost shape is looked at."""
+    if isinstance(values, np.ndarray):
+        return values.ndim > 1
+    return (
+        isinstance(values, Sequence)
+        and len(values) > 0
+        and isinstance(values[0], (Sequence, np.ndarray))
+        and not isinstance(values[0], str)
+    )
+
+
+def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:
+    """Return exact numbers as a read-only float64 array, each entry correctly rounded."""
+    if values and not isinstance(values[0], Fraction):
+        array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
+    else:
+        array = np.array([float(x) for x in values])  # type: ignore[arg-type]
+    if not all(math.isfinite(x) for x in array.flat):
+        raise OverflowError("a validated number left the float range")
+    array.setflags(write=False)
+    return array

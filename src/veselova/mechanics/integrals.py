@@ -1,0 +1,145 @@
+"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5).
+
+Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works along the leading axes.
+I_i = 1/A_i throughout.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "clock_rate",
+    "constants_of_motion",
+    "energy",
+    "linear_integrals",
+    "momentum",
+    "neumann_integrals",
+    "neumann_polynomial",
+    "neumann_velocity",
+    "sliding_velocity",
+    "tangent_basis",
+    "unit_scale",
+]
+
+Array = NDArray[np.float64]
+
+#: I_i and I_j closer than this (relative) share one Neumann integral: their quotient P_ij²/(I_i−I_j) carries no digits.
+_COINCIDENT = 1e-12
+
+
+def unit_scale(A: Array) -> tuple[Array, int]:
+    """Return A/2^k with determinant near one, and k: det A itself leaves the float range for large n."""
+    k = int(np.rint(np.mean(np.log2(A))))
+    return np.ldexp(A, -k), k
+
+
+def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return q̇ − (Aq,q̇)/(Aq,q) q, the part of q̇ that is A-orthogonal to q.
+
+    With it, (Aq̇,q̇)(Aq,q) − (Aq,q̇)² is a product of two sums of positive terms: nothing cancels.
+    """
+    Aq = A * q
+    ratio = np.sum(Aq * q_dot, axis=-1) / np.sum(Aq * q, axis=-1)
+    sliding: Array = q_dot - ratio[..., None] * q
+    return sliding
+
+
+def energy(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape (...)."""
+    scaled, k = unit_scale(A)
+    w = sliding_velocity(scaled, q, q_dot)
+    h = np.sum(scaled * w * w, axis=-1) * np.sum(scaled * q * q, axis=-1) / (2 * np.prod(scaled))
+    return np.asarray(np.ldexp(h, k * (2 - A.size)), dtype=np.float64)
+
+
+def momentum(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return p = [(q,Aq) A q̇ − (q̇,Aq) A q]/det A, equation (big_p), shape (..., n); (q,p) = 0."""
+    scaled, k = unit_scale(A)
+    w = sliding_velocity(scaled, q, q_dot)
+    p = scaled * w * np.sum(scaled * q * q, axis=-1)[..., None] / np.prod(scaled)
+    return np.asarray(np.ldexp(p, k * (2 - A.size)), dtype=np.float64)
+
+
+def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return dτ₁/dt = √(2h det A/(q,Aq)), equation (4.6), shape (...).
+
+    Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is A-orthogonal to q.
+    """
+    w = sliding_velocity(A, q, q_dot)
+    return np.asarray(np.sqrt(np.sum(A * w * w, axis=-1)), dtype=np.float64)
+
+
+def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return q' = dq/dτ₁ = q̇/(dτ₁/dt), shape (..., n); zero for a body at rest."""
+    rate = clock_rate(A, q, q_dot)[..., None]
+    return np.divide(q_dot, rate, out=np.zeros_like(q_dot), where=rate > 0)
+
+
+def linear_integrals(p: Array, frame: Array) -> Array:
+    """Return l_k = (1/det A)⟨AωA, e_1∧e_k⟩ = (p, e_k), k = 2…n, from p and the frame, shape (..., n−1)."""
+    return np.asarray(np.einsum("...i,...ik->...k", p, frame[..., :, 1:]))
+
+
+def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1), P = q∧q', shape (..., n).
+
+    Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
+    """
+    inverse = 1 / A
+    v = neumann_velocity(A, q, q_dot)
+    P = q[..., :, None] * v[..., None, :] - q[..., None, :] * v[..., :, None]
+    gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])  # I_i − I_j without cancellation
+    same = np.abs(gap) <= _COINCIDENT * np.maximum(inverse[:, None], inverse[None, :])
+    F = q * q + np.sum(np.divide(P * P, gap, out=np.zeros_like(P), where=~same), axis=-1)
+    share = same / np.sum(same, axis=1, keepdims=True)
+    return np.asarray(F @ share.T, dtype=np.float64)
+
+
+def neumann_polynomial(point: Any, inverse: Any, q_squared: Any, wedge_squared: Any) -> tuple[Any, Any]:
+    """Return N(λ) = Σ_{i<j} P_ij² Π_{k≠i,j}(λ−I_k) + Σ_i q_i² Π_{k≠i}(λ−I_k), and its derivative.
+
+    ``inverse`` holds the I_i, ``q_squared`` the q_i², ``wedge_squared`` the P_ij². N = Φ𝓕 with 𝓕 of (family1) and
+    Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division occurs, so I's may coincide. Works in any arithmetic
+    with + − ×: floats, arrays of λ, multiprecision numbers, fractions.
+    """
+    zero = 0 * point
+    product, slope = zero + 1, zero  # Π_{k<m}(λ−I_k) and its derivative
+    value, value_slope = zero, zero
+    partial: list[tuple[Any, Any]] = []  # Π_{k<m, k≠i}(λ−I_k) for each i < m, with derivatives
+    for m, I_m in enumerate(inverse):
+        x = point - I_m
+        value_slope = value_slope * x + value + q_squared[m] * slope
+        value = value * x + q_squared[m] * product
+        for i, (t, t_slope) in enumerate(partial):
+            value = value + wedge_squared[i][m] * t
+            value_slope = value_slope + wedge_squared[i][m] * t_slope
+        partial = [(t * x, t_slope * x + t) for t, t_slope in partial]
+        partial.append((product, slope))
+        product, slope = product * x, slope * x + product
+    return value, value_slope
+
+
+def tangent_basis(q: Array) -> Array:
+    """Return an orthonormal basis of q⊥ as columns, shape (..., n, n−1): n−1 columns of the reflection that swaps q and ∓E_n."""
+    n = q.shape[-1]
+    u = np.array(q, dtype=np.float64)
+    u[..., -1] += np.where(u[..., -1] >= 0, 1.0, -1.0)  # the sign that adds: no cancellation
+    norm = np.sum(u * u, axis=-1)[..., None, None]
+    return np.asarray(np.eye(n)[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm, dtype=np.float64)
+
+
+def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of N(λ), shape (..., n−2); c_1 = 0 is left out.
+
+    They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
+    a symmetric eigenproblem with absolute error of a few ε·max I_i, whatever coincides.
+    """
+    basis = tangent_basis(q)
+    v = neumann_velocity(A, q, q_dot)
+    form = np.diag(1 / A) - v[..., :, None] * v[..., None, :]
+    restricted = np.swapaxes(basis, -1, -2) @ form @ basis
+    return np.asarray(np.linalg.eigvalsh(restricted)[..., 1:], dtype=np.float64)

@@ -1,0 +1,90 @@
+"""Pictures of a motion. The one place that knows matplotlib, imported when a picture is asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from veselova.mechanics.errors import BackendMissing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from veselova.mechanics.comparison import Comparison
+    from veselova.mechanics.trajectory import Trajectory
+
+__all__ = ["picture"]
+
+#: One colour per body axis or coordinate, told apart in print and by colour-blind readers (Okabe and Ito).
+_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"]
+
+#: Differences of zero are drawn at the bottom of the logarithmic axis.
+_LEAST_DRAWN = 1e-17
+
+
+def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Figure:
+    """Return the picture of a motion.
+
+    n = 3: the curve q(t) on the sphere with the frame axes at a few times, and λ(t). Any other n: the components of q and
+    the spheroconic coordinates. With a comparison: the difference of the engines, their error estimates and the
+    conditioning floor on a logarithmic axis.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
+    rows = 2 if comparison is None else 3
+    figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
+    if trajectory.problem.n == 3:
+        grid = figure.add_gridspec(rows, 1, height_ratios=[2] + [1] * (rows - 1))
+        _draw_sphere(figure.add_subplot(grid[0], projection="3d"), trajectory)
+        axes = [figure.add_subplot(grid[row]) for row in range(1, rows)]
+    else:
+        axes = list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
+        _draw_lines(axes[0], trajectory.times, trajectory.q, "q", "components of $q$")
+        axes = axes[1:]
+    _draw_lines(axes[0], trajectory.times, trajectory.spheroconic, r"\lambda", "spheroconic coordinates")
+    if comparison is not None:
+        _draw_difference(axes[1], comparison)
+    axes[-1].set_xlabel("time $t$")
+    problem, provenance = trajectory.problem, trajectory.provenance
+    figure.suptitle(f"Veselova motion, n = {problem.n}, h = {problem.energy:.4g} ({provenance.engine}, {provenance.method})")
+    return figure
+
+
+def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) -> None:
+    for i in range(values.shape[1]):
+        axes.plot(times, values[:, i], color=_COLOURS[i % len(_COLOURS)], linewidth=1.1, label=f"${symbol}_{{{i + 1}}}$")
+    axes.set_ylabel(label)
+    axes.legend(loc="upper right", ncols=min(8, values.shape[1]), fontsize="small", framealpha=0.9)
+
+
+def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
+    """Draw q(t) on the unit sphere and, at six times, the frame vectors e_2, e_3 standing on it."""
+    latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
+    x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)
+    axes.plot_wireframe(x, y, z, color="0.85", linewidth=0.4)
+    axes.plot(*trajectory.q.T, color=_COLOURS[0], linewidth=1.2)
+    for i in np.unique(np.linspace(0, trajectory.times.size - 1, 6).astype(int)):
+        for k, colour in ((0, _COLOURS[0]), (1, _COLOURS[1]), (2, _COLOURS[2])):
+            axes.quiver(*trajectory.q[i], *(0.3 * trajectory.frame[i, :, k]), color=colour, linewidth=1.4)
+    axes.set_box_aspect((1, 1, 1))
+    axes.set_xlabel("$q_1$")
+    axes.set_ylabel("$q_2$")
+    axes.set_zlabel("$q_3$")
+    axes.set_title("$q(t)$ on the sphere, with $e_1$ (blue), $e_2$ (red), $e_3$ (green) at six times", fontsize="medium")
+
+
+def _draw_difference(axes: Axes, comparison: Comparison) -> None:
+    times = comparison.analytic.times
+    for name, colour in (("q", _COLOURS[0]), ("frame", _COLOURS[1]), ("omega", _COLOURS[2])):
+        axes.semilogy(
+            times, np.maximum(comparison.difference(name), _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|"
+        )
+    axes.semilogy(times, comparison.analytic.error, color="0.4", linestyle="--", linewidth=1, label="error, analytic")
+    axes.semilogy(times, comparison.numeric.error, color="0.4", linestyle=":", linewidth=1, label="error, numeric")
+    axes.semilogy(times, comparison.conditioning_floor, color="0.7", linewidth=1, label="conditioning floor")
+    axes.set_ylabel("difference of engines")
+    axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)

@@ -1,0 +1,42 @@
+"""The times at which a motion is asked for: finite and strictly increasing; t = 0 is the start, negative times are fine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.exact import exact_vector, to_float
+
+__all__ = ["uniform_times", "validated_times"]
+
+Array = NDArray[np.float64]
+
+
+def validated_times(times: Any) -> Array:
+    """Return the times as a read-only float64 array; raises InvalidInput unless finite and strictly increasing."""
+    if isinstance(times, np.ndarray) and times.ndim == 1 and times.dtype == np.float64 and np.all(np.isfinite(times)):
+        array = np.array(times)
+        array.setflags(write=False)
+    else:
+        array = to_float(exact_vector(times, ("times",)))
+    if array.size == 0:
+        raise InvalidInput(("times",), "at least one time", "none")
+    falls = np.flatnonzero(np.diff(array) <= 0)
+    if falls.size:
+        i = int(falls[0]) + 1
+        raise InvalidInput(("times", i), f"a time greater than the one before it ({array[i - 1]!r})", repr(float(array[i])))
+    return array
+
+
+def uniform_times(start: float, stop: float, count: int) -> Array:
+    """Return ``count`` equally spaced times from start to stop, both included; raises InvalidInput as above."""
+    if count < 1:
+        raise InvalidInput(("times", "count"), "at least 1", str(count))
+    if count > 1 and not start < stop:
+        raise InvalidInput(("times", "stop"), f"a time greater than start ({start!r})", repr(stop))
+    if not np.isfinite(stop - start):
+        raise InvalidInput(("times", "stop"), "a span within the range of a float", f"{start!r} to {stop!r}")
+    return validated_times(np.linspace(start, stop, count))

@@ -1,0 +1,48 @@
+"""The invariant torus of a motion: its curve, periods, frequencies and the phases of the start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Torus"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Torus:
+    """The torus of one motion, g = n−1.
+
+    energy h · constants (g−1,) c_2 ≤ … ≤ c_{n−1} · branch_points (2g+1,) b_0 = 0 < … < b_{2g}
+    origins (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a c_k (``c1`` is 0)
+    periods (g, g) a_{ks} = (−1)^{g−s} ∮ λ^{k−1}dλ/(2√|R|) over cut s · riemann_matrix (g, g) T, Riemann matrix iT
+    riemann_matrix_residual: max |T − Tᵀ|/max |T| before symmetrisation
+    frequencies_tau1, frequencies_t (g,) cycles per unit τ₁ and t · phases (g,) z⁰ in [0, 1) · mean_rate: mean of dt/dτ₁
+    """
+
+    n: int
+    energy: float
+    constants: Array
+    branch_points: Array
+    origins: tuple[str, ...]
+    periods: Array
+    riemann_matrix: Array
+    riemann_matrix_residual: float
+    frequencies_tau1: Array
+    frequencies_t: Array
+    phases: Array
+    mean_rate: float
+    regime: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the torus as a JSON-ready dictionary (arrays as nested lists)."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<tr><th style='text-align:left'>{k}</th><td><pre>{v}</pre></td></tr>" for k, v in self.as_dict().items())
+        return f"<table>{rows}</table>"

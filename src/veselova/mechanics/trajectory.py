@@ -1,0 +1,184 @@
+"""The one result type of both engines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import BackendMissing, Unsolved
+from veselova.mechanics.veselova import Veselova
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["OUTPUTS", "Provenance", "Trajectory"]
+
+Array = NDArray[np.float64]
+
+#: The series of a trajectory, with the axes that follow the time axis; the order of every listing and file.
+OUTPUTS: Mapping[str, tuple[str, ...]] = {
+    "q": ("axis",),
+    "q_dot": ("axis",),
+    "frame": ("axis", "vector"),
+    "omega": ("axis", "axis_2"),
+    "spheroconic": ("coordinate",),
+    "tau1": (),
+}
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a trajectory was computed. ``details`` holds what the method has to say of itself (nodes, modes, steps …)."""
+
+    engine: str
+    method: str
+    digits: int
+    version: str
+    seconds: float
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the provenance as a JSON-ready dictionary."""
+        return {**vars(self), "details": dict(self.details)}
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion at given times, in the body axes of the problem.
+
+    times (N,) · error (N,) a bound on every component of q and frame at each time, in absolute value
+    tau1 (N,) Neumann time, zero at t = 0 · q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i
+    omega (N, n, n) = q∧q̇, body angular velocity · spheroconic (N, n−1), increasing
+    """
+
+    problem: Veselova
+    times: Array
+    error: Array
+    tau1: Array
+    q: Array
+    q_dot: Array
+    frame: Array
+    spheroconic: Array
+    provenance: Provenance
+    dense: Callable[[Any], Trajectory] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        for array in (self.times, self.error, self.tau1, self.q, self.q_dot, self.frame, self.spheroconic):
+            array.setflags(write=False)
+
+    @classmethod
+    def of_principal(
+        cls,
+        problem: Veselova,
+        times: Array,
+        states: tuple[Array, Array, Array, Array],
+        error: Array,
+        provenance: Provenance,
+        dense: Callable[[Any], Trajectory] | None = None,
+    ) -> Trajectory:
+        """Return the trajectory of states (τ₁, q̇, frame, λ) along the principal axes of the problem."""
+        tau1, q_dot, frame, spheroconic = states
+        frame, q_dot = problem.to_body_axes(frame), problem.to_body_axes(q_dot)
+        return cls(problem, times, error, tau1, frame[:, :, 0], q_dot, frame, spheroconic, provenance, dense)
+
+    @cached_property
+    def integrals(self) -> Mapping[str, Array]:
+        """Return the integrals of motion at each time, by name (see ``Veselova.integrals``)."""
+        return self.problem.integrals(self.q_dot, self.frame)
+
+    @cached_property
+    def omega(self) -> Array:
+        """Return the body angular velocity ω = q∧q̇, equation (44.3), shape (N, n, n)."""
+        product = self.q[:, :, None] * self.q_dot[:, None, :]
+        omega = product - np.swapaxes(product, 1, 2)
+        omega.setflags(write=False)
+        return omega
+
+    @property
+    def drift(self) -> dict[str, float]:
+        """Return, per integral of motion, its largest change against the first time, relative to its size there (or to 1)."""
+        return {name: _drift(values) for name, values in self.integrals.items()}
+
+    def at(self, times: Any) -> Trajectory:
+        """Return the same motion at other times; raises Unsolved where the engine left no dense answer."""
+        if self.dense is None:
+            raise Unsolved(
+                "no-dense-answer", f"a trajectory of method {self.provenance.method} is known at its times only; solve again"
+            )
+        return self.dense(times)
+
+    def series(self, name: str) -> Array:
+        """Return one of the OUTPUTS by name."""
+        return np.asarray(getattr(self, name), dtype=np.float64)
+
+    def columns(self) -> dict[str, Array]:
+        """Return the flat table of the trajectory: time, error and every component, named like ``frame_1_2`` (from 1)."""
+        table = {"t": self.times, "error": self.error}
+        for name in OUTPUTS:
+            values = self.series(name)
+            for index in np.ndindex(values.shape[1:]):
+                table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
+        return table
+
+    def to_npz(self, path: str | Path) -> None:
+        """Write all series, the integrals and the provenance to a NumPy archive."""
+        arrays = {name: self.series(name) for name in OUTPUTS}
+        integrals = {f"integral_{name}": values for name, values in self.integrals.items()}
+        provenance = json.dumps(self.provenance.as_dict())
+        with Path(path).open("wb") as file:  # an open file keeps savez from appending its own suffix to the name
+            np.savez_compressed(file, times=self.times, error=self.error, provenance=provenance, **arrays, **integrals)  # type: ignore[arg-type]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the flat table as comma-separated values, 17 digits, one row per time."""
+        table = self.columns()
+        np.savetxt(path, np.column_stack(list(table.values())), fmt="%.17g", delimiter=",", header=",".join(table), comments="")
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write the flat table as Parquet; raises BackendMissing without pyarrow."""
+        try:
+            from pyarrow import parquet, table
+        except ImportError:
+            raise BackendMissing("pyarrow", "Parquet output", "pip install pyarrow") from None
+        parquet.write_table(table(self.columns()), str(path))
+
+    def to_xarray(self) -> Any:
+        """Return an xarray Dataset with the time as its coordinate; raises BackendMissing without xarray."""
+        try:
+            from xarray import Dataset
+        except ImportError:
+            raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
+        variables: dict[str, Any] = {name: (("time", *axes), self.series(name)) for name, axes in OUTPUTS.items()}
+        variables["error"] = (("time",), self.error)
+        return Dataset(variables, coords={"time": self.times}, attrs=self.provenance.as_dict())
+
+    def plot(self) -> Figure:
+        """Return a matplotlib figure of the motion; raises BackendMissing without matplotlib."""
+        from veselova.mechanics.picture import picture
+
+        return picture(self)
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "system": f"{self.problem.system}, n = {self.problem.n}",
+            "engine": f"{self.provenance.engine} ({self.provenance.method})",
+            "times": f"{self.times.size} from {self.times[0]:g} to {self.times[-1]:g}",
+            "largest error": f"{np.max(self.error):.2g}",
+            "seconds": f"{self.provenance.seconds:.3g}",
+            **{f"drift of {name}": f"{value:.2g}" for name, value in self.drift.items()},
+        }
+        body = "".join(f"<tr><th style='text-align:left'>{key}</th><td>{value}</td></tr>" for key, value in rows.items())
+        return f"<table>{body}</table>"
+
+
+def _drift(values: Array) -> float:
+    scale = np.maximum(np.max(np.abs(values[:1]), initial=0.0), np.finfo(float).tiny)
+    if np.all(np.abs(values[:1]) < 1e-8):  # integrals that vanish, like (q,p), are measured against 1
+        scale = np.maximum(scale, 1.0)
+    return float(np.max(np.abs(values - values[:1]), initial=0.0) / scale)
