@@ -1,0 +1,1 @@
+"""The numerical engine: integration on the manifold, with a measured error."""

@@ -1,0 +1,55 @@
+"""SciPy's DOP853 (Dormand–Prince, order 8) as an integrator of the reduced flow."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.flow import ReducedFlow
+from veselova.numeric.integrator import Integrator
+
+__all__ = ["Dop853"]
+
+Array = NDArray[np.float64]
+
+
+class Dop853(Integrator):
+    """DOP853 at a relative tolerance, absolute tolerance a tenth of it (states are of order one)."""
+
+    #: 1e-13 is where rounding takes over (below it steps shrink and errors do not); ten times that shows its error.
+    tolerances: ClassVar[tuple[float, float]] = (1e-13, 1e-12)
+    method: ClassVar[str] = "dop853"
+
+    def __init__(self, flow: ReducedFlow, tolerance: float) -> None:
+        self._flow = flow
+        self._tolerance = tolerance
+        self._steps = 0
+
+    def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
+        """Return (states at the wanted times, state at stop)."""
+        outputs = wanted if wanted.size and wanted[-1] == stop else np.append(wanted, stop)
+        answer = solve_ivp(
+            self._flow.vector_field,
+            (start, stop),
+            state,
+            method="DOP853",
+            t_eval=outputs,
+            rtol=self._tolerance,
+            atol=self._tolerance / 10,
+        )
+        if not answer.success:
+            raise Unsolved(
+                "integration-failed", f"DOP853 stopped between t = {start:.6g} and {stop:.6g} (scaled): {answer.message}"
+            )
+        self._steps += answer.nfev // 12  # twelve stages a step
+        states = np.ascontiguousarray(answer.y.T)
+        return states[: wanted.size], states[-1]
+
+    @property
+    def steps(self) -> int:
+        """Return the number of steps taken so far."""
+        return self._steps
