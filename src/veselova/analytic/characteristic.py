@@ -1,0 +1,40 @@
+"""Half-integer theta characteristics [ε; δ] and those of the branch points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Characteristic"]
+
+
+@dataclass(frozen=True, order=True)
+class Characteristic:
+    """[ε; δ] in halves: each entry is 0 or 1 and stands for 0 or ½. Addition is modulo one, which changes θ by a sign at most."""
+
+    epsilon: tuple[int, ...]
+    delta: tuple[int, ...]
+
+    @classmethod
+    def zero(cls, genus: int) -> Characteristic:
+        """Return [0; 0], the characteristic of the common denominator θ(z)."""
+        return cls((0,) * genus, (0,) * genus)
+
+    @classmethod
+    def of_branch_point(cls, j: int, genus: int) -> Characteristic:
+        """Return η(b_j): η(b_0) = [0; ½…½], η(b_{2s−1}) = [½e_s; ½ from s on] (odd), η(b_{2s}) = [½e_s; ½ beyond s]."""
+        s = (j + 1) // 2
+        epsilon = tuple(int(i == s) for i in range(1, genus + 1))
+        first = s if j % 2 == 1 else s + 1
+        return cls(epsilon, tuple(int(i >= first) for i in range(1, genus + 1)))
+
+    def __add__(self, other: Characteristic) -> Characteristic:
+        """Return the sum modulo one, as in the two-index characteristics η(I_i) + η(c_k)."""
+        return Characteristic(
+            tuple((a + b) % 2 for a, b in zip(self.epsilon, other.epsilon, strict=True)),
+            tuple((a + b) % 2 for a, b in zip(self.delta, other.delta, strict=True)),
+        )
+
+    @property
+    def is_odd(self) -> bool:
+        """Return whether θ[ε; δ](−z) = −θ[ε; δ](z)."""
+        return sum(a * b for a, b in zip(self.epsilon, self.delta, strict=True)) % 2 == 1

@@ -1,0 +1,90 @@
+"""The rate of the clock, dt/dτ₁ as a function on the torus, and what a clock is.
+
+dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper). Two independent clocks
+integrate it along z = z⁰ + fτ₁: analytic.fourier_clock and analytic.panel_clock.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.precision import Values
+
+__all__ = ["Clock", "ClockRate"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ClockRate:
+    """dt/dτ₁ = scale · Π_s √(λ_s/b_{2s}) on the torus of one motion: the factors are at most one at any genus."""
+
+    inversion: AbelJacobi
+    scale: Any
+
+    def at(self, psi: Values) -> Values:
+        """Return dt/dτ₁ at angles of shape (N, g)."""
+        rate = 0 * psi[:, 0] + self.scale
+        for s, cut in enumerate(self.inversion.periods.cuts):
+            rate = rate * self._factor(s, cut.distances(psi[:, s])[2])
+        return np.asarray(rate)
+
+    def _factor(self, s: int, below: Values) -> Values:
+        curve = self.inversion.periods.curve
+        point = curve.branch_points[2 * s + 1] + below
+        return np.asarray(curve.arithmetic.sqrt(point / curve.branch_points[2 * s + 2]))
+
+    def columns(self, count: int) -> list[tuple[Values, Values]]:
+        """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
+
+        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ · e^{−2πi m·z} over the torus is
+        F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹: one-variable integrals only.
+        """
+        periods = self.inversion.periods
+        g, result = periods.genus, []
+        for s, cut in enumerate(periods.cuts):
+            psi = cut.nodes(count)
+            _, _, below, above = cut.distances(psi)
+            forms = cut.forms(below, above) * self._factor(s, below)
+            angles = np.zeros((count, g), dtype=psi.dtype)
+            angles[:, s] = psi
+            measure = (-1) ** (g - s - 1) * 2 * periods.arithmetic.pi / count
+            result.append((periods.inverse_cycles @ forms * measure, self.inversion.map(angles)))
+        return result
+
+    @cached_property
+    def mean(self) -> Any:
+        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
+        count = max(series.shape[1] for series in self.inversion.periods.cut_series)
+        means = [np.sum(weights, axis=1) for weights, _ in self.columns(count)]
+        return self.scale * self.inversion.periods.arithmetic.determinant(np.stack(means, axis=1))
+
+
+class Clock(ABC):
+    """Neumann time as a function of physical time along one orbit, and back."""
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def tau1(self, times: Array) -> tuple[Array, Array]:
+        """Return (τ₁, z modulo 2) at physical times."""
+
+    @abstractmethod
+    def time(self, tau1: Array) -> Array:
+        """Return t at Neumann times."""
+
+    @abstractmethod
+    def error(self, tau1: Array) -> Array:
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0 and f, shape (N,)."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Return the number of modes or of panel nodes."""

@@ -1,0 +1,116 @@
+"""Jacobi's elliptic functions on a quarter period, each value accurate relative to itself for every modulus.
+
+The modulus is given by both k² and k'² = 1−k², which come as products of differences of branch points: for a closing gap k'²
+is tiny and 1−k² would be noise. Angles are ψ = πv/K, so a function of period 2K in v has period 2π in ψ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.precision import Arithmetic, Values
+
+__all__ = ["Jacobi"]
+
+
+@dataclass(frozen=True)
+class Jacobi:
+    """sn, cn, dn of modulus k, with K = K(k) and K' = K(k') by the arithmetic–geometric mean."""
+
+    arithmetic: Arithmetic
+    k_squared: Any
+    complement: Any
+
+    @cached_property
+    def quarter(self) -> Any:
+        """Return K, the real quarter period; it grows like log(4/k')."""
+        xp = self.arithmetic
+        return xp.pi / 2 / xp.agm(xp.number(1), xp.sqrt(self.complement))
+
+    @cached_property
+    def conjugate_quarter(self) -> Any:
+        """Return K', the quarter period of the complementary modulus; infinite (raises) for a closed cut, k = 0."""
+        xp = self.arithmetic
+        return xp.pi / 2 / xp.agm(xp.number(1), xp.sqrt(self.k_squared))
+
+    @cached_property
+    def aspect(self) -> float:
+        """Return K'/K, which sets how fast trigonometric sums in ψ converge; infinite for k = 0."""
+        return float(self.conjugate_quarter / self.quarter) if self.k_squared > 0 else float("inf")
+
+    def __call__(self, psi: Values) -> tuple[Values, Values, Values]:
+        """Return sn, cn, dn at v = Kψ/π for any real ψ; sn and cn have period 4π in ψ, and their signs say where."""
+        xp = self.arithmetic
+        quarters = xp.floor(psi / xp.pi)
+        # Half angles from the nearer end keep cn near K, and sn near 0, accurate relative to themselves.
+        offset = psi - quarters * xp.pi
+        turn = np.array(quarters, dtype=float).astype(np.int64) % 4
+        offset = np.where(turn % 2 == 1, xp.pi - offset, offset)
+        near_end = offset > xp.pi / 2
+        s, c, d = self._first_half(np.where(near_end, xp.pi - offset, offset))
+        k_prime = xp.sqrt(self.complement)
+        s, c, d = np.where(near_end, c / d, s), np.where(near_end, k_prime * s / d, c), np.where(near_end, k_prime / d, d)
+        return np.where(turn >= 2, -s, s), np.where((turn == 1) | (turn == 2), -c, c), d
+
+    def _first_half(self, psi: Values) -> tuple[Values, Values, Values]:
+        """Return sn, cn, dn for 0 ≤ ψ ≤ π/2 (v ≤ K/2) by theta series in whichever nome is at most e^(−π)."""
+        return self._trigonometric(psi) if self.aspect >= 1 else self._hyperbolic(psi)
+
+    @cached_property
+    def _log_nome(self) -> Any:
+        ratio = self.conjugate_quarter / self.quarter
+        return -self.arithmetic.pi * (ratio if self.aspect >= 1 else 1 / ratio)
+
+    @cached_property
+    def _terms(self) -> int:
+        """Number of terms m ≥ 1 with nome^(m²−m) above the precision; the exponent is what is left after growth to v = K/2."""
+        return int(np.ceil(0.5 + np.sqrt(0.25 + np.log(1 / self.arithmetic.epsilon) / -float(self._log_nome))))
+
+    def _constants(self) -> tuple[Any, Any, Any]:
+        """Return θ_2/q^{1/4}, θ_3, θ_4 at zero."""
+        xp = self.arithmetic
+        one = xp.number(1)
+        t2, t3, t4 = 2 * one, one, one
+        for m in range(1, self._terms + 1):
+            power = xp.exp(self._log_nome * m * m)
+            t2 = t2 + 2 * xp.exp(self._log_nome * (m * m + m))
+            t3, t4 = t3 + 2 * power, t4 + 2 * (-1) ** m * power
+        return t2, t3, t4
+
+    def _trigonometric(self, psi: Values) -> tuple[Values, Values, Values]:
+        """sn = (θ3/θ2) θ1(z)/θ4(z), cn = (θ4/θ2) θ2(z)/θ4(z), dn = (θ4/θ3) θ3(z)/θ4(z), z = πv/2K = ψ/2."""
+        xp = self.arithmetic
+        z = psi / 2
+        sine, cosine = xp.sin(z), xp.cos(z)
+        if self.k_squared == 0:
+            return sine, cosine, 0 * psi + 1
+        t2, t3, t4 = self._constants()
+        z1, z2, z3, z4 = 2 * sine, 2 * cosine, 0 * psi + 1, 0 * psi + 1
+        for m in range(1, self._terms + 1):
+            odd, even = xp.exp(self._log_nome * (m * m + m)), 2 * xp.exp(self._log_nome * m * m)
+            z1, z2 = z1 + 2 * (-1) ** m * odd * xp.sin((2 * m + 1) * z), z2 + 2 * odd * xp.cos((2 * m + 1) * z)
+            wave = even * xp.cos(2 * m * z)
+            z3, z4 = z3 + wave, z4 + (-1) ** m * wave
+        return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
+
+    def _hyperbolic(self, psi: Values) -> tuple[Values, Values, Values]:
+        """Jacobi's imaginary transformation: sn = (θ3/θ4) (θ1/i)/θ2, cn = (θ2/θ4) θ4/θ2, dn = (θ2/θ3) θ3/θ2 at iy, y = πv/2K'.
+
+        All four sums are divided by e^y, and exponents are joined before exp: nothing overflows, whatever K/K'.
+        """
+        xp = self.arithmetic
+        y = psi / 2 * (self.quarter / self.conjugate_quarter)
+        q = self._log_nome
+        t2, t3, t4 = self._constants()
+        z1, z2, z3, z4 = -xp.expm1(-2 * y), 1 + xp.exp(-2 * y), xp.exp(-y), xp.exp(-y)
+        for m in range(1, self._terms + 1):
+            growth = xp.exp(q * (m * m + m) + 2 * m * y)
+            z1 = z1 - (-1) ** m * growth * xp.expm1(-(4 * m + 2) * y)
+            z2 = z2 + growth * (1 + xp.exp(-(4 * m + 2) * y))
+            wave = xp.exp(q * m * m + (2 * m - 1) * y) * (1 + xp.exp(-4 * m * y))
+            z3, z4 = z3 + wave, z4 + (-1) ** m * wave
+        return (t3 / t4) * z1 / z2, (t2 / t4) * z4 / z2, (t2 / t3) * z3 / z2

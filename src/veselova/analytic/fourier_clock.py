@@ -1,0 +1,149 @@
+"""The clock in closed form: every Fourier coefficient of dt/dτ₁ is a determinant of one-variable integrals.
+
+    t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f)
+
+Any t costs the same; the number of modes grows with the genus (n = 3: hundreds, n = 4: thousands, n = 5: ten thousands).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import Clock, ClockRate
+from veselova.analytic.increasing import increasing_root
+from veselova.analytic.orbit import LinearFlow
+
+__all__ = ["FourierClock"]
+
+Array = NDArray[np.float64]
+
+#: Modes below this fraction of F_0 are left out: there the determinants are rounding.
+_SMALLEST_MODE = 4e-16
+
+#: Modes that bring the inverse clock near its answer before all of them are summed.
+_FIRST_MODES = 64
+
+#: Smallest dt/dτ₁, as a part of its mean, that a Newton step of the inverse clock divides by.
+_LEAST_SLOPE = 0.05
+
+#: Entries of one block of (times × modes): 16 MB of temporaries.
+_BLOCK = 2_000_000
+
+#: A Newton step of this many cycles leaves an error of its square.
+_SETTLED = 1e-9
+
+
+class FourierClock(Clock):
+    """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ − t/F_0 stays bounded."""
+
+    name: ClassVar[str] = "fourier"
+
+    def __init__(self, rate: ClockRate, in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
+        self._in_tau1, self._in_time, self._mean = in_tau1, in_time, mean
+        modes, coefficients = _significant_modes(rate)
+        order = np.argsort(-np.abs(coefficients))
+        self._modes, coefficients = modes[order], coefficients[order]
+        # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
+        self._amplitudes = coefficients / (np.pi * (self._modes @ in_tau1.rates))
+        self._rates = 2 * coefficients
+        self._offset = 2 * np.pi * (self._modes @ in_tau1.start)
+
+    @property
+    def size(self) -> int:
+        """Return the number of modes kept, m and −m counted once."""
+        return int(self._modes.shape[0])
+
+    def error(self, tau1: Array) -> Array:
+        """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
+
+        Modes left out are as small and hardly more numerous; independent errors add in squares.
+        """
+        longest = 1 / (np.pi * np.abs(self._modes @ self._in_tau1.rates))
+        farthest = float(np.max(np.abs(tau1)))
+        spread = np.sqrt(np.sum(np.minimum(longest, farthest) ** 2)) if self.size else 0.0
+        return np.full(tau1.shape, 4 * _SMALLEST_MODE * (spread + 1 / float(np.max(np.abs(self._in_tau1.rates)))))
+
+    def time(self, tau1: Array) -> Array:
+        """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
+        return self._mean * tau1 + self._periodic(self._in_tau1.advance(tau1), self.size)[0]
+
+    def _periodic(self, advance: Array, size: int) -> tuple[Array, Array]:
+        """Return the sum over the first ``size`` modes at z = z⁰ + advance, and its derivative in τ₁.
+
+        The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
+        """
+        value, slope = np.empty(advance.shape[0]), np.empty(advance.shape[0])
+        modes, block = self._modes[:size], max(1, _BLOCK // max(size, 1))
+        for first in range(0, advance.shape[0], block):
+            rows = slice(first, first + block)
+            half = np.pi * (advance[rows] @ modes.T)
+            middle = half + self._offset[:size]
+            value[rows] = 2 * (np.cos(middle) * np.sin(half)) @ self._amplitudes[:size]
+            slope[rows] = np.cos(middle + half) @ self._rates[:size]
+        return value, slope
+
+    def tau1(self, times: Array) -> tuple[Array, Array]:
+        """Return (τ₁, z): Newton's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
+        uniform = self._in_time.advance(times)
+        reach = np.full_like(times, 2 * float(np.sum(np.abs(self._amplitudes))) / self._mean)
+        delta = np.zeros_like(times)
+        for size in sorted({min(self.size, _FIRST_MODES), self.size}):
+
+            def excess(delta: Array, size: int = size) -> tuple[Array, Array]:
+                periodic, slope = self._periodic(uniform + delta[:, None] * self._in_tau1.rates, size)
+                return self._mean * delta + periodic, self._mean + slope
+
+            if size < self.size:  # a truncated sum need not increase: two plain steps towards it are all it is good for
+                for _ in range(2):
+                    value, slope = excess(delta)
+                    delta = np.clip(delta - value / np.maximum(slope, _LEAST_SLOPE * self._mean), -reach, reach)
+            else:
+                delta = increasing_root(excess, delta, -reach, reach, _SETTLED / float(np.max(self._in_tau1.rates)))
+        z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
+        return times / self._mean + delta, z
+
+
+def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
+    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m.
+
+    The coefficients fall off like the support function of a convex body, so the set is convex up to its edge: it is grown
+    from zero through neighbours, in whichever directions it reaches far.
+    """
+    genus = rate.inversion.periods.genus
+    longest = max(series.shape[1] for series in rate.inversion.periods.cut_series)
+    steps = np.concatenate([np.eye(genus, dtype=np.int64), -np.eye(genus, dtype=np.int64)])
+    seen: set[bytes] = {np.zeros(genus, dtype=np.int64).tobytes()}
+    frontier = np.zeros((1, genus), dtype=np.int64)
+    kept_modes, kept_values = [], []
+    threshold = _SMALLEST_MODE * float(rate.mean)
+    count, columns = 0, []
+    while frontier.size:
+        needed = 2 * longest + 2 * int(np.max(np.abs(frontier)))
+        if needed > count:  # nodes enough for e^{−2πi m·G_s}, with room for the next layers
+            count = needed + 32
+            columns = rate.columns(count)
+        matrices = np.stack([np.cos(2 * np.pi * (frontier @ G.T)) @ weights.T for weights, G in columns], axis=2)
+        values = float(rate.scale) * np.linalg.det(matrices)
+        large = np.abs(values) > threshold
+        kept_modes.append(frontier[large])
+        kept_values.append(values[large])
+        neighbours = (frontier[large][:, None, :] + steps).reshape(-1, genus)
+        frontier = _unseen(_half_space(neighbours), seen)
+    modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
+    moving = np.any(modes != 0, axis=1)
+    return modes[moving].astype(np.float64), values[moving]
+
+
+def _half_space(modes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the distinct modes, each replaced by its negative where its first nonzero entry is negative."""
+    first = modes[np.arange(modes.shape[0]), np.argmax(modes != 0, axis=1)]
+    return np.unique(np.where(first[:, None] < 0, -modes, modes), axis=0)
+
+
+def _unseen(modes: NDArray[np.int64], seen: set[bytes]) -> NDArray[np.int64]:
+    fresh = [row for row in modes if row.tobytes() not in seen]
+    seen.update(row.tobytes() for row in fresh)
+    return np.array(fresh, dtype=np.int64).reshape(-1, modes.shape[1])

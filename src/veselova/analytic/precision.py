@@ -1,0 +1,183 @@
+"""The one place that touches precision: the arithmetic in which the closed form is evaluated.
+
+The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are float64; in ``Extended`` they
+are multiprecision numbers of an mpmath context that belongs to the arithmetic alone, so nothing global changes.
+"""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import elliprf
+
+__all__ = ["DOUBLE", "Arithmetic", "Double", "Extended", "extended"]
+
+#: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
+Values = NDArray[Any]
+
+
+class Arithmetic(ABC):
+    """Elementary functions, constants and small linear algebra at one precision. Functions act entrywise on arrays."""
+
+    digits: int
+    epsilon: float
+    pi: Any
+    sqrt: Callable[[Any], Any]
+    exp: Callable[[Any], Any]
+    expm1: Callable[[Any], Any]
+    log: Callable[[Any], Any]
+    sin: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    floor: Callable[[Any], Any]
+
+    @abstractmethod
+    def number(self, value: Any) -> Any:
+        """Return one number (Fraction, float, or a number of another arithmetic), rounded to this precision."""
+
+    @abstractmethod
+    def array(self, values: Any) -> Values:
+        """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
+
+    @abstractmethod
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+
+    @abstractmethod
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+
+    @abstractmethod
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+
+    def agm(self, a: Any, b: Any) -> Any:
+        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically from any ratio."""
+        while abs(a - b) > 4 * self.epsilon * abs(a):
+            a, b = (a + b) / 2, self.sqrt(a * b)
+        return (a + b) / 2
+
+
+class Double(Arithmetic):
+    """IEEE double precision through NumPy and SciPy."""
+
+    digits = 15
+    epsilon = float(np.finfo(float).eps)
+    pi = float(np.pi)
+    sqrt = staticmethod(np.sqrt)
+    exp = staticmethod(np.exp)
+    expm1 = staticmethod(np.expm1)
+    log = staticmethod(np.log)
+    sin = staticmethod(np.sin)
+    cos = staticmethod(np.cos)
+    floor = staticmethod(np.floor)
+
+    def number(self, value: Any) -> float:
+        """Return the nearest double."""
+        return float(value)
+
+    def array(self, values: Any) -> Values:
+        """Return a float64 array, entries correctly rounded."""
+        return np.array(np.vectorize(float, otypes=[float])(values) if np.size(values) else values, dtype=np.float64)
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+        return elliprf(x, y, z)
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+        return np.asarray(np.linalg.inv(matrix))
+
+    def determinant(self, matrix: Values) -> float:
+        """Return the determinant of a square matrix."""
+        return float(np.linalg.det(matrix))
+
+
+class Extended(Arithmetic):
+    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least 20)."""
+
+    #: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
+    _GUARD = 6
+
+    def __init__(self, digits: int) -> None:
+        self._context = mpmath.MPContext()
+        self._context.dps = digits + self._GUARD
+        self.digits = digits
+        self.epsilon = float(mpmath.mpf(10) ** -digits) if digits < 300 else 10.0**-300
+        self.pi = +self._context.pi
+        for name in ("sqrt", "exp", "expm1", "log", "sin", "cos", "floor"):
+            setattr(self, name, self._entrywise(getattr(self._context, name), 1))
+        self._rf = self._entrywise(self._context.elliprf, 3)
+
+    @staticmethod
+    def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
+        ufunc: Callable[..., Any] = np.frompyfunc(function, arguments, 1)
+        return ufunc
+
+    def number(self, value: Any) -> Any:
+        """Return one number, rounded to this precision."""
+        if isinstance(value, Fraction):
+            return self._context.mpf(value.numerator) / value.denominator
+        if isinstance(value, np.generic):
+            value = value.item()
+        return self._context.mpf(value)
+
+    def array(self, values: Any) -> Values:
+        """Return an object array of multiprecision numbers."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.shape, dtype=object)
+        for index, value in np.ndenumerate(given):
+            result[index] = self.number(value)
+        return result
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+        return self._rf(x, y, z)
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+        return self._from_matrix(self._context.inverse(self._context.matrix(matrix.tolist())))
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+        return self._context.det(self._context.matrix(matrix.tolist()))
+
+    def symmetric_eigenvalues(self, matrix: Values) -> list[Any]:
+        """Return the eigenvalues of a real symmetric matrix, increasing."""
+        values: Iterable[Any] = self._context.eigsy(self._context.matrix(matrix.tolist()), eigvals_only=True)
+        return sorted(values)
+
+    def _from_matrix(self, matrix: Any) -> Values:
+        result = np.empty((matrix.rows, matrix.cols), dtype=object)
+        for i in range(matrix.rows):
+            for j in range(matrix.cols):
+                result[i, j] = matrix[i, j]
+        return result
+
+
+class _ExtendedOfThread(threading.local):
+    """The extended arithmetics of one thread: an mpmath context changes its own precision while it works."""
+
+    def __init__(self) -> None:
+        self.by_digits: dict[int, Extended] = {}
+
+
+_extended_of_thread = _ExtendedOfThread()
+
+
+def extended(digits: int) -> Extended:
+    """Return this thread's extended arithmetic of the given digits; making one costs a millisecond."""
+    known = _extended_of_thread.by_digits
+    if digits not in known:
+        known[digits] = Extended(digits)
+    return known[digits]
+
+
+#: The double-precision arithmetic; it has no state, so one serves all.
+DOUBLE = Double()

@@ -1,0 +1,70 @@
+"""The attitude as theta quotients with one common denominator.
+
+    q_i = κ_i θ[η(I_i)]/θ,   v_k = (q', n_k) = κ_k θ[η(c_k)]/θ,   (n_k)_i = κ_ik θ[η(I_i)+η(c_k)]/θ,   γ the case c_1 = 0.
+
+The constants κ come from half periods z = ½ν, where every λ_s is a branch point and the closed formula of analytic.frame is
+exact: for each function the half period at which it is largest against its denominator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.frame import Attitude, Frame
+from veselova.analytic.theta import Theta
+
+__all__ = ["ThetaQuotients"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ThetaQuotients:
+    """The theta route to the attitude of one torus; agrees with Frame after Abel–Jacobi inversion, and shares only κ with it."""
+
+    theta: Theta
+    frame: Frame
+
+    @cached_property
+    def _characteristics(self) -> list[Characteristic]:
+        """Return those of q_1 … q_n, then of v_k, then of (n_k)_i with i before k; k runs over c_2 … c_{n−1}, c_1."""
+        curve = self.frame.periods.curve
+        g = curve.genus
+        of_I = [Characteristic.of_branch_point(curve.place["I", i], g) for i in range(g + 1)]
+        of_c = [Characteristic.of_branch_point(curve.place["c", k], g) for k in [*range(1, g), 0]]
+        return [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
+
+    @cached_property
+    def _distinct(self) -> tuple[list[Characteristic], NDArray[np.intp]]:
+        distinct = sorted(set(self._characteristics))
+        return distinct, np.array([distinct.index(c) for c in self._characteristics])
+
+    def _raw(self, z: Array) -> Array:
+        """Return θ[η](z)/θ(z) for the listed functions, shape (N, n + g + n·g)."""
+        distinct, places = self._distinct
+        values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *distinct])
+        return np.asarray((values[:, 1:] / values[:, :1])[:, places])
+
+    @cached_property
+    def constants(self) -> Array:
+        """Return the κ's in the order of the functions."""
+        g = self.theta.genus
+        half_periods = np.array(np.meshgrid(*[[0.0, 1.0]] * g, indexing="ij")).reshape(g, -1).T
+        attitude = self.frame.at(np.pi * half_periods)
+        exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
+        raw = self._raw(half_periods / 2)
+        best = np.argmax(np.abs(raw), axis=0)
+        columns = np.arange(raw.shape[1])
+        return np.asarray(exact[best, columns] / raw[best, columns])
+
+    def at(self, z: Array) -> Attitude:
+        """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are left to the caller (empty)."""
+        values = self._raw(z) * self.constants
+        g = self.theta.genus
+        n = g + 1
+        return Attitude(values[:, :n], values[:, n + g :].reshape(-1, n, g), values[:, n : n + g], np.empty((z.shape[0], 0)))

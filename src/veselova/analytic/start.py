@@ -1,0 +1,67 @@
+"""Where a motion begins on the torus: the angles ψ_s(0) on the cuts and the constant signs ς_i of q_i."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from veselova.analytic.curve import Curve
+from veselova.analytic.interval import Interval
+from veselova.analytic.precision import Values
+from veselova.analytic.spectrum import Spectrum
+
+__all__ = ["Start", "start"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """angles (g,) in [0, 2π) · signs (n,) of the q_i along sorted axes, against the roots of analytic.frame."""
+
+    angles: Values
+    signs: Values
+
+
+def start(spectrum: Spectrum, curve: Curve) -> Start:
+    """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum."""
+    ends = _ordered(spectrum)
+    increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
+    angles = [
+        _angle(Interval(curve, 2 * s + 1), x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
+        for s, x in enumerate(spectrum.spheroconic)
+    ]
+    signs = []
+    for i, (position, velocity) in enumerate(zip(spectrum.q, spectrum.q_prime, strict=True)):
+        b = curve.place["I", i]
+        lower_end, angle = b % 2 == 1, angles[curve.cut_of(b) - 1]
+        if position == 0:  # the root passes zero with ψ: upwards along sn at ψ = 0, downwards along cn at ψ = π
+            signs.append((1 if velocity > 0 else -1) * (1 if lower_end else -1))
+        else:
+            root_positive = lower_end or angle < curve.arithmetic.pi
+            signs.append((1 if position > 0 else -1) * (1 if root_positive else -1))
+    return Start(curve.arithmetic.array(angles), curve.arithmetic.array(signs))
+
+
+def _ordered(spectrum: Spectrum) -> list[Any]:
+    return sorted([*spectrum.constants, *spectrum.inverse])
+
+
+def _direction(spectrum: Spectrum, point: Any) -> bool:
+    """Return whether λ_s increases: λ' = 2 Σ q_iq_i'/(λ−I_i) / Σ q_i²/(λ−I_i)²; at an end of the cut it does not matter."""
+    slope: Any = 0
+    for q, v, inverse in zip(spectrum.q, spectrum.q_prime, spectrum.inverse, strict=True):
+        if point == inverse:
+            return True
+        slope += q * v / (point - inverse)
+    return bool(slope >= 0)
+
+
+def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
+    """Return ψ in [0, 2π): v = F(am v, k) = sn·R_F(cn², dn², 1), and 2K−v on the way back."""
+    xp = cut.curve.arithmetic
+    below, above = max(below, 0), max(above, 0)
+    sn_squared, cn_squared = cut.squares(xp.number(below), xp.number(above))
+    jacobi = cut.jacobi
+    dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
+    v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
+    psi = xp.pi * v / jacobi.quarter
+    return psi if increasing or psi == 0 else 2 * xp.pi - psi
