@@ -1,0 +1,72 @@
+"""Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by integration.
+
+    import veselova as vs
+    problem = vs.Veselova(A=[3, 2, 1.5, 1], q=[0.5, 0.5, 0.5, 0.5], q_dot=[0.5, -0.5, 0.3, -0.3])
+    trajectory = vs.solve(problem, times=[0, 1, 1000])
+    trajectory.frame                                # (3, 4, 4), columns e_i; trajectory.error bounds every component
+
+Names are loaded when first used: importing the client loads neither engine.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from veselova.version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from veselova.engines import compare as compare
+    from veselova.engines import solve as solve
+    from veselova.engines import torus as torus
+    from veselova.mechanics.comparison import Comparison as Comparison
+    from veselova.mechanics.errors import BackendMissing as BackendMissing
+    from veselova.mechanics.errors import InternalContradiction as InternalContradiction
+    from veselova.mechanics.errors import InvalidInput as InvalidInput
+    from veselova.mechanics.errors import ProblemResponse as ProblemResponse
+    from veselova.mechanics.errors import ServiceError as ServiceError
+    from veselova.mechanics.errors import ServiceUnreachable as ServiceUnreachable
+    from veselova.mechanics.errors import Unsolved as Unsolved
+    from veselova.mechanics.errors import VeselovaError as VeselovaError
+    from veselova.mechanics.torus import Torus as Torus
+    from veselova.mechanics.trajectory import Provenance as Provenance
+    from veselova.mechanics.trajectory import Trajectory as Trajectory
+    from veselova.mechanics.veselova import Veselova as Veselova
+    from veselova.service.client import AsyncClient as AsyncClient
+    from veselova.service.client import Client as Client
+
+#: Public name → the module that defines it.
+_HOMES = {
+    "AsyncClient": "veselova.service.client",
+    "BackendMissing": "veselova.mechanics.errors",
+    "Client": "veselova.service.client",
+    "Comparison": "veselova.mechanics.comparison",
+    "InternalContradiction": "veselova.mechanics.errors",
+    "InvalidInput": "veselova.mechanics.errors",
+    "ProblemResponse": "veselova.mechanics.errors",
+    "Provenance": "veselova.mechanics.trajectory",
+    "ServiceError": "veselova.mechanics.errors",
+    "ServiceUnreachable": "veselova.mechanics.errors",
+    "Torus": "veselova.mechanics.torus",
+    "Trajectory": "veselova.mechanics.trajectory",
+    "Unsolved": "veselova.mechanics.errors",
+    "Veselova": "veselova.mechanics.veselova",
+    "VeselovaError": "veselova.mechanics.errors",
+    "compare": "veselova.engines",
+    "solve": "veselova.engines",
+    "torus": "veselova.engines",
+}
+
+__all__ = ["__version__", *sorted(_HOMES)]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'veselova' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

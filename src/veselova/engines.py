@@ -1,0 +1,50 @@
+"""The two engines behind one call. An engine is imported when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.trajectory import Trajectory
+from veselova.mechanics.veselova import Veselova
+
+if TYPE_CHECKING:
+    from veselova.mechanics.torus import Torus
+
+__all__ = ["ENGINES", "compare", "solve", "torus"]
+
+#: Engine → the module whose ``solve`` it is.
+ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
+
+
+def solve(problem: Veselova, times: Any, engine: str = "analytic", method: str | None = None) -> Trajectory:
+    """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
+
+    ``engine``: ``analytic`` (closed form) or ``numeric`` (integration). ``method``: None for the engine's default;
+    analytic: ``theta`` or ``angles``; numeric: ``dop853`` or ``taylor`` (extra ``fast``).
+    Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem, BackendMissing without its library.
+    """
+    if not isinstance(problem, Veselova):
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+    if engine not in ENGINES:
+        raise InvalidInput(("engine",), f"one of {', '.join(ENGINES)}", shown(engine))
+    options = {} if method is None else {"method": method}
+    answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
+    return answer
+
+
+def compare(problem: Veselova, times: Any, method: str | None = None) -> Comparison:
+    """Return both engines' answers and their differences; ``method`` is the numerical one (``dop853`` or ``taylor``)."""
+    return Comparison(solve(problem, times, "analytic"), solve(problem, times, "numeric", method))
+
+
+def torus(problem: Veselova) -> Torus:
+    """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the analytic engine does."""
+    if not isinstance(problem, Veselova):
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+    from veselova.analytic.torus import torus as torus_of
+
+    return torus_of(problem)
