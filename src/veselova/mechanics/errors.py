@@ -2,6 +2,7 @@
 
 VeselovaError
 ├── InvalidInput            bad input; names the field, what was required, what was given   (also a ValueError)
+├── InvalidRequest          a JSON request with one or more such faults                     (also a ValueError)
 ├── Unsolved                an engine's named outcome: it cannot serve this problem, and why
 ├── BackendMissing          an optional library that was asked for is not installed          (also an ImportError)
 ├── InternalContradiction   two results that must agree do not: a bug of ours
@@ -19,6 +20,7 @@ __all__ = [
     "BackendMissing",
     "InternalContradiction",
     "InvalidInput",
+    "InvalidRequest",
     "ProblemResponse",
     "ServiceError",
     "ServiceUnreachable",
@@ -37,7 +39,8 @@ def shown(value: object) -> str:
         text = value if isinstance(value, str) and value.strip() != "" else repr(value)
     except ValueError:  # an int of more digits than Python is willing to print
         text = f"an integer of about {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else "a value"
-    text = " ".join(text.split())
+    # Lone surrogates, which JSON strings can carry, cannot be written as UTF-8.
+    text = " ".join(text.encode("utf-8", "backslashreplace").decode("utf-8").split())
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
@@ -71,12 +74,20 @@ class InvalidInput(VeselovaError, ValueError):
     @property
     def field(self) -> str:
         """Return the field in the notation of its Python argument, e.g. ``frame[0][2]``."""
-        head, *rest = self.path or ("input",)
+        head, *rest = self.path or ("the request",)
         return str(head) + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in rest)
 
     def below(self, *parents: str | int) -> InvalidInput:
         """Return the same error, located inside the given parents (``problem``, say)."""
         return InvalidInput((*parents, *self.path), self.required, self.given)
+
+
+class InvalidRequest(VeselovaError, ValueError):
+    """A JSON request with faults, each an InvalidInput whose path starts at the request's root."""
+
+    def __init__(self, faults: Sequence[InvalidInput]) -> None:
+        self.faults = tuple(faults)
+        super().__init__(" ".join(str(fault) for fault in self.faults))
 
 
 class Unsolved(VeselovaError):

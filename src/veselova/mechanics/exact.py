@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Real
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
 
-__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "to_float"]
+__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "plain", "to_float"]
 
 Number = int | float | str | Fraction | Decimal
 
@@ -81,7 +81,7 @@ def _parse_numeral(text: str) -> Fraction:
 def _items(values: Any, path: Path, required: str) -> list[Any]:
     if isinstance(values, np.ndarray):
         values = values.tolist()
-    if isinstance(values, (str, bytes, dict)) or not isinstance(values, Iterable):
+    if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
         raise InvalidInput(path, required, shown(values))
     return list(values)
 
@@ -102,6 +102,17 @@ def exact_matrix(values: Any, path: Path, size: int) -> tuple[tuple[Fraction, ..
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
     return tuple(exact_vector(row, (*path, i), size) for i, row in enumerate(rows))
+
+
+def plain(value: Any) -> Any:
+    """Return an accepted number, vector or matrix in JSON types, without rounding: ratios and decimals become strings."""
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (Fraction, Decimal)):
+        return str(value)
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def is_matrix(values: Any) -> bool:

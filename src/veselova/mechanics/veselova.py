@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, to_float
+from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plain, to_float
 from veselova.mechanics.flow import ReducedFlow
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized
 from veselova.mechanics.spheroconic import to_spheroconic
@@ -46,6 +47,7 @@ class Veselova:
     frame: Array
     axes: Array | None
     exact: ExactState
+    given: Mapping[str, Any]
 
     system: ClassVar[str] = "veselova"
 
@@ -75,6 +77,8 @@ class Veselova:
             start_frame = _admissible_frame(given_frame, position)
         self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes)
         object.__setattr__(self, "exact", ExactState(diagonal, exact_q, exact_q_dot, natural=given_frame is None))
+        given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
+        object.__setattr__(self, "given", {name: plain(value) for name, value in given.items() if value is not None})
         if not np.isfinite(self.energy) or (self.energy == 0 and self.moves):
             raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {self.energy}")
 
@@ -134,6 +138,10 @@ class Veselova:
             "constants": integrals.constants_of_motion(self.A, q, q_dot),
         }
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
+        return {"system": self.system, **self.given}
+
     def conditioning_floor(self, times: Array) -> Array:
         """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
         return np.asarray(np.finfo(float).eps * np.maximum(1.0, np.linalg.norm(self.q_dot) * np.abs(times)), dtype=np.float64)
@@ -171,7 +179,7 @@ def _principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
             raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
         for i, value in enumerate(diagonal):
             if value <= 0 or float(value) == 0:
-                raise InvalidInput(("A", i), "a finite number greater than 0", str(float(value)))
+                raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
         return diagonal, None
     n = len(A)
     if n < 2:

@@ -1,0 +1,1 @@
+"""The doors: HTTP API, its client, and the command line."""

@@ -1,0 +1,220 @@
+"""The command line. Exit status: 0 solved, 1 could not be solved, 2 bad input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from veselova.version import __version__
+
+__all__ = ["main"]
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+_File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input")]
+_Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
+_Output = Annotated[Path | None, typer.Option(help="write the motion to a file: .npz, .csv, .parquet or .json")]
+_Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
+_Method = Annotated[str | None, typer.Option(help="theta or angles (analytic), dop853 or taylor (numeric)")]
+
+
+def main() -> None:
+    """Run the command line; errors are one sentence on standard error."""
+    with _reported():
+        app()
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError
+    from veselova.service.problem_details import Refused
+
+    try:
+        yield
+    except (InvalidInput, InvalidRequest, Refused) as error:
+        _fail(str(error), 2)
+    except VeselovaError as error:
+        _fail(str(error), 1)
+    except BrokenPipeError:  # the reader of our output has gone, as in `veselova solve … | head`
+        sys.stderr.close()
+        raise SystemExit(1) from None
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+
+
+def _fail(message: str, status: int) -> None:
+    print(f"veselova: {message}", file=sys.stderr)
+    raise SystemExit(status)
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="print the version")] = False) -> None:
+    """Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by integration."""
+    if version:
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command()
+def demo(method: Annotated[str | None, typer.Option(help="numeric: dop853 or taylor")] = None, plot: _Plot = None) -> None:
+    """Solve a four-dimensional body with both engines and show how they agree."""
+    from veselova.service.examples import BODY4
+
+    _compare({**BODY4, "method": method}, False, None, plot)
+
+
+@app.command()
+def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None) -> None:
+    """Solve a motion with one engine."""
+    from veselova.service.console import print_trajectory
+    from veselova.service.documents import trajectory_document
+    from veselova.service.schemas import TrajectoryRequest, read_request
+    from veselova.service.tasks import requested_trajectory
+
+    request = read_request(TrajectoryRequest, _document(file))
+    _check_suffixes(output, plot)
+    trajectory = requested_trajectory(request)
+    if output:
+        _write(trajectory, output, request.outputs)
+    if plot:
+        _draw(trajectory, plot)
+    if json:
+        _print_json(trajectory_document(trajectory, request.outputs))
+    else:
+        print_trajectory(_console(), trajectory)
+
+
+@app.command()
+def compare(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None, method: _Method = None) -> None:
+    """Solve a motion with both engines and show how they agree."""
+    document = _document(file)
+    if method is not None and isinstance(document, dict):
+        document = {**document, "method": method}
+    _compare(document, json, output, plot)
+
+
+def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
+    from veselova.service.console import print_comparison
+    from veselova.service.documents import comparison_document
+    from veselova.service.schemas import ComparisonRequest, read_request
+    from veselova.service.tasks import requested_comparison
+
+    if isinstance(document, dict):
+        document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
+    request = read_request(ComparisonRequest, document)
+    _check_suffixes(output, plot)
+    comparison = requested_comparison(request)
+    if output:
+        _write(comparison.analytic, output, request.outputs)
+    if plot:
+        _draw(comparison, plot)
+    if json:
+        _print_json(comparison_document(comparison, request.outputs))
+    else:
+        print_comparison(_console(), comparison)
+        if plot:
+            print(f"Picture: {plot}")
+
+
+@app.command()
+def torus(file: _File, json: _Json = False) -> None:
+    """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
+    from veselova.service.console import print_torus
+    from veselova.service.schemas import TorusRequest, read_request
+    from veselova.service.tasks import requested_torus
+
+    document = _document(file)
+    if isinstance(document, dict):  # the file of a motion serves here too
+        document = {name: value for name, value in document.items() if name in ("problem", "budget_s")}
+    answer = requested_torus(read_request(TorusRequest, document))
+    if json:
+        _print_json(answer.as_dict())
+    else:
+        print_torus(_console(), answer)
+
+
+@app.command()
+def serve(
+    host: Annotated[str, typer.Option(help="address to bind")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")] = 8000,
+    settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
+) -> None:
+    """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
+    from pydantic import ValidationError
+
+    from veselova.service.settings import Settings
+
+    try:
+        limits = Settings()
+    except ValidationError as error:
+        item = error.errors()[0]
+        _fail(f"VESELOVA_{str(item['loc'][0]).upper()}: {item['msg']}; given {item['input']}", 2)
+        return
+    if settings:
+        for name, value in limits.model_dump().items():
+            print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
+        return
+    import uvicorn
+
+    from veselova.service.app import create_app
+
+    # Requests in flight get ten seconds to finish after SIGTERM; their workers are killed with the loop.
+    uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=10)
+
+
+def _document(file: str) -> Any:
+    from veselova.mechanics.errors import InvalidInput
+    from veselova.service.admission import decoded
+
+    try:
+        text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
+    except OSError as error:
+        raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
+    return decoded(text)
+
+
+def _console() -> Any:
+    from rich.console import Console
+
+    # Tables keep their columns when the output is a file; a terminal's own width is taken as it is.
+    return Console(width=None if sys.stdout.isatty() else 120)
+
+
+def _print_json(document: Any) -> None:
+    from veselova.service.documents import encoded
+
+    sys.stdout.buffer.write(encoded(document) + b"\n")
+    sys.stdout.buffer.flush()
+
+
+_WRITERS = (".npz", ".csv", ".parquet", ".json")
+_PICTURES = (".png", ".pdf", ".svg")
+
+
+def _check_suffixes(output: Path | None, plot: Path | None) -> None:
+    """Refuse a file name before the work, not after it."""
+    from veselova.mechanics.errors import InvalidInput
+
+    for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
+        if path is not None and path.suffix not in suffixes:
+            raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
+        if path is not None and not path.parent.is_dir():
+            raise InvalidInput((option,), "a file in an existing folder", str(path))
+
+
+def _write(trajectory: Any, path: Path, outputs: list[Any]) -> None:
+    from veselova.service.documents import encoded, trajectory_document
+
+    if path.suffix == ".json":
+        path.write_bytes(encoded(trajectory_document(trajectory, outputs)))
+    else:
+        getattr(trajectory, f"to_{path.suffix[1:]}")(path)
+
+
+def _draw(subject: Any, path: Path) -> None:
+    subject.plot().savefig(path, dpi=130)

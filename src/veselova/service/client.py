@@ -1,0 +1,247 @@
+"""The HTTP client, synchronous and asynchronous from one core. Loads neither engine.
+
+with veselova.Client("http://127.0.0.1:8000") as client:
+    trajectory = client.trajectory(problem, times=[0, 1, 2])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
+
+import httpx2 as httpx
+import numpy as np
+import orjson
+import stamina
+
+from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceUnreachable, shown
+from veselova.mechanics.exact import plain
+from veselova.mechanics.torus import Torus
+from veselova.mechanics.trajectory import Trajectory
+from veselova.mechanics.veselova import Veselova
+from veselova.service.documents import NEEDED_OUTPUTS, comparison_of, torus_of, trajectory_of
+
+__all__ = ["AsyncClient", "Client"]
+
+T = TypeVar("T")
+P = ParamSpec("P")
+
+#: Statuses that may pass if the same request is sent again: too many requests, overload or a lost worker.
+_RETRIED_STATUSES = frozenset({429, 503})
+
+#: Seconds that the answer may take on its way beyond the budget of the work itself.
+_TRANSFER_S = 10.0
+
+
+#: Longest pause that a server can ask for.
+_LONGEST_PAUSE_S = 30.0
+
+#: Failures of the connection. An answer that did not come in time is not among them: asking again would double the load.
+_PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
+
+
+@dataclass(frozen=True)
+class _Call(Generic[T]):
+    """One request: where it goes, its body, how long it may take, and what its answer becomes."""
+
+    path: str
+    body: Mapping[str, Any]
+    budget_s: float
+    result: Callable[[Any], T]
+
+
+class _Retry(Exception):
+    """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may ask for a pause in seconds."""
+
+    def __init__(self, cause: Exception, pause: float | None = None) -> None:
+        self.cause = cause
+        self.pause = pause
+
+
+def _pause_before_retry(error: Exception) -> bool | float:
+    """Return whether to try again, or after how many seconds: the hook of stamina's retries."""
+    return isinstance(error, _Retry) and (error.pause or True)
+
+
+def _problem(problem: Veselova | Mapping[str, Any]) -> Veselova:
+    """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated here already."""
+    if isinstance(problem, Veselova):
+        return problem
+    if not isinstance(problem, Mapping):
+        raise InvalidInput(("problem",), "a veselova.Veselova or a mapping with its JSON fields", shown(problem))
+    from veselova.service.schemas import VeselovaModel, read_request
+
+    return read_request(VeselovaModel, dict(problem)).problem()
+
+
+def _times(times: Any) -> Any:
+    return dict(times) if isinstance(times, Mapping) else plain(np.asarray(times) if isinstance(times, range) else times)
+
+
+def _trajectory_call(
+    problem: Veselova | Mapping[str, Any],
+    times: Any,
+    engine: str = "analytic",
+    method: str | None = None,
+    *,
+    budget_s: float = 10.0,
+) -> _Call[Trajectory]:
+    """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
+    asked = _problem(problem)
+    body = {"engine": engine, **_motion(asked, times, method, budget_s)}
+    return _Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
+
+
+def _compare_call(
+    problem: Veselova | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
+) -> _Call[Comparison]:
+    """Return both engines' motions and how they agree (see ``veselova.compare``)."""
+    asked = _problem(problem)
+    return _Call("/v1/comparisons", _motion(asked, times, method, budget_s), budget_s, partial(comparison_of, asked))
+
+
+def _torus_call(problem: Veselova | Mapping[str, Any], *, budget_s: float = 10.0) -> _Call[Torus]:
+    """Return the invariant torus of a motion (see ``veselova.torus``)."""
+    return _Call("/v1/tori", {"problem": _problem(problem).as_dict(), "budget_s": budget_s}, budget_s, torus_of)
+
+
+def _motion(problem: Veselova, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
+    return {
+        "problem": problem.as_dict(),
+        "times": _times(times),
+        "method": method,
+        "outputs": list(NEEDED_OUTPUTS),
+        "budget_s": budget_s,
+    }
+
+
+class _Core:
+    """What both clients share: the address, the retries, the reading of answers."""
+
+    def __init__(self, base_url: str, *, attempts: int = 4) -> None:
+        self._base_url = base_url
+        self._attempts = attempts
+
+    def _retries(self) -> Any:
+        """Return a fresh retry context; one belongs to one call."""
+        return stamina.retry_context(on=_pause_before_retry, attempts=self._attempts, timeout=None, wait_initial=0.2)
+
+    def _request(self, call: _Call[Any]) -> dict[str, Any]:
+        headers = {"content-type": "application/json", "accept": "application/json, application/problem+json"}
+        timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
+        return {"method": "POST", "url": call.path, "content": orjson.dumps(call.body), "headers": headers, "timeout": timeout}
+
+    def _result(self, call: _Call[T], response: httpx.Response) -> T:
+        """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
+        if response.status_code == httpx.codes.OK:
+            return call.result(orjson.loads(response.content))
+        try:
+            document = orjson.loads(response.content)
+        except orjson.JSONDecodeError:
+            document = None
+        if not isinstance(document, dict):
+            document = {"title": response.reason_phrase, "status": response.status_code, "detail": shown(response.text)}
+        failure = ProblemResponse(response.status_code, document)
+        if response.status_code not in _RETRIED_STATUSES:
+            raise failure
+        pause = response.headers.get("retry-after", "")
+        raise _Retry(failure, min(float(pause), _LONGEST_PAUSE_S) if pause.isdigit() else None)
+
+    def _unreachable(self, error: httpx.TransportError) -> Exception:
+        """Return the failure behind a transport error, to be retried where the connection itself failed."""
+        failure = ServiceUnreachable(f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}")
+        failure.__cause__ = error
+        return _Retry(failure) if isinstance(error, _PASSING) else failure
+
+
+class Client(_Core):
+    """A synchronous client. Every method answers with the same types as the library itself.
+
+    ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before anything is sent,
+    ProblemResponse with the server's problem document, ServiceUnreachable when no answer comes.
+    """
+
+    def __init__(self, base_url: str = "http://127.0.0.1:8000", *, attempts: int = 4, transport: Any = None) -> None:
+        super().__init__(base_url, attempts=attempts)
+        self._http = httpx.Client(base_url=base_url, transport=transport)
+
+    def _send(self, call: _Call[T]) -> T:
+        try:
+            for attempt in self._retries():
+                with attempt:
+                    try:
+                        response = self._http.request(**self._request(call))
+                    except httpx.TransportError as error:
+                        raise self._unreachable(error) from None
+                    return self._result(call, response)
+        except _Retry as retry:
+            raise retry.cause from None
+        raise AssertionError("a retry context gives at least one attempt")
+
+    @staticmethod
+    def _method(call: Callable[P, _Call[T]]) -> Callable[Concatenate[Client, P], T]:
+        def method(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
+            return self._send(call(*args, **kwargs))
+
+        method.__doc__ = call.__doc__
+        return method
+
+    trajectory = _method(_trajectory_call)
+    compare = _method(_compare_call)
+    torus = _method(_torus_call)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class AsyncClient(_Core):
+    """The asynchronous client: the same methods, awaited."""
+
+    def __init__(self, base_url: str = "http://127.0.0.1:8000", *, attempts: int = 4, transport: Any = None) -> None:
+        super().__init__(base_url, attempts=attempts)
+        self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
+
+    async def _send(self, call: _Call[T]) -> T:
+        try:
+            async for attempt in self._retries():
+                with attempt:
+                    try:
+                        response = await self._http.request(**self._request(call))
+                    except httpx.TransportError as error:
+                        raise self._unreachable(error) from None
+                    return self._result(call, response)
+        except _Retry as retry:
+            raise retry.cause from None
+        raise AssertionError("a retry context gives at least one attempt")
+
+    @staticmethod
+    def _method(call: Callable[P, _Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:
+        def method(self: AsyncClient, /, *args: P.args, **kwargs: P.kwargs) -> Awaitable[T]:
+            return self._send(call(*args, **kwargs))
+
+        method.__doc__ = call.__doc__
+        return method
+
+    trajectory = _method(_trajectory_call)
+    compare = _method(_compare_call)
+    torus = _method(_torus_call)
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()

@@ -1,0 +1,107 @@
+"""What the command line prints: tables on a terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.torus import Torus
+from veselova.mechanics.trajectory import Trajectory
+
+__all__ = ["print_comparison", "print_torus", "print_trajectory"]
+
+#: Rows of a trajectory that a terminal is shown; files and JSON have all.
+_SHOWN_TIMES = 12
+
+
+def _table(*columns: str) -> Table:
+    table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+    return table
+
+
+def _heading(console: Console, text: str) -> None:
+    console.print(f"\n{text}", style="bold", highlight=False)
+
+
+def _describe(trajectory: Trajectory) -> str:
+    problem, provenance = trajectory.problem, trajectory.provenance
+    span = f"{trajectory.times.size} times from {trajectory.times[0]:g} to {trajectory.times[-1]:g}"
+    motion = f"n = {problem.n}, energy {problem.energy:.12g}, {span}"
+    return f"{motion}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
+
+
+def print_trajectory(console: Console, trajectory: Trajectory) -> None:
+    """Print the motion at some of its times, the error estimate and the drift of the integrals."""
+    console.print(_describe(trajectory), highlight=False)
+    n = trajectory.problem.n
+    shown = min(n, 6)
+    table = _table("t", "τ₁", *(f"q_{i + 1}" for i in range(shown)), *(["…"] if n > shown else []), "error")
+    for i in np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int)):
+        components = [f"{x: .9f}" for x in trajectory.q[i, :shown]] + (["…"] if n > shown else [])
+        table.add_row(f"{trajectory.times[i]:g}", f"{trajectory.tau1[i]:.6f}", *components, f"{trajectory.error[i]:.1e}")
+    console.print(table)
+    _print_drift(console, {trajectory.provenance.engine: trajectory})
+
+
+def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:
+    _heading(console, "Drift of the integrals of motion")
+    table = _table("integral", *trajectories)
+    drifts = [trajectory.drift for trajectory in trajectories.values()]
+    for name in drifts[0]:
+        table.add_row(name, *(f"{drift[name]:.1e}" for drift in drifts))
+    console.print(table)
+
+
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print how the engines agree, quantity by quantity, against their own error estimates and the conditioning floor."""
+    console.print(_describe(comparison.analytic), highlight=False)
+    console.print(_describe(comparison.numeric), highlight=False)
+    _heading(console, "Largest difference of the two engines")
+    table = _table("output", "deviation")
+    for name, value in comparison.deviation.items():
+        table.add_row(name, f"{value:.1e}")
+    console.print(table)
+    _heading(console, "What to hold it against")
+    table = _table("bound", "largest value")
+    table.add_row("error estimate, analytic", f"{np.max(comparison.analytic.error):.1e}")
+    table.add_row("error estimate, numeric", f"{np.max(comparison.numeric.error):.1e}")
+    table.add_row("conditioning floor (one rounding of the data)", f"{np.max(comparison.conditioning_floor):.1e}")
+    console.print(table)
+    _print_drift(console, {"analytic": comparison.analytic, "numeric": comparison.numeric})
+    verdict = (
+        "The engines agree within their error estimates."
+        if comparison.agrees
+        else "The engines DISAGREE beyond their error estimates."
+    )
+    console.print(f"\n{verdict}", highlight=False)
+
+
+def print_torus(console: Console, torus: Torus) -> None:
+    """Print the torus: constants, branch points, frequencies, periods."""
+    console.print(f"n = {torus.n}, genus {torus.n - 1}, energy {torus.energy:.12g}, regime {torus.regime}", highlight=False)
+    _heading(console, "Branch points")
+    table = _table("b", "origin", "value")
+    for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
+        table.add_row(f"b_{j}", origin, f"{value:.15g}")
+    console.print(table)
+    _heading(console, "Phases (cycles)")
+    table = _table("s", "z⁰", "per unit τ₁", "per unit t")
+    for s, row in enumerate(zip(torus.phases, torus.frequencies_tau1, torus.frequencies_t, strict=True), start=1):
+        table.add_row(str(s), *(f"{x:.15g}" for x in row))
+    console.print(table)
+    _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
+    _print_matrix(console, f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})", torus.riemann_matrix)
+
+
+def _print_matrix(console: Console, title: str, matrix: Any) -> None:
+    _heading(console, title)
+    table = _table(*("" for _ in range(matrix.shape[1])))
+    for row in matrix:
+        table.add_row(*(f"{x: .12g}" for x in row))
+    console.print(table)

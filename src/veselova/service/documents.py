@@ -1,0 +1,102 @@
+"""The JSON of answers, both ways: a result becomes a document, and a document the same result again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import orjson
+
+from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.torus import Torus
+from veselova.mechanics.trajectory import OUTPUTS, Provenance, Trajectory
+from veselova.mechanics.veselova import Veselova
+
+__all__ = [
+    "NEEDED_OUTPUTS",
+    "comparison_document",
+    "comparison_of",
+    "encoded",
+    "torus_of",
+    "trajectory_document",
+    "trajectory_of",
+]
+
+#: The outputs from which a Trajectory can be rebuilt: q is the first column of the frame, and ω = q∧q̇.
+NEEDED_OUTPUTS = ("q_dot", "frame", "spheroconic", "tau1")
+
+
+def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:
+    """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's start and drift."""
+    drift = trajectory.drift
+    return {
+        "engine": trajectory.provenance.engine,
+        "times": trajectory.times,
+        "series": {name: trajectory.series(name) for name in outputs},
+        "integrals": {name: {"initial": values[0], "drift": drift[name]} for name, values in trajectory.integrals.items()},
+        "error": trajectory.error,
+        "provenance": trajectory.provenance.as_dict(),
+    }
+
+
+def trajectory_of(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
+    """Return the trajectory of a document that has NEEDED_OUTPUTS; numbers come back to the last bit."""
+    series = {name: np.array(document["series"][name], dtype=np.float64) for name in NEEDED_OUTPUTS}
+    times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
+    return Trajectory(
+        problem,
+        times,
+        error,
+        series["tau1"],
+        series["frame"][:, :, 0],
+        series["q_dot"],
+        series["frame"],
+        series["spheroconic"],
+        Provenance(**document["provenance"]),
+    )
+
+
+def comparison_document(comparison: Comparison, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:
+    """Return the document of a comparison: both trajectories, and the largest deviation of every output."""
+    outputs = tuple(outputs)
+    return {
+        **comparison.summary(),
+        "analytic": trajectory_document(comparison.analytic, outputs),
+        "numeric": trajectory_document(comparison.numeric, outputs),
+    }
+
+
+def comparison_of(problem: Veselova, document: Mapping[str, Any]) -> Comparison:
+    """Return the comparison of a document whose trajectories have NEEDED_OUTPUTS."""
+    return Comparison(trajectory_of(problem, document["analytic"]), trajectory_of(problem, document["numeric"]))
+
+
+def torus_of(document: Mapping[str, Any]) -> Torus:
+    """Return the torus of a document."""
+    values = dict(document)
+    for name in ("constants", "branch_points", "periods", "riemann_matrix", "frequencies_tau1", "frequencies_t", "phases"):
+        values[name] = np.array(values[name], dtype=np.float64)
+    return Torus(**{**values, "origins": tuple(values["origins"])})
+
+
+def encoded(document: Mapping[str, Any]) -> bytes:
+    """Return a document as JSON bytes; NaN and infinity, which JSON cannot say and orjson writes as null, are our bug."""
+    _require_finite(document, "document")
+    return orjson.dumps(_contiguous(document), option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _require_finite(value: Any, place: str) -> None:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            _require_finite(item, f"{place}.{key}")
+    elif isinstance(value, (float, np.ndarray, np.floating)) and not np.all(np.isfinite(value)):
+        raise InternalContradiction(f"{place} holds a number that is not finite")
+
+
+def _contiguous(value: Any) -> Any:
+    """Return the document with every array in the memory order that orjson takes."""
+    if isinstance(value, Mapping):
+        return {key: _contiguous(item) for key, item in value.items()}
+    return np.ascontiguousarray(value) if isinstance(value, np.ndarray) and value.ndim else value

@@ -1,0 +1,88 @@
+"""RFC 9457 problem documents: the one table from exception to HTTP status and code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import orjson
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+from veselova.mechanics.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved
+
+__all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_document", "problem_response"]
+
+MEDIA_TYPE = "application/problem+json"
+
+#: Status codes of HTTPException that the framework itself raises, with the code and title of their documents.
+_FRAMEWORK = {404: ("not-found", "No such resource"), 405: ("method-not-allowed", "Method not allowed")}
+
+#: Exception → (status, code, title); the most specific class of an exception decides. ``type`` is urn:veselova:problem:code.
+TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
+    InvalidInput: (422, "invalid-input", "The input is not valid"),
+    InvalidRequest: (422, "invalid-input", "The input is not valid"),
+    Unsolved: (422, "unsolved", "The engine cannot serve this problem"),
+    BackendMissing: (501, "backend-missing", "An optional library is not installed on this server"),
+    InternalContradiction: (500, "internal-contradiction", "Two results that must agree do not"),
+    Exception: (500, "internal-error", "The server failed"),
+}
+
+#: What the service itself refuses: code → (status, title).
+_REFUSALS = {
+    "malformed-json": (400, "The body is not JSON"),
+    "not-acceptable": (406, "No acceptable representation"),
+    "body-too-large": (413, "The body is too large"),
+    "unsupported-media-type": (415, "The body must be application/json"),
+    "worker-lost": (503, "The worker process was lost"),
+    "overloaded": (503, "Too many requests are waiting"),
+    "not-ready": (503, "The server is starting"),
+    "over-budget": (504, "The time budget was used up"),
+}
+
+
+class Refused(Exception):
+    """A request that the service refuses for a reason of its own, by the code of its document."""
+
+    def __init__(self, code: str, detail: str, retry_after: int | None = None) -> None:
+        self.code = code
+        self.detail = detail
+        self.retry_after = retry_after
+        super().__init__(detail)
+
+
+def problem_document(error: Exception) -> dict[str, Any]:
+    """Return the problem document of an exception; what is not ours is reported without its message."""
+    if isinstance(error, Refused):
+        status, title = _REFUSALS[error.code]
+        return _document(status, error.code, title, error.detail)
+    if isinstance(error, HTTPException):
+        code, title = _FRAMEWORK.get(error.status_code, ("http-error", "The request was refused"))
+        return _document(error.status_code, code, title, str(error.detail))
+    status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
+    detail = str(error) if code != "internal-error" else "An unexpected error; it has been logged."
+    document = _document(status, code, title, detail)
+    faults = error.faults if isinstance(error, InvalidRequest) else (error,) if isinstance(error, InvalidInput) else ()
+    if faults:
+        document["errors"] = [{"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults]
+    if isinstance(error, Unsolved):
+        document["outcome"] = error.outcome
+    return document
+
+
+def problem_response(error: Exception) -> Response:
+    """Return the HTTP response that carries the problem document of an exception."""
+    document = problem_document(error)
+    headers = dict(error.headers or {}) if isinstance(error, HTTPException) else {}
+    if isinstance(error, Refused) and error.retry_after is not None:
+        headers["Retry-After"] = str(error.retry_after)
+    return Response(orjson.dumps(document), document["status"], headers, MEDIA_TYPE)
+
+
+def _document(status: int, code: str, title: str, detail: str) -> dict[str, Any]:
+    return {"type": f"urn:veselova:problem:{code}", "title": title, "status": status, "detail": detail}
+
+
+def _pointer(path: tuple[str | int, ...]) -> str:
+    """Return the RFC 6901 pointer of a path."""
+    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in path)

@@ -1,0 +1,83 @@
+"""The resources of the HTTP API."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import orjson
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from veselova.mechanics.trajectory import OUTPUTS
+from veselova.service.admission import admit, read_json, require_acceptable
+from veselova.service.problem_details import Refused
+from veselova.service.schemas import read_request
+from veselova.service.settings import Settings
+from veselova.service.tasks import TASKS
+from veselova.service.workers import Workers
+from veselova.version import __version__
+
+__all__ = ["RESOURCES", "router"]
+
+#: Path → (kind of answer, summary, what the answer holds).
+RESOURCES = {
+    "/v1/trajectories": ("trajectory", "Solve a motion with one engine", "The motion at the given times"),
+    "/v1/comparisons": ("comparison", "Solve a motion with both engines", "Both motions and how they agree"),
+    "/v1/tori": ("torus", "Describe the invariant torus of a motion", "Curve, periods, frequencies, phases"),
+}
+
+#: The systems served, for clients that discover them.
+_SYSTEMS = {
+    "systems": [
+        {
+            "system": "veselova",
+            "title": "Rank-one Veselova problem with inertia (A_i A_j/det A)",
+            "fields": ["A", "q", "q_dot", "frame", "normalize"],
+            "engines": {"analytic": ["theta", "angles"], "numeric": ["dop853", "taylor"]},
+            "outputs": list(OUTPUTS),
+        }
+    ]
+}
+
+
+def router(settings: Settings, workers: Workers) -> APIRouter:
+    """Return the routes of one server, over its settings and workers."""
+    routes = APIRouter()
+    for path, (kind, summary, _) in RESOURCES.items():
+        routes.add_api_route(
+            path, _computing(kind, settings, workers), methods=["POST"], summary=summary, name=kind, tags=["motions"]
+        )
+
+    @routes.get("/v1/systems", summary="List the systems that can be solved", tags=["service"])
+    async def systems() -> Response:
+        return _json({**_SYSTEMS, "version": __version__, "limits": settings.model_dump()})
+
+    @routes.get("/healthz", summary="Whether the server runs", tags=["service"])
+    async def healthz() -> Response:
+        return _json({"status": "ok", "version": __version__})
+
+    @routes.get("/readyz", summary="Whether a worker is warm", tags=["service"])
+    async def readyz() -> Response:
+        if not workers.warm:
+            raise Refused("not-ready", "No worker is warm yet.", retry_after=1)
+        return _json({"status": "ready"})
+
+    return routes
+
+
+def _computing(kind: str, settings: Settings, workers: Workers) -> Callable[[Request], Awaitable[Response]]:
+    model, _ = TASKS[kind]
+
+    async def compute(request: Request) -> Response:
+        require_acceptable(request.headers.get("accept"))
+        asked = read_request(model, await read_json(request, settings))
+        admit(asked, settings)
+        body = await workers.run(kind, asked.model_dump(), asked.budget_s)
+        return Response(body, media_type="application/json")
+
+    return compute
+
+
+def _json(document: dict[str, Any]) -> Response:
+    return Response(orjson.dumps(document), media_type="application/json")

@@ -1,0 +1,138 @@
+"""The JSON of requests: which fields there are. What numbers may be is said once, by mechanics.exact.
+
+The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document) and validated where the
+problem is built, so that Python, command line and HTTP refuse the same input with the same sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
+
+from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
+from veselova.mechanics.exact import exact_number, to_float
+from veselova.mechanics.times import uniform_times, validated_times
+from veselova.mechanics.trajectory import OUTPUTS
+from veselova.mechanics.veselova import Veselova
+from veselova.service.examples import BODY4, BODY4_PROBLEM
+
+__all__ = ["ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
+
+_NUMBER = {
+    "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100}],
+    "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
+}
+_VECTOR = {"type": "array", "items": _NUMBER, "minItems": 2}
+_MATRIX = {"type": "array", "items": _VECTOR, "minItems": 2}
+_UNIFORM = {
+    "type": "object",
+    "properties": {"start": _NUMBER, "stop": _NUMBER, "count": {"type": "integer", "minimum": 1}},
+    "required": ["start", "stop", "count"],
+    "additionalProperties": False,
+}
+_TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
+
+_Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
+_Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
+_Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
+_Times = Annotated[Any, WithJsonSchema(_TIMES)]
+
+Output = Literal["q", "q_dot", "frame", "omega", "spheroconic", "tau1"]
+
+
+class _Request(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class VeselovaModel(_Request):
+    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state at t = 0."""
+
+    system: Literal["veselova"]
+    A: Annotated[_Inertia, Field(description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2")]
+    q: Annotated[_Vector, Field(description="unit vector e_1, n numbers")]
+    q_dot: Annotated[_Vector, Field(description="its velocity, orthogonal to q, n numbers")]
+    frame: Annotated[_Frame, Field(description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out")] = None
+    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
+
+    def problem(self) -> Veselova:
+        """Return the problem; raises InvalidInput located below ``problem``."""
+        try:
+            return Veselova(self.A, self.q, self.q_dot, self.frame, normalize=self.normalize)
+        except InvalidInput as error:
+            raise error.below("problem") from None
+
+
+class TorusRequest(_Request):
+    """A problem whose invariant torus is asked for."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
+
+    problem: VeselovaModel
+    budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped")] = 10.0
+
+
+class ComparisonRequest(TorusRequest):
+    """A motion asked of both engines."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
+
+    times: Annotated[_Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
+    method: Annotated[str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")] = None
+    outputs: Annotated[list[Output], Field(min_length=1)] = list(OUTPUTS)  # type: ignore[arg-type]
+    digits: Annotated[int, Field(ge=15, le=15, description="decimal digits of the computation")] = 15
+
+    def time_grid(self) -> Any:
+        """Return the times asked for as an array; raises InvalidInput located at ``times``."""
+        if not isinstance(self.times, dict):
+            return validated_times(self.times)
+        unknown = [key for key in self.times if key not in ("start", "stop", "count")]
+        if unknown or len(self.times) < 3:
+            given = f"the fields {', '.join(self.times) or 'none'}"
+            raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", shown(given))
+        count = self.times["count"]
+        if isinstance(count, bool) or not isinstance(count, int):
+            raise InvalidInput(("times", "count"), "a whole number", shown(count))
+        start, stop = to_float([exact_number(self.times[key], ("times", key)) for key in ("start", "stop")]).tolist()
+        return uniform_times(start, stop, count)
+
+    def time_count(self) -> int:
+        """Return how many times are asked for, without building them (a list, or a count)."""
+        count = self.times.get("count") if isinstance(self.times, dict) else self.times
+        if isinstance(count, int):
+            return count
+        return len(count) if isinstance(count, list) else 0
+
+
+class TrajectoryRequest(ComparisonRequest):
+    """A motion asked of one engine."""
+
+    engine: Literal["analytic", "numeric"] = "analytic"
+
+
+_Model = TypeVar("_Model", bound=_Request)
+
+
+def read_request(model: type[_Model], document: Any) -> _Model:
+    """Return the request that a decoded JSON document states; raises InvalidRequest with every fault found."""
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise InvalidRequest([_fault(item) for item in error.errors(include_url=False, include_context=True)]) from None
+
+
+def _fault(item: Any) -> InvalidInput:
+    """Return pydantic's finding in the words of the other doors: field, required, given."""
+    path, kind, given = tuple(item["loc"]), item["type"], shown(item.get("input"))
+    if kind == "missing":
+        return InvalidInput(path, "this field", "nothing")
+    if kind == "extra_forbidden":
+        return InvalidInput(path, "no field of this name", f"the field {shown(str(path[-1]))}")
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return InvalidInput(path, "a JSON object", given)
+    required: Sequence[str] = {
+        "literal_error": [str(item.get("ctx", {}).get("expected", ""))],
+        "bool_type": ["true or false"],
+    }.get(kind, [item["msg"][:1].lower() + item["msg"][1:]])
+    return InvalidInput(path, required[0], given)
