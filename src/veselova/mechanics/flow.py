@@ -6,7 +6,7 @@ and time in units of 1/|q̇(0)|: the field is then of order one whatever the sca
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,19 @@ class ReducedFlow:
         w = sliding_velocity(A, q, q_dot)
         return np.asarray(A * w * (q @ (A * q)), dtype=np.float64)
 
+    def neighbour(self, distance: float) -> ReducedFlow:
+        """Return the flow of a start moved by about ``distance`` on the manifold, energy included: how data rounding acts."""
+        n = self.n
+        direction = np.random.default_rng(n).normal(size=self.initial.size) / np.sqrt(n)
+        p, E = self.initial[:n], self.initial[n:-1].reshape(n, n)
+        q = E[:, 0] + distance * direction[:n]
+        q /= np.linalg.norm(q)
+        E = orthonormalized(np.column_stack([q, E[:, 1:]]))
+        p = p + distance * float(np.linalg.norm(p)) * direction[n : 2 * n]
+        p = p - (p @ E[:, 0]) * E[:, 0]
+        twice_energy = float(p @ (self.inverse * p) / (E[:, 0] @ (self.A * E[:, 0])))
+        return replace(self, twice_energy=twice_energy, initial=np.concatenate([p, E.ravel(), [0.0]]))
+
     @property
     def n(self) -> int:
         """Return the dimension of the body."""
@@ -85,11 +98,14 @@ class ReducedFlow:
         return np.concatenate([p, E.ravel(), state[-1:]])
 
     def unpack(self, states: Array) -> tuple[Array, Array, Array]:
-        """Return (frame, q̇, τ₁) in the user's units from states of shape (N, n + n² + 1)."""
+        """Return (frame, q̇, τ₁) in the user's units from states of shape (N, n + n² + 1).
+
+        Frames are made orthonormal and p orthogonal to q; the energy is left as integrated, so that its drift can be seen.
+        """
         n = self.n
-        p, E = states[:, :n], states[:, n:-1].reshape(-1, n, n)
+        p, E = states[:, :n], orthonormalized(states[:, n:-1].reshape(-1, n, n))
         q = E[:, :, 0]
-        p_inverse = self.inverse * p
+        p_inverse = self.inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
         qAq = np.sum(q * self.A * q, axis=1, keepdims=True)
         q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / qAq
         return E, q_dot / self.time_unit, states[:, -1] * self.tau1_unit

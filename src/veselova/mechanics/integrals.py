@@ -48,12 +48,20 @@ def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     return sliding
 
 
+def _norm(vectors: Array) -> Array:
+    """Return the lengths of vectors whose squares may leave the float range."""
+    largest = np.max(np.abs(vectors), axis=-1, keepdims=True)
+    unit = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
+    return np.asarray(largest[..., 0] * np.sqrt(np.sum(unit * unit, axis=-1)), dtype=np.float64)
+
+
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
     """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape (...)."""
     scaled, k = unit_scale(A)
-    w = sliding_velocity(scaled, q, q_dot)
-    h = np.sum(scaled * w * w, axis=-1) * np.sum(scaled * q * q, axis=-1) / (2 * np.prod(scaled))
-    return np.asarray(np.ldexp(h, k * (2 - A.size)), dtype=np.float64)
+    w = _norm(np.sqrt(scaled) * sliding_velocity(scaled, q, q_dot))
+    with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
+        h = w * w * (np.sum(scaled * q * q, axis=-1) / (2 * np.prod(scaled)))
+        return np.asarray(np.ldexp(h, k * (2 - A.size)), dtype=np.float64)
 
 
 def momentum(A: Array, q: Array, q_dot: Array) -> Array:
@@ -69,8 +77,7 @@ def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
 
     Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is A-orthogonal to q.
     """
-    w = sliding_velocity(A, q, q_dot)
-    return np.asarray(np.sqrt(np.sum(A * w * w, axis=-1)), dtype=np.float64)
+    return _norm(np.sqrt(A) * sliding_velocity(A, q, q_dot))
 
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:

@@ -68,9 +68,9 @@ class Veselova:
             position, velocity = axes.T @ position, axes.T @ velocity
             given_frame = None if given_frame is None else axes.T @ given_frame
             exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
-        position = _unit(position)
-        velocity = velocity - (velocity @ position) * position
+        position, velocity = _unit(position), _tangent(exact_q, exact_q_dot)
         A_float = to_float(diagonal)
+        _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
             start_frame = natural_frame(A_float, position, velocity)
         else:
@@ -79,8 +79,6 @@ class Veselova:
         object.__setattr__(self, "exact", ExactState(diagonal, exact_q, exact_q_dot, natural=given_frame is None))
         given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
         object.__setattr__(self, "given", {name: plain(value) for name, value in given.items() if value is not None})
-        if not np.isfinite(self.energy) or (self.energy == 0 and self.moves):
-            raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {self.energy}")
 
     def _set(self, **arrays: Array | None) -> None:
         for name, value in arrays.items():
@@ -200,6 +198,12 @@ def _unit(vector: Array) -> Array:
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
+def _tangent(q: tuple[Fraction, ...], q_dot: tuple[Fraction, ...]) -> Array:
+    """Return q̇ − (q,q̇)/(q,q) q, rounded once: exactly zero where q̇ is along q."""
+    along = sum(a * b for a, b in zip(q, q_dot, strict=True)) / sum(a * a for a in q)
+    return to_float([b - along * a for a, b in zip(q, q_dot, strict=True)])
+
+
 def _require_on_sphere(q: Array, q_dot: Array) -> None:
     length = float(np.linalg.norm(q))
     if abs(length - 1) > INPUT_TOLERANCE:
@@ -211,6 +215,12 @@ def _require_on_sphere(q: Array, q_dot: Array) -> None:
             raise InvalidInput(
                 ("q_dot",), "a vector orthogonal to q to 1e-9 of its length (or normalize=True)", f"cosine {slope:.3g} with q"
             )
+
+
+def _require_representable_energy(A: Array, q: Array, q_dot: Array) -> None:
+    energy = float(integrals.energy(A, q, q_dot))
+    if not np.isfinite(energy) or (energy == 0 and np.any(q_dot)):
+        raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")
 
 
 def _admissible_frame(frame: Array, q: Array) -> Array:

@@ -1,0 +1,140 @@
+"""The problem table: motions with tags, through which every engine runs.
+
+Tags: ``generic`` (all branch points distinct), ``special-start`` (generic torus, start on a coordinate axis or at a turning
+point), ``near-degenerate`` (a gap or cut nearly closed), ``closed-cut``, ``closed-gap``, ``at-rest`` (the outcome that the
+analytic engine names), ``matrix`` (A given as a matrix), ``scaled`` (units far from one), ``reference`` (45-digit motion).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from veselova import Veselova
+
+REFERENCE = Path(__file__).parent / "reference" / "rank1.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One row of the table: the problem, the times of interest, and the reference points where there are any."""
+
+    name: str
+    A: Sequence[Any]
+    q: Sequence[Any]
+    q_dot: Sequence[Any]
+    tags: frozenset[str]
+    frame: Any = None
+    horizon: float = 50.0
+    points: tuple[dict[str, Any], ...] = field(default=(), repr=False)
+
+    @cache  # noqa: B019 - cases live as long as the module
+    def problem(self) -> Veselova:
+        """Return the problem, normalised."""
+        return Veselova(self.A, self.q, self.q_dot, self.frame, normalize=True)
+
+    def times(self, count: int = 6) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return times spread over both directions up to the horizon, zero not among them."""
+        half = self.horizon * np.geomspace(1e-2, 1.0, count // 2)
+        return np.concatenate([-half[::-1], half])
+
+
+def _tags(*names: str) -> frozenset[str]:
+    return frozenset(names)
+
+
+def _reference_cases() -> list[Case]:
+    special = {
+        "axis-start": _tags("generic", "special-start"),
+        "planar": _tags("closed-cut"),
+        "symmetric-two": _tags("closed-cut"),
+        "near-equal": _tags("generic", "near-degenerate"),
+        "slow": _tags("generic", "scaled"),
+    }
+    cases = []
+    for item in json.loads(REFERENCE.read_text())["problems"]:
+        tags = special.get(item["name"], _tags("generic")) | {"reference"}
+        horizon = max(float(point["t"]) for point in item["points"])
+        cases.append(Case(item["name"], item["A"], item["q"], item["q_dot"], tags, item["frame"], horizon, tuple(item["points"])))
+    return cases
+
+
+def near_separatrix(gap: float) -> Case:
+    """Return an n = 3 motion with c_2 above I_2 by about ``gap``: the unstable great circle's neighbourhood.
+
+    q' is turned in the tangent plane until F_2 = q_2² + Σ P_2j²/(I_2−I_j), which vanishes where c_2 = I_2, is as wanted.
+    """
+    A = np.array([3.0, 2.0, 1.0])
+    q = np.array([0.6, 0.48, 0.64])
+    tangent = np.array([0.8, -0.36, -0.48]), np.array([0.0, 0.8, -0.6])
+
+    def excess(angle: float) -> float:
+        problem = Veselova(A, q, np.cos(angle) * tangent[0] + np.sin(angle) * tangent[1], normalize=True)
+        return float(problem.constants[0]) - 0.5 - gap
+
+    low, high = _bracket(excess)
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(low) * excess(middle) > 0 else (low, middle)
+    q_dot = np.cos(low) * tangent[0] + np.sin(low) * tangent[1]
+    return Case(
+        f"near-separatrix-{gap:g}", A.tolist(), q.tolist(), q_dot.tolist(), _tags("generic", "near-degenerate"), horizon=30.0
+    )
+
+
+def _bracket(function: Any) -> tuple[float, float]:
+    angles = np.linspace(0, np.pi, 40)
+    values = [function(a) for a in angles]
+    for a, b, x, y in zip(angles, angles[1:], values, values[1:], strict=False):
+        if x * y < 0:
+            return float(a), float(b)
+    raise AssertionError("no sign change: choose another start")
+
+
+def _matrix_case() -> Case:
+    rotation = np.linalg.qr(np.random.default_rng(7).normal(size=(4, 4)))[0]
+    A = rotation @ np.diag([3.0, 2.0, 1.5, 1.0]) @ rotation.T
+    return Case(
+        "matrix-inertia", ((A + A.T) / 2).tolist(), [0.5, 0.5, 0.5, 0.5], [1.1, -0.7, 0.3, -0.7], _tags("generic", "matrix")
+    )
+
+
+TABLE: tuple[Case, ...] = (
+    *_reference_cases(),
+    Case("body4", [3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"], _tags("generic")),
+    Case("pendulum-like", [5, 1], [0.6, 0.8], [-0.8, 0.6], _tags("generic")),
+    Case("rising-A", [0.3, 0.5, 0.8, 1.3, 2.1], [1, -1, 2, -2, 1], [0.1, 0.3, -0.2, 0.5, 1], _tags("generic")),
+    Case(
+        "eight", [1, 2, 3, 4, 5, 6, 7, 8], [1, 1, -1, 1, 1, -1, 1, 1], [1, -2, 3, -4, 3, 2, -1, 0.5], _tags("generic"), horizon=20
+    ),
+    Case("ratio-100", [100, 10, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("generic")),
+    Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-gap")),
+    Case("two-axes-vanish", [4, 3, 2, 1], [0, 0.6, 0.8, 0], [0.5, 0.8, -0.6, 0.3], _tags("generic", "special-start")),
+    Case("large-units", [3e8, 2e8, 1.1e8], [0.3, 0.5, 0.8], [1e-6, -4e-7, 2e-7], _tags("generic", "scaled"), horizon=5e7),
+    Case("fast", [3, 2, 1], [0.3, 0.5, 0.8], [1e9, -4e8, 2e8], _tags("generic", "scaled"), horizon=5e-8),
+    near_separatrix(1e-3),
+    near_separatrix(1e-6),
+    near_separatrix(1e-10),
+    Case(
+        "nearly-equal-A",
+        [2, "1.00000001", 1, 0.7],
+        [0.3, 0.5, 0.8, 0.2],
+        [1, -0.4, 0.2, 0.1],
+        _tags("generic", "near-degenerate"),
+    ),
+    _matrix_case(),
+    Case("isotropic", [1, 1, 1], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("closed-cut")),
+    Case("unstable-circle", [3, 2, 1], [1, 0, 0], [0, 0, 1], _tags("closed-gap")),
+    Case("at-rest", [3, 2, 1], [0.3, 0.5, 0.8], [0, 0, 0], _tags("at-rest")),
+)
+
+
+def tagged(*tags: str) -> list[Case]:
+    """Return the cases that carry all the tags."""
+    return [case for case in TABLE if case.tags.issuperset(tags)]

@@ -1,0 +1,94 @@
+"""The Abel–Jacobi map in real angles, both ways, and the start of a motion on its torus."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from draws import random_problem
+from problems import tagged
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.curve import Curve
+from veselova.analytic.frame import Frame
+from veselova.analytic.periods import Periods
+from veselova.analytic.precision import DOUBLE, Extended, extended
+from veselova.analytic.spectrum import spectrum
+from veselova.analytic.start import start
+from veselova.mechanics.integrals import neumann_velocity
+
+DIMENSIONS = range(2, 9)
+
+
+def inversion_of(problem: Any) -> AbelJacobi:
+    return AbelJacobi(Periods(Curve.of(spectrum(problem, extended(40)), DOUBLE)))
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_inversion_undoes_the_map(n: int, rng: np.random.Generator) -> None:
+    for _ in range(5):
+        inversion = inversion_of(random_problem(rng, n))
+        psi = rng.uniform(-10, 10, (40, n - 1))
+        assert np.max(np.abs(inversion.invert(inversion.map(psi)) - psi)) < 1e-12
+        z = rng.uniform(-3, 3, (40, n - 1))
+        assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 2e-14
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_the_jacobian_is_the_derivative_of_the_map(n: int, rng: np.random.Generator) -> None:
+    inversion = inversion_of(random_problem(rng, n))
+    psi, step = rng.uniform(0, 6, (10, n - 1)), 1e-6
+    jacobian = inversion.jacobian(psi)
+    for s in range(n - 1):
+        e = np.eye(n - 1)[s] * step
+        difference = (inversion.map(psi + e) - inversion.map(psi - e)) / (2 * step)
+        assert np.allclose(jacobian[:, :, s], difference, atol=1e-8)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_branch_points_lie_at_half_periods(n: int, rng: np.random.Generator) -> None:
+    inversion = inversion_of(random_problem(rng, n))
+    psi = np.pi * rng.integers(-3, 4, (20, n - 1))
+    assert np.allclose(inversion.map(psi), psi / (2 * np.pi), atol=1e-14)
+
+
+def test_the_map_is_quasi_periodic_and_odd(rng: np.random.Generator) -> None:
+    inversion = inversion_of(random_problem(rng, 4))
+    psi = rng.uniform(0, 6, (20, 3))
+    assert np.allclose(
+        inversion.map(psi + 2 * np.pi * np.array([1, 0, -2])), inversion.map(psi) + np.array([1, 0, -2]), atol=1e-13
+    )
+    assert np.allclose(inversion.map(-psi), -inversion.map(psi), atol=1e-14)
+
+
+def test_extended_inversion_starts_from_the_double_one(rng: np.random.Generator) -> None:
+    problem = tagged("generic")[1].problem()
+    spectra = spectrum(problem, extended(40))
+    precise = AbelJacobi(Periods(Curve.of(spectra, Extended(30))), coarse=inversion_of(problem))
+    z = precise.arithmetic.array(rng.uniform(-1, 1, (3, 2)))
+    assert np.max(np.abs(precise.map(precise.invert(z)) - z)) < 1e-28
+
+
+@pytest.mark.parametrize("case", tagged("generic"), ids=lambda case: case.name)
+def test_the_start_gives_back_position_and_velocity(case: Any) -> None:
+    problem = case.problem()
+    spectra = spectrum(problem, extended(40))
+    curve = Curve.of(spectra, DOUBLE)
+    begin = start(spectra, curve)
+    attitude = Frame(Periods(curve), begin.signs).at(begin.angles[None, :])
+    order = list(spectra.order)
+    v = neumann_velocity(problem.A, problem.q, problem.q_dot)
+    assert np.allclose(attitude.q[0], problem.q[order], atol=1e-14)
+    assert np.allclose(attitude.q_prime[0], v[order], atol=1e-13 * np.max(np.abs(v)))
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, -1)])
+@pytest.mark.parametrize("q_dot", [[0, 1, 0.5], [0, -1, 0.5], [0, 1, -0.5]])
+def test_a_start_on_an_axis_takes_its_signs_from_the_velocity(signs: Any, q_dot: Any) -> None:
+    from veselova import Veselova, solve
+
+    problem = Veselova([3, 2, 1], np.array([1, 0, 0]) * signs[0], np.array(q_dot) * signs)
+    step = 1e-4
+    q = solve(problem, [step]).q[0]
+    assert np.allclose(q, problem.q + step * problem.q_dot, atol=1e-7)

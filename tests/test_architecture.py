@@ -1,0 +1,138 @@
+"""The house rules that a machine can hold: who imports whom, how large a room is, what is public."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import veselova
+
+ROOT = Path(veselova.__file__).parent
+REPOSITORY = Path(__file__).parent.parent
+FILES = sorted(ROOT.rglob("*.py"))
+
+#: Part → what its modules may import at module level, besides the standard library.
+ALLOWED = {
+    "mechanics": {"numpy", "scipy", "veselova.mechanics", "veselova.version"},
+    "analytic": {"numpy", "scipy", "mpmath", "veselova.mechanics", "veselova.analytic", "veselova.version"},
+    "numeric": {"numpy", "scipy", "veselova.mechanics", "veselova.numeric", "veselova.version"},
+}
+
+#: What may be imported inside a function, because the library is optional or slow to load.
+ALLOWED_LATER = {
+    "mechanics": {"matplotlib", "pyarrow", "xarray"},
+    "analytic": set(),
+    "numeric": {"heyoka"},
+}
+
+
+def _imports(tree: ast.AST) -> list[str]:
+    names = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names.append(node.module or "")
+    return names
+
+
+def _split_imports(path: Path) -> tuple[list[str], list[str]]:
+    """Return the imports at module level (type-checking ones left out) and those inside functions."""
+    tree = ast.parse(path.read_text())
+    inner = [
+        name for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) for name in _imports(node)
+    ]
+    checking = [
+        name
+        for node in tree.body
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+        for name in _imports(node)
+    ]
+    outer = _imports(tree)
+    for name in inner + checking:
+        outer.remove(name)
+    return outer, inner
+
+
+def _permitted(name: str, allowed: set[str]) -> bool:
+    top = name.split(".")[0]
+    if top != "veselova":
+        return top in sys.stdlib_module_names or top in allowed
+    return any(name == entry or name.startswith(entry + ".") for entry in allowed)
+
+
+@pytest.mark.parametrize("part", sorted(ALLOWED))
+def test_each_part_imports_only_what_it_may(part: str) -> None:
+    for path in sorted((ROOT / part).glob("*.py")):
+        outer, inner = _split_imports(path)
+        for name in outer:
+            assert _permitted(name, ALLOWED[part]), f"{path.name} imports {name}"
+        for name in inner:
+            assert _permitted(name, ALLOWED[part] | ALLOWED_LATER[part]), f"{path.name} imports {name}"
+
+
+def test_only_one_file_touches_precision() -> None:
+    users = {
+        path.name
+        for path in FILES
+        if {"mpmath", "flint"} & {name.split(".")[0] for name in _imports(ast.parse(path.read_text()))}
+    }
+    assert users == {"precision.py"}
+
+
+def test_files_fit_on_a_few_screens_and_functions_do_one_thing() -> None:
+    for path in FILES:
+        text = path.read_text()
+        assert text.count("\n") <= 300, f"{path.name} has {text.count(chr(10))} lines"
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                assert (node.end_lineno or 0) - node.lineno < 60, f"{path.name}: {node.name} is too long"
+
+
+def test_folders_are_at_most_two_deep() -> None:
+    assert all(len(path.relative_to(ROOT).parts) <= 2 for path in FILES)
+
+
+def test_the_parts_stand_at_the_front_door() -> None:
+    for part in ("analytic", "numeric", "service"):
+        link = REPOSITORY / part
+        assert link.is_symlink()
+        assert link.resolve() == (ROOT / part).resolve()
+
+
+def test_every_public_name_exists_and_is_documented() -> None:
+    assert veselova.__all__ == ["__version__", *sorted(veselova.__all__[1:])]
+    for name in veselova.__all__:
+        value = getattr(veselova, name)
+        assert name == "__version__" or value.__doc__, name
+    with pytest.raises(AttributeError):
+        _ = veselova.no_such_name  # type: ignore[attr-defined]
+
+
+def test_every_module_and_public_function_has_a_docstring() -> None:
+    for path in FILES:
+        tree = ast.parse(path.read_text())
+        assert ast.get_docstring(tree), path
+        for node in tree.body:
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
+                assert ast.get_docstring(node), f"{path.name}: {node.name}"
+
+
+@pytest.mark.parametrize(
+    "statement", ["import veselova; veselova.Client; veselova.AsyncClient", "import veselova.service.schemas"]
+)
+def test_client_and_schemas_load_neither_engine(statement: str) -> None:
+    engines = "('veselova.analytic', 'veselova.numeric', 'scipy', 'mpmath')"
+    check = f"import sys; print([m for m in sys.modules if m.startswith({engines})])"
+    answer = subprocess.run([sys.executable, "-c", f"{statement}; {check}"], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
+
+
+def test_importing_the_package_loads_no_part() -> None:
+    check = "import veselova, sys; print([m for m in sys.modules if m.startswith('veselova.') and m != 'veselova.version'])"
+    answer = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"

@@ -1,0 +1,221 @@
+"""Both engines through the problem table: reference motions, agreement, honest errors, far times."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from draws import random_problem
+from problems import TABLE, Case, tagged
+from truth import true_motion
+
+from veselova import Unsolved, Veselova, compare, solve, torus
+from veselova.analytic.solution import Solution
+
+#: The stated slack of every error estimate: the true error stays below this many times the reported one.
+SLACK = 2.0
+
+METHODS = [("analytic", "theta"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+SOLVABLE = [case for case in TABLE if "at-rest" not in case.tags]
+
+
+@cache
+def truth(case: Case) -> Any:
+    problem = case.problem()
+    frame, q_dot, tau1 = true_motion(problem, case.times(), case.frame if "reference" in case.tags else None)
+    return problem.to_body_axes(frame), problem.to_body_axes(q_dot), tau1
+
+
+def reference(case: Case) -> tuple[Any, Any, Any, Any]:
+    columns = [np.array([[float(x) for x in np.ravel(point[name])] for point in case.points]) for name in ("frame", "q_dot")]
+    times, tau1 = (np.array([float(point[name]) for point in case.points]) for name in ("t", "tau1"))
+    n = len(case.A)
+    return times, columns[0].reshape(-1, n, n), columns[1], tau1
+
+
+@pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
+def test_truth_reproduces_the_reference_motions(case: Case) -> None:
+    times, frame, q_dot, tau1 = reference(case)
+    found = true_motion(case.problem(), times, case.frame)
+    assert np.max(np.abs(found[0] - frame)) <= 3e-16
+    assert np.max(np.abs(found[1] - q_dot)) <= 1e-15 * np.max(np.abs(q_dot))
+    assert np.max(np.abs(found[2] - tau1)) <= 1e-15 * np.max(np.abs(tau1))
+
+
+@pytest.mark.parametrize("method", ["theta", "angles"])
+@pytest.mark.parametrize("case", tagged("reference", "generic"), ids=lambda case: case.name)
+def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: str) -> None:
+    times, frame, q_dot, tau1 = reference(case)
+    found = solve(case.problem(), times, "analytic", method)
+    allowed = 1e-12 * np.maximum(1.0, np.sqrt(times))
+    if case.name == "slow":  # |q̇| is 1e-3: the turning, not the time, is what counts
+        allowed = np.full(times.size, 1e-12)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= allowed)
+    assert np.all(np.max(np.abs(found.q_dot - q_dot), axis=1) <= allowed * max(1.0, np.max(np.abs(q_dot))))
+    assert np.all(np.abs(found.tau1 - tau1) <= allowed * np.maximum(1.0, tau1))
+
+
+@pytest.mark.parametrize(("method", "bound"), [("dop853", 1e-8), ("taylor", 1e-12)])
+@pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
+def test_the_numeric_engine_reaches_the_reference_motions(case: Case, method: str, bound: float) -> None:
+    times, frame, _, tau1 = reference(case)
+    found = solve(case.problem(), times, "numeric", method)
+    allowed = bound * (np.maximum(1.0, times) if method == "taylor" else 1.0)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= allowed)
+    assert np.all(np.abs(found.tau1 - tau1) <= allowed * np.maximum(1.0, tau1))
+
+
+@pytest.mark.parametrize(("engine", "method"), METHODS)
+@pytest.mark.parametrize("case", SOLVABLE, ids=lambda case: case.name)
+def test_true_errors_never_exceed_reported_ones(case: Case, engine: str, method: str) -> None:
+    if engine == "analytic" and "generic" not in case.tags:
+        with pytest.raises(Unsolved) as raised:
+            solve(case.problem(), case.times(), engine, method)
+        assert raised.value.outcome in case.tags
+        return
+    found = solve(case.problem(), case.times(), engine, method)
+    frame, q_dot, tau1 = truth(case)
+    error = np.max(np.abs(found.frame - frame), axis=(1, 2))
+    assert np.all(error <= SLACK * found.error)
+    assert np.all(np.abs(found.q - frame[:, :, 0]) <= SLACK * found.error[:, None])
+    speed = np.max(np.linalg.norm(q_dot, axis=1))
+    assert np.all(np.max(np.abs(found.q_dot - q_dot), axis=1) <= 20 * SLACK * found.error * speed)
+    assert np.all(np.abs(found.tau1 - tau1) <= 20 * SLACK * found.error * (1 + np.max(np.abs(tau1))))
+
+
+@pytest.mark.parametrize(("engine", "method"), METHODS)
+@pytest.mark.parametrize("case", tagged("generic"), ids=lambda case: case.name)
+def test_what_must_hold_at_every_time_does(case: Case, engine: str, method: str) -> None:
+    problem = case.problem()
+    found = solve(problem, case.times(20), engine, method)
+    n, E = problem.n, found.frame
+    assert np.max(np.abs(np.swapaxes(E, 1, 2) @ E - np.eye(n))) <= 1e-13
+    space = np.swapaxes(E, 1, 2) @ found.omega @ E
+    assert np.max(np.abs(space[:, 1:, 1:])) <= 1e-13 * np.max(np.abs(found.omega))  # the constraint (44)
+    assert np.array_equal(found.q, E[:, :, 0])
+    assert np.all(np.diff(found.tau1) > 0)
+    assert np.all(np.diff(found.spheroconic, axis=1) > 0)
+    assert max(found.drift.values()) < 1e-8
+
+
+def test_error_estimates_are_not_empty_promises() -> None:
+    """The estimates stay useful: at |ωt| of order 50, below 1e-11 in closed form and 1e-8 by DOP853."""
+    for case in tagged("generic"):
+        assert np.max(solve(case.problem(), case.times()).error) < 1e-11
+        assert np.max(solve(case.problem(), case.times(), "numeric").error) < 1e-8
+
+
+@pytest.mark.parametrize("case", tagged("generic"), ids=lambda case: case.name)
+def test_the_engines_agree_within_their_errors(case: Case) -> None:
+    comparison = compare(case.problem(), case.times(), "taylor")
+    assert comparison.agrees
+    assert comparison.deviation["frame"] < 1e-11
+    assert np.all(comparison.conditioning_floor > 0)
+
+
+def test_at_rest_the_numeric_engine_stands_still_and_the_analytic_one_says_so() -> None:
+    problem = tagged("at-rest")[0].problem()
+    found = solve(problem, [-1, 0, 1e9], "numeric")
+    assert np.array_equal(found.frame, np.tile(problem.frame, (3, 1, 1)))
+    assert not found.tau1.any()
+    for call in (lambda: solve(problem, [1.0]), lambda: torus(problem)):
+        with pytest.raises(Unsolved) as raised:
+            call()
+        assert raised.value.outcome == "at-rest"
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
+    """t = 10⁶ with 30-digit frequencies, against the same without guard digits: within 100 conditioning floors."""
+    problem = random_problem(rng, n, 5.0)
+    times = np.array([1e6 - 0.5, 1e6])
+    found = solve(problem, times)
+    assert found.provenance.details["guard_digits"]
+    solution = Solution(problem)
+    unguarded = solution._fourier(False)
+    attitude = solution.attitude(unguarded.tau1(times)[1], "angles")
+    _, frame, _ = solution.states(attitude)
+    floor = problem.conditioning_floor(times)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= 100 * floor)
+    assert np.all(found.error < 10 * floor)
+
+
+def test_far_times_agree_with_integration() -> None:
+    problem = tagged("reference", "generic")[1].problem()
+    times = np.array([-200.0, 700.0])
+    frame, _, tau1 = true_motion(problem, times)
+    found = solve(problem, times)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)
+    assert np.allclose(found.tau1, tau1, rtol=1e-15, atol=1e-12)
+    assert np.max(found.error) < 1e-11
+
+
+def test_too_far_is_a_named_outcome() -> None:
+    problem = random_problem(np.random.default_rng(1), 8)
+    with pytest.raises(Unsolved) as raised:
+        solve(problem, [1e9])
+    assert raised.value.outcome == "too-far"
+
+
+def test_one_time_is_the_same_as_many() -> None:
+    problem = tagged("generic")[3].problem()
+    many, one = solve(problem, [1.0, 2.0, 3.0]), solve(problem, [2.0])
+    assert np.allclose(many.frame[1], one.frame[0], atol=1e-14)
+
+
+def test_motions_run_backwards() -> None:
+    problem = tagged("generic")[3].problem()
+    later = solve(problem, [7.0])
+    reversed_ = Veselova(problem.A, later.q[0], -later.q_dot[0], later.frame[0], normalize=True)
+    back = solve(reversed_, [7.0])
+    assert np.allclose(back.frame[0], problem.frame, atol=1e-12)
+
+
+@pytest.mark.parametrize("permutation", [[1, 0, 2, 3], [3, 2, 1, 0], [2, 3, 0, 1]])
+def test_the_order_of_the_axes_is_the_users(permutation: list[int]) -> None:
+    problem = tagged("generic")[3].problem()
+    turned = Veselova(
+        problem.A[permutation], problem.q[permutation], problem.q_dot[permutation], problem.frame[permutation], normalize=True
+    )
+    times = [0.5, 20.0]
+    assert np.allclose(solve(turned, times).frame, solve(problem, times).frame[:, permutation], atol=1e-12)
+
+
+def test_scaling_the_inertia_or_the_speed_only_rescales_time() -> None:
+    A, q, q_dot = np.array([3.0, 2.0, 1.0]), [0.6, 0, 0.8], np.array([0.8, 1, -0.6])
+    plain = solve(Veselova(A, q, q_dot), [10.0])
+    heavy = solve(Veselova(8 * A, q, q_dot), [10.0])
+    fast = solve(Veselova(A, q, 4 * q_dot), [2.5])
+    assert np.allclose(heavy.frame, plain.frame, atol=1e-13)
+    assert np.allclose(fast.frame, plain.frame, atol=1e-13)
+    assert np.isclose(heavy.tau1[0], plain.tau1[0] * np.sqrt(8), rtol=1e-14)
+
+
+def test_the_torus_describes_the_motion() -> None:
+    problem = tagged("reference", "generic")[3].problem()
+    found = torus(problem)
+    assert found.regime == "generic"
+    assert np.allclose(found.constants, problem.constants, atol=1e-13)
+    assert np.allclose(found.frequencies_t, found.frequencies_tau1 / found.mean_rate, rtol=1e-14)
+    names = (
+        {f"I{i + 1}": 1 / a for i, a in enumerate(problem.A)}
+        | {f"c{k + 2}": c for k, c in enumerate(problem.constants)}
+        | {"c1": 0.0}
+    )
+    assert np.allclose(found.branch_points, [names[name] for name in found.origins], atol=1e-13)
+    assert found.riemann_matrix_residual < 1e-14
+    # a in the monomial basis: its inverse's last column gives the frequencies too, as λ^{g−1} is the only form that advances.
+    assert np.allclose(np.linalg.inv(found.periods)[:, -1], found.frequencies_tau1, rtol=1e-9)
+
+
+def test_the_symmetric_limit_is_approached_smoothly() -> None:
+    """Two nearly equal A's: λ between them moves on a tiny cut, and the motion tends to the symmetric body's."""
+    start = {"q": [0.3, 0.5, 0.8], "q_dot": [1, -0.4, 0.2], "normalize": True}
+    frame = np.linalg.qr(np.column_stack([[0.3, 0.5, 0.8], np.eye(3)[:, :2]]))[0]
+    frame[:, 0] = np.array([0.3, 0.5, 0.8]) / np.sqrt(0.98)
+    exact = solve(Veselova([2, 1, 1], frame=frame, **start), [10.0], "numeric", "taylor").frame[0]
+    for gap in (1e-4, 1e-8, 1e-12):
+        near = solve(Veselova([2, 1 + gap, 1], frame=frame, **start), [10.0]).frame[0]
+        assert np.max(np.abs(near - exact)) < 30 * gap + 1e-12

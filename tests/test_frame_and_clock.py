@@ -1,0 +1,146 @@
+"""The closed frame on the torus, and the two clocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from draws import random_problem
+from problems import near_separatrix, tagged
+
+from veselova.analytic.fourier_clock import FourierClock
+from veselova.analytic.increasing import increasing_root
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.panel_clock import PanelClock
+from veselova.analytic.solution import Solution
+from veselova.mechanics.errors import InternalContradiction
+
+DIMENSIONS = range(2, 9)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_the_closed_frame_is_orthonormal_everywhere_on_the_torus(n: int, rng: np.random.Generator) -> None:
+    solution = Solution(random_problem(rng, n))
+    at = solution.attitude(rng.uniform(-2, 2, (100, n - 1)), "angles")
+    frame = np.concatenate([at.q[:, :, None], at.normals], axis=2)
+    assert np.max(np.abs(np.swapaxes(frame, 1, 2) @ frame - np.eye(n))) < 1e-13
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_the_normals_are_eigenvectors_of_mosers_matrix(n: int, rng: np.random.Generator) -> None:
+    solution = Solution(random_problem(rng, n, 10.0))
+    at = solution.attitude(rng.uniform(0, 1, (10, n - 1)), "angles")
+    inverse = np.array([float(x) for x in solution.spectrum.inverse])
+    constants = [float(c) for c in [*solution.spectrum.constants[1:], solution.spectrum.constants[0]]]
+    for q, v, normals in zip(at.q, at.q_prime, at.normals, strict=True):
+        projector = np.eye(n) - np.outer(q, q)
+        matrix = projector @ (np.diag(inverse) - np.outer(v, v)) @ projector
+        assert np.allclose(matrix @ normals, normals * constants, atol=1e-12 * inverse[-1])
+        assert abs(q @ v) < 1e-13 * np.linalg.norm(v)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_the_frame_turns_with_the_body_along_the_flow(n: int, rng: np.random.Generator) -> None:
+    """dE/dτ₁ = −(q∧q')E for the natural frame, by a difference along z⁰ + fτ₁."""
+    solution = Solution(random_problem(rng, n, 5.0))
+    step, f = 1e-5, solution.in_tau1.rates
+    z = rng.uniform(0, 1, (5, n - 1))
+
+    def frames(z: Any) -> Any:
+        at = solution.attitude(z, "angles")
+        return np.concatenate([at.q[:, :, None], at.normals], axis=2)
+
+    rate = (frames(z + step * f) - frames(z - step * f)) / (2 * step)
+    at = solution.attitude(z, "angles")
+    omega = at.q[:, :, None] * at.q_prime[:, None, :]
+    omega = omega - np.swapaxes(omega, 1, 2)
+    assert np.max(np.abs(rate + omega @ frames(z))) < 1e-7 * np.max(np.abs(omega))
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_normals_change_sign_analytically_with_their_cycles(n: int, rng: np.random.Generator) -> None:
+    solution = Solution(random_problem(rng, n))
+    z = rng.uniform(0, 1, (5, n - 1))
+    before = solution.attitude(z, "angles")
+    for s in range(n - 1):
+        after = solution.attitude(z + np.eye(n - 1)[s], "angles")
+        signs = after.q / before.q
+        assert np.allclose(np.abs(signs), 1, atol=1e-9)
+        ends = [solution.curve.origins[i] for i in (2 * s + 1, 2 * s + 2)]
+        flipped = {end.index for end in ends if end.kind == "I"}
+        assert all((signs[:, i] < 0).all() == (i in flipped) for i in range(n))
+
+
+@pytest.mark.parametrize("n", range(2, 6))
+def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> None:
+    for _ in range(3):
+        solution = Solution(random_problem(rng, n))
+        times = np.sort(rng.uniform(-80, 80, 30))
+        fourier, panels = solution.clock(times, "fourier"), solution.clock(times, "panels")
+        (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
+        scale = np.max(np.abs(tau_panels))
+        assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
+        assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
+        assert np.allclose(fourier.time(tau_fourier), times, atol=1e-13 * scale)
+        assert np.allclose(panels.time(tau_panels), times, atol=1e-13 * scale)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Generator) -> None:
+    """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at once."""
+    solution = Solution(random_problem(rng, n))
+    clock = solution.clock(np.array([1.0]), "fourier")
+    assert isinstance(clock, FourierClock)
+    z = rng.uniform(-1, 1, (40, n - 1))
+    series = solution.mean_rate + clock._periodic(z - solution.in_tau1.start, clock.size)[1]
+    q = solution.attitude(z, "angles").q
+    A = solution.problem.A[list(solution.spectrum.order)]
+    start = solution.problem.q @ (solution.problem.A * solution.problem.q)
+    expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.clock_rate)
+    assert np.allclose(series, expected, rtol=1e-12)
+    assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
+
+
+def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
+    solution = Solution(tagged("generic")[1].problem())
+    tau1 = np.linspace(-2e4, 2e4, 400_001)
+    rates = solution.rate.at(solution.inversion.invert(solution.in_tau1.phases(tau1)))
+    assert np.isclose(np.mean(rates), solution.mean_rate, rtol=1e-4)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-10])
+def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
+    solution = Solution(near_separatrix(gap).problem())
+    times = np.linspace(-30, 30, 41)
+    tau_fourier, tau_panels = solution.clock(times, "fourier").tau1(times)[0], solution.clock(times, "panels").tau1(times)[0]
+    assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
+
+
+def test_panels_stretch_to_the_wanted_times() -> None:
+    solution = Solution(tagged("generic")[3].problem())
+    clock = PanelClock(solution.rate, solution.in_tau1, -0.5, 33.0)
+    assert np.allclose(clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13)
+
+
+def test_phases_far_out_are_reduced_without_losing_digits() -> None:
+    with mpmath.workdps(60):
+        rates = [mpmath.sqrt(2) / 3, mpmath.pi / 7]
+        flow = LinearFlow.of(np.array([0.25, 0.5]), np.array(rates, dtype=object))
+        for x in (1e3, 1e9 + 0.125, 1.5e15, -7e12):
+            found = flow.phases(np.array([x]))[0]
+            for rate, start, phase in zip(rates, flow.start, found, strict=True):
+                exact = mpmath.mpf(x) * rate + start
+                distance = (mpmath.mpf(float(phase)) - exact) / 2
+                assert abs(distance - mpmath.nint(distance)) < 4e-16 * (1 + abs(x) * 1e-16)
+
+
+def test_inversion_of_an_increasing_function_needs_no_good_guess() -> None:
+    def steep(x: Any) -> Any:
+        return np.tanh(50 * (x - 0.3)) + 0.01 * (x - 0.3), 50 / np.cosh(50 * (x - 0.3)) ** 2 + 0.01
+
+    roots = increasing_root(steep, np.array([-4.0, 0.31, 4.0]), np.full(3, -5.0), np.full(3, 5.0), 1e-9)
+    assert np.allclose(roots, 0.3, atol=1e-15)
+    with pytest.raises(InternalContradiction):
+        increasing_root(lambda x: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)

@@ -1,0 +1,166 @@
+"""Trajectory, Comparison and Torus: the shapes, files and pictures that users work with."""
+
+from __future__ import annotations
+
+import builtins
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from problems import tagged
+
+from veselova import BackendMissing, Comparison, Trajectory, Unsolved, compare, solve, torus
+from veselova.mechanics.trajectory import OUTPUTS, Provenance
+
+TIMES = np.linspace(0, 5, 11)
+
+
+@pytest.fixture(scope="module")
+def trajectory() -> Trajectory:
+    return solve(tagged("generic")[3].problem(), TIMES)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return compare(tagged("generic")[3].problem(), TIMES, "taylor")
+
+
+def test_series_have_the_promised_shapes(trajectory: Trajectory) -> None:
+    N, n = TIMES.size, 4
+    shapes = {"q": (N, n), "q_dot": (N, n), "frame": (N, n, n), "omega": (N, n, n), "spheroconic": (N, n - 1), "tau1": (N,)}
+    assert {name: trajectory.series(name).shape for name in OUTPUTS} == shapes
+    assert trajectory.times.shape == trajectory.error.shape == (N,)
+    assert np.array_equal(trajectory.omega, -np.swapaxes(trajectory.omega, 1, 2))
+
+
+def test_a_trajectory_cannot_be_changed(trajectory: Trajectory) -> None:
+    for name in OUTPUTS:
+        with pytest.raises(ValueError, match="read-only"):
+            trajectory.series(name)[...] = 0
+    with pytest.raises(AttributeError):
+        trajectory.q = None  # type: ignore[misc, assignment]
+
+
+def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
+    assert list(trajectory.integrals) == ["energy", "q_norm", "q_p", "neumann", "linear", "constants"]
+    assert all(values.shape[0] == TIMES.size for values in trajectory.integrals.values())
+    assert max(trajectory.drift.values()) < 1e-13
+    assert np.allclose(trajectory.integrals["energy"], trajectory.problem.energy, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("engine", "method"), [("analytic", "theta"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+)
+def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -> None:
+    problem = tagged("generic")[1].problem()
+    first = solve(problem, [0.0, 1.0], engine, method)
+    later = first.at([2.5, 3.5])
+    assert np.allclose(later.frame, solve(problem, [2.5, 3.5], engine, method).frame, atol=1e-11)
+    assert later.provenance.method == method
+
+
+def test_a_trajectory_without_a_dense_answer_says_so(trajectory: Trajectory) -> None:
+    bare = Trajectory(**{f: getattr(trajectory, f) for f in trajectory.__dataclass_fields__ if f != "dense"})
+    with pytest.raises(Unsolved) as raised:
+        bare.at([1.0])
+    assert raised.value.outcome == "no-dense-answer"
+
+
+def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory) -> None:
+    document = trajectory.provenance.as_dict()
+    assert document["engine"] == "analytic"
+    assert document["method"] == "theta"
+    assert document["seconds"] > 0
+    assert document["details"]["clock"] == "panels"
+    assert json.loads(json.dumps(document)) == document
+    assert Provenance(**document) == trajectory.provenance
+
+
+def test_npz_holds_everything(trajectory: Trajectory, tmp_path: Path) -> None:
+    trajectory.to_npz(tmp_path / "motion.npz")
+    with np.load(tmp_path / "motion.npz") as stored:
+        for name in OUTPUTS:
+            assert np.array_equal(stored[name], trajectory.series(name))
+        assert np.array_equal(stored["integral_energy"], trajectory.integrals["energy"])
+        assert json.loads(str(stored["provenance"]))["engine"] == "analytic"
+
+
+def test_csv_loses_no_digit(trajectory: Trajectory, tmp_path: Path) -> None:
+    trajectory.to_csv(tmp_path / "motion.csv")
+    header, *rows = (tmp_path / "motion.csv").read_text().splitlines()
+    table = trajectory.columns()
+    assert header.split(",") == list(table)
+    values = np.array([[float(x) for x in row.split(",")] for row in rows])
+    assert np.array_equal(values, np.column_stack(list(table.values())))
+    assert "frame_1_2" in table
+
+
+@pytest.mark.parametrize(("method", "library"), [("to_parquet", "pyarrow"), ("to_xarray", "xarray"), ("plot", "matplotlib")])
+def test_a_missing_library_is_named(trajectory: Trajectory, method: str, library: str, monkeypatch: Any, tmp_path: Path) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name.split(".")[0] == library:
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(BackendMissing, match=library):
+        getattr(trajectory, method)(*([tmp_path / "x"] if method == "to_parquet" else []))
+
+
+def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
+    from veselova.numeric import taylor
+
+    taylor._compiled.cache_clear()
+    monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
+    with pytest.raises(BackendMissing, match="heyoka"):
+        solve(tagged("generic")[1].problem(), [1.0], "numeric", "taylor")
+    taylor._compiled.cache_clear()
+
+
+def test_parquet_and_xarray_hold_the_series(trajectory: Trajectory, tmp_path: Path) -> None:
+    from pyarrow import parquet
+
+    trajectory.to_parquet(tmp_path / "motion.parquet")
+    assert parquet.read_table(tmp_path / "motion.parquet").column_names == list(trajectory.columns())
+    dataset = trajectory.to_xarray()
+    assert dataset["frame"].dims == ("time", "axis", "vector")
+
+
+@pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])
+def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
+    case = next(case for case in tagged("generic") if case.name == name)
+    comparison = compare(case.problem(), np.linspace(0, 3, 31))
+    for subject, panels in ((comparison.analytic, 2), (comparison, 3)):
+        figure = subject.plot()
+        assert len(figure.axes) == panels
+        figure.savefig(tmp_path / "picture.png", dpi=40)
+        assert (tmp_path / "picture.png").stat().st_size > 5000
+    assert figure.axes[-1].get_yscale() == "log"
+    assert figure.axes[0].name == ("3d" if case.problem().n == 3 else "rectilinear")
+
+
+def test_a_comparison_summarises_deviation_drift_and_seconds(comparison: Comparison) -> None:
+    summary = comparison.summary()
+    assert set(summary["deviation"]) == set(OUTPUTS)
+    assert summary["agrees"] is True
+    assert set(summary["seconds"]) == {"analytic", "numeric"}
+    assert summary["conditioning_floor"] > 0
+    assert json.loads(json.dumps(summary)) == summary
+    assert np.all(comparison.difference("frame") <= comparison.analytic.error + comparison.numeric.error)
+
+
+def test_disagreement_is_seen(comparison: Comparison) -> None:
+    wrong = {f: getattr(comparison.numeric, f) for f in comparison.numeric.__dataclass_fields__}
+    wrong["frame"] = wrong["frame"].copy()
+    wrong["frame"][-1, 0, 1] += 1e-6
+    assert not Comparison(comparison.analytic, Trajectory(**wrong)).agrees
+
+
+def test_notebooks_get_tables(comparison: Comparison, trajectory: Trajectory) -> None:
+    assert "largest error" in trajectory._repr_html_()
+    assert "frame" in comparison._repr_html_()
+    assert "riemann_matrix" in torus(trajectory.problem)._repr_html_()

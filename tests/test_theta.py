@@ -1,0 +1,172 @@
+"""Theta functions: against python-flint, and through the identities that define them."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+from draws import random_problem, random_riemann_matrix
+from flint import acb, acb_mat, ctx
+from problems import tagged
+
+from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.solution import Solution
+from veselova.analytic.theta import Theta, lattice_points
+
+
+def all_characteristics(genus: int) -> list[Characteristic]:
+    halves = list(product((0, 1), repeat=genus))
+    return [Characteristic(epsilon, delta) for epsilon in halves for delta in halves]
+
+
+def flint_values(T: Any, z: Any) -> Any:
+    """θ[ε;δ](z; iT) of FLINT for every characteristic, ε's bits before δ's, as doubles."""
+    ctx.prec = 106
+    try:
+        tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
+        values = tau.theta(acb_mat([[acb(float(x))] for x in z]))
+        return np.array([complex(values[0, i]) for i in range(values.ncols())])
+    finally:
+        ctx.prec = 53
+
+
+def as_flint_orders(characteristic: Characteristic) -> int:
+    bits = [*characteristic.epsilon, *characteristic.delta]
+    return int("".join(map(str, bits)), 2)
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, 4])
+def test_every_characteristic_agrees_with_flint(genus: int, rng: np.random.Generator) -> None:
+    characteristics = all_characteristics(genus)
+    for _ in range(6 if genus < 4 else 2):
+        T, z = random_riemann_matrix(rng, genus), rng.uniform(-1, 1, genus)
+        expected = flint_values(T, z)
+        scale = np.abs(Theta(T).values(np.zeros((1, genus)), [Characteristic.zero(genus)]))[0, 0]
+        found = Theta(T).values(z[None, :], characteristics)[0]
+        for characteristic, value in zip(characteristics, found, strict=True):
+            true = expected[as_flint_orders(characteristic)]
+            # FLINT's series carries e^{2πi(m+ε)·(z+δ)}: real where ours is, since pairs ±(m+ε) join.
+            assert abs(true.imag) < 1e-14 * scale
+            assert abs(value - true.real) < 1e-13 * scale
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, 4])
+def test_waves_and_gaussians_are_the_same_function(genus: int, rng: np.random.Generator) -> None:
+    T, z = random_riemann_matrix(rng, genus, 0.5), rng.uniform(-2, 2, (5, genus))
+    characteristics = all_characteristics(genus)[:: 1 + genus]
+    everything = tuple(range(genus))
+    series = Theta(T, everything).values(z, characteristics)
+    for waves in [(), everything[:1], everything[1:]]:
+        assert np.allclose(Theta(T, waves).values(z, characteristics), series, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, 5])
+def test_theta_has_period_one_up_to_the_sign_of_its_characteristic(genus: int, rng: np.random.Generator) -> None:
+    theta, z = Theta(random_riemann_matrix(rng, genus)), rng.uniform(-1, 1, (4, genus))
+    for characteristic in all_characteristics(genus)[:: genus**2]:
+        values = theta.values(z, [characteristic])[:, 0]
+        for s in range(genus):
+            shifted = theta.values(z + np.eye(genus)[s], [characteristic])[:, 0]
+            assert np.allclose(shifted, (-1) ** characteristic.epsilon[s] * values, rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, 4])
+def test_parity_of_theta_is_that_of_its_characteristic(genus: int, rng: np.random.Generator) -> None:
+    theta, z = Theta(random_riemann_matrix(rng, genus)), rng.uniform(-1, 1, (4, genus))
+    for characteristic in all_characteristics(genus):
+        sign = -1 if characteristic.is_odd else 1
+        values, mirrored = (theta.values(x, [characteristic])[:, 0] for x in (z, -z))
+        assert np.allclose(mirrored, sign * values, rtol=1e-11, atol=1e-13)
+
+
+def test_theta_is_quasi_periodic_along_the_imaginary_periods(rng: np.random.Generator) -> None:
+    """θ[ε;δ] with ε moved by one is the same sum: the shadow, at real z, of quasi-periodicity along iT."""
+    T, z = random_riemann_matrix(rng, 2), rng.uniform(-1, 1, (1, 2))
+    for epsilon in ([0.0, 0.0], [0.5, 0.0], [0.5, 0.5]):
+        for shift in ([1, 0], [0, -2]):
+            m = lattice_points(T, 6.0, np.array(epsilon)) + np.array(shift)
+            weights = np.exp(-np.pi * np.sum((m @ T) * m, axis=1))
+            direct = np.sum(weights * np.cos(2 * np.pi * (m @ z[0])))
+            characteristic = Characteristic(tuple(int(2 * e) for e in epsilon), (0, 0))
+            assert np.isclose(direct, Theta(T).values(z, [characteristic])[0, 0], rtol=1e-12)
+
+
+def test_riemanns_quartic_relation(rng: np.random.Generator) -> None:
+    """In genus one: θ3(0)⁴ = θ2(0)⁴ + θ4(0)⁴, and the two relations between squares at z and at zero."""
+    theta = Theta(np.array([[0.8]]))
+    z = rng.uniform(-1, 1, (6, 1))
+    names = {"θ3": ((0,), (0,)), "θ4": ((0,), (1,)), "θ2": ((1,), (0,)), "θ1": ((1,), (1,))}
+    at_z = {k: theta.values(z, [Characteristic(*v)])[:, 0] for k, v in names.items()}
+    at_0 = {k: theta.values(np.zeros((1, 1)), [Characteristic(*v)])[0, 0] for k, v in names.items()}
+    assert np.isclose(at_0["θ3"] ** 4, at_0["θ2"] ** 4 + at_0["θ4"] ** 4, rtol=1e-13)
+    assert np.allclose(at_z["θ3"] ** 2 * at_0["θ3"] ** 2, at_z["θ4"] ** 2 * at_0["θ4"] ** 2 + at_z["θ2"] ** 2 * at_0["θ2"] ** 2)
+    assert np.allclose(at_z["θ4"] ** 2 * at_0["θ3"] ** 2, at_z["θ3"] ** 2 * at_0["θ4"] ** 2 + at_z["θ1"] ** 2 * at_0["θ2"] ** 2)
+
+
+@pytest.mark.parametrize("genus", [2, 3])
+def test_the_addition_theorem_of_second_order_thetas(genus: int, rng: np.random.Generator) -> None:
+    """θ(x+y)θ(x−y) = Σ_ε θ[ε;0](2x; 2T) θ[ε;0](2y; 2T), ε over half periods: Riemann's bilinear addition theorem."""
+    T = random_riemann_matrix(rng, genus)
+    x, y = rng.uniform(-1, 1, (2, 1, genus))
+    zero = Characteristic.zero(genus)
+    left = Theta(T).values(x + y, [zero]) * Theta(T).values(x - y, [zero])
+    halves = [Characteristic(epsilon, (0,) * genus) for epsilon in product((0, 1), repeat=genus)]
+    right = np.sum(Theta(2 * T).values(2 * x, halves) * Theta(2 * T).values(2 * y, halves), axis=1)
+    assert np.allclose(left[:, 0], right, rtol=1e-12)
+
+
+def test_lattice_points_are_exactly_those_inside(rng: np.random.Generator) -> None:
+    form, shift = random_riemann_matrix(rng, 3), np.array([0.5, 0.0, 0.5])
+    found = lattice_points(form, 3.0, shift)
+    box = np.array(list(product(range(-8, 9), repeat=3))) + shift
+    inside = box[np.sum((box @ form) * box, axis=1) <= 9.0]
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, inside.tolist()))
+
+
+def test_characteristics_of_the_branch_points_have_the_parity_of_the_table() -> None:
+    for genus in range(1, 8):
+        odd = [Characteristic.of_branch_point(j, genus).is_odd for j in range(2 * genus + 1)]
+        assert odd == [j % 2 == 1 for j in range(2 * genus + 1)]
+        total = Characteristic.zero(genus)
+        for j in range(1, 2 * genus + 1, 2):
+            total = total + Characteristic.of_branch_point(j, genus)
+        assert total.epsilon == (1,) * genus  # Riemann's constant: the sum of the odd ones
+
+
+@pytest.mark.parametrize("n", range(2, 8))
+def test_quotients_agree_with_inversion_in_angles(n: int, rng: np.random.Generator) -> None:
+    for _ in range(4 if n < 6 else 1):
+        solution = Solution(random_problem(rng, n))
+        z = rng.uniform(-2, 2, (20, n - 1))
+        by_theta, by_angles = solution.attitude(z, "theta"), solution.attitude(z, "angles")
+        assert np.max(np.abs(by_theta.q - by_angles.q)) < 2e-14
+        assert np.max(np.abs(by_theta.normals - by_angles.normals)) < 2e-14
+        assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(np.abs(by_angles.components))
+
+
+def test_one_index_constants_are_the_values_at_half_periods() -> None:
+    """|κ_j| from z = 0 (z = ½e_s for an odd index), where every λ_s is the lower (upper) end of its cut."""
+    solution = Solution(tagged("reference", "generic")[3].problem())
+    curve, g = solution.curve, solution.curve.genus
+    theta = Theta(np.asarray(solution.periods.riemann_matrix))
+    for i in range(g + 1):
+        j = curve.place["I", i]
+        z = np.zeros((1, g))
+        ends = [curve.branch_points[2 * s + 1] for s in range(g)]
+        if j % 2 == 1:
+            z[0, (j - 1) // 2] = 0.5
+            ends[(j - 1) // 2] = curve.branch_points[j + 1]
+        values = theta.values(z, [Characteristic.of_branch_point(j, g), Characteristic.zero(g)])[0]
+        size = np.prod([abs(curve.branch_points[j] - end) for end in ends])
+        size /= np.prod([abs(curve.differences[j, curve.place["I", k]]) for k in range(g + 1) if k != i])
+        expected = np.sqrt(size) * abs(values[1] / values[0])
+        assert np.isclose(abs(solution.quotients.constants[i]), expected, rtol=1e-12)
+
+
+def test_the_denominator_has_no_real_zero_and_no_cancellation(rng: np.random.Generator) -> None:
+    for case in tagged("near-degenerate"):
+        genus = case.problem().n - 1
+        values = Solution(case.problem()).quotients.theta.values(rng.uniform(0, 1, (200, genus)), [Characteristic.zero(genus)])
+        assert np.min(values) > 0

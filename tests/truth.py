@@ -1,0 +1,100 @@
+"""The true motion: the Neumann form in physical time, integrated by heyoka in binary128 (34 digits).
+
+It shares nothing with the engines under test: other equations (Neumann's, not the extended system), other arithmetic, and
+the start rounded to 34 digits straight from the exact input.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.veselova import Veselova
+
+Array = NDArray[np.float64]
+
+_CONTEXT = mpmath.MPContext()
+_CONTEXT.dps = 45
+
+
+@lru_cache(maxsize=16)
+def _integrator(n: int) -> Any:
+    import heyoka as hy
+
+    quad = hy.real128
+    q, v = (list(hy.make_vars(*[f"{name}{i}" for i in range(n)])) for name in ("q", "v"))
+    E = [[hy.make_vars(f"e{i}_{k}") for k in range(1, n)] for i in range(n)]
+    tau1 = hy.make_vars("tau1")
+    A, inverse, W = [hy.par[i] for i in range(n)], [hy.par[n + i] for i in range(n)], hy.par[2 * n]
+
+    def dot(*factors: Any) -> Any:
+        return hy.sum([np.prod(list(terms)) for terms in zip(*factors, strict=True)])
+
+    rate = hy.sqrt(W / dot(A, q, q))
+    multiplier = (dot(inverse, q, q) - dot(v, v)) / dot(q, q)
+    equations = [(a, rate * b) for a, b in zip(q, v, strict=True)]
+    equations += [(b, rate * (multiplier - c) * a) for a, b, c in zip(q, v, inverse, strict=True)]
+    for k in range(n - 1):
+        column = [row[k] for row in E]
+        along_q, along_v = dot(q, column), dot(v, column)
+        equations += [(column[i], rate * (v[i] * along_q - q[i] * along_v)) for i in range(n)]
+    equations.append((tau1, rate))
+    zeros = [quad(0)] * (2 * n + n * (n - 1) + 1)
+    return hy.taylor_adaptive(equations, zeros, fp_type=quad, compact_mode=True, pars=[quad(1)] * (2 * n + 1))
+
+
+def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Array, Array, Array]:
+    """Return (frame, q̇, τ₁) at the times, rounded to double from 34 digits; ``frame`` are exact strings where given.
+
+    A frame left to the problem is taken as the problem's own doubles, made orthogonal in high precision.
+    """
+    import heyoka as hy
+
+    mp = _CONTEXT
+    exact, n = problem.exact, problem.n
+    A = [mp.mpf(a.numerator) / a.denominator for a in exact.A]
+    q = [mp.mpf(x.numerator) / x.denominator for x in exact.q]
+    q_dot = [mp.mpf(x.numerator) / x.denominator for x in exact.q_dot]
+    length = mp.sqrt(mp.fsum(x * x for x in q))
+    q = [x / length for x in q]
+    slope = mp.fsum(x * y for x, y in zip(q, q_dot, strict=True))
+    q_dot = [y - slope * x for x, y in zip(q, q_dot, strict=True)]
+    wedge = mp.fsum(A[i] * A[j] * (q[i] * q_dot[j] - q[j] * q_dot[i]) ** 2 for j in range(n) for i in range(j))
+    rate = mp.sqrt(wedge / mp.fsum(a * x * x for a, x in zip(A, q, strict=True)))
+    columns = [q]
+    source = problem.frame if frame is None else frame
+    for k in range(1, n):
+        column = [mp.mpf(str(source[i][k]) if isinstance(source[i][k], str) else float(source[i][k])) for i in range(n)]
+        for _ in range(2):
+            for other in columns:
+                overlap = mp.fsum(x * y for x, y in zip(other, column, strict=True))
+                column = [x - overlap * y for x, y in zip(column, other, strict=True)]
+        size = mp.sqrt(mp.fsum(x * x for x in column))
+        columns.append([x / size for x in column])
+
+    def quad(x: Any) -> Any:
+        return hy.real128(mp.nstr(x, 36))
+
+    start = [*q, *(y / rate for y in q_dot), *(columns[k][i] for k in range(1, n) for i in range(n)), mp.zero]
+    parameters = [*A, *(1 / a for a in A), wedge]
+    integrator = _integrator(n)
+    integrator.pars[:] = [quad(x) for x in parameters]
+    results = np.empty((times.size, len(start)))
+    for direction in (1, -1):
+        integrator.time = hy.real128(0)
+        integrator.state[:] = [quad(x) for x in start]
+        indices = np.flatnonzero(times >= 0) if direction > 0 else np.flatnonzero(times < 0)[::-1]
+        for index in indices:
+            integrator.propagate_until(hy.real128(float(times[index])))
+            results[index] = [float(x) for x in integrator.state]
+    true_frame = np.empty((times.size, n, n))
+    true_frame[:, :, 0] = results[:, :n]
+    # The equations list the frame column by column, in the order of the state.
+    true_frame[:, :, 1:] = results[:, 2 * n : -1].reshape(-1, n - 1, n).transpose(0, 2, 1)
+    velocity = results[:, n : 2 * n]
+    weight = np.sum(results[:, :n] ** 2 * np.array([float(a) for a in A]), axis=1)
+    return true_frame, velocity * np.sqrt(float(wedge) / weight)[:, None], results[:, -1]
