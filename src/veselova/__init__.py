@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.errors import BackendMissing as BackendMissing
     from veselova.mechanics.errors import InternalContradiction as InternalContradiction
     from veselova.mechanics.errors import InvalidInput as InvalidInput
+    from veselova.mechanics.errors import InvalidRequest as InvalidRequest
     from veselova.mechanics.errors import ProblemResponse as ProblemResponse
     from veselova.mechanics.errors import ServiceError as ServiceError
     from veselova.mechanics.errors import ServiceUnreachable as ServiceUnreachable
@@ -43,6 +44,7 @@ _HOMES = {
     "Comparison": "veselova.mechanics.comparison",
     "InternalContradiction": "veselova.mechanics.errors",
     "InvalidInput": "veselova.mechanics.errors",
+    "InvalidRequest": "veselova.mechanics.errors",
     "ProblemResponse": "veselova.mechanics.errors",
     "Provenance": "veselova.mechanics.trajectory",
     "ServiceError": "veselova.mechanics.errors",

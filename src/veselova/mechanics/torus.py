@@ -41,7 +41,7 @@ class Torus:
     def as_dict(self) -> dict[str, Any]:
         """Return the torus as a JSON-ready dictionary (arrays as nested lists)."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+        return {name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v for name, v in values.items()}
 
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><th style='text-align:left'>{k}</th><td><pre>{v}</pre></td></tr>" for k, v in self.as_dict().items())

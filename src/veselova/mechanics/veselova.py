@@ -200,7 +200,7 @@ def _unit(vector: Array) -> Array:
 
 def _tangent(q: tuple[Fraction, ...], q_dot: tuple[Fraction, ...]) -> Array:
     """Return q̇ − (q,q̇)/(q,q) q, rounded once: exactly zero where q̇ is along q."""
-    along = sum(a * b for a, b in zip(q, q_dot, strict=True)) / sum(a * a for a in q)
+    along = sum((a * b for a, b in zip(q, q_dot, strict=True)), Fraction()) / sum((a * a for a in q), Fraction())
     return to_float([b - along * a for a, b in zip(q, q_dot, strict=True)])
 
 

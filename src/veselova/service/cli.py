@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -163,8 +164,10 @@ def serve(
 
     from veselova.service.app import create_app
 
-    # Requests in flight get ten seconds to finish after SIGTERM; their workers are killed with the loop.
-    uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=10)
+    # uvicorn sends itself the signal again when it has shut down. The default action of SIGTERM would end the process before
+    # the event loop has killed the workers; leaving by SystemExit unwinds the loop.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=limits.shutdown_grace_s)
 
 
 def _document(file: str) -> Any:

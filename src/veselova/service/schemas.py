@@ -42,6 +42,10 @@ _Times = Annotated[Any, WithJsonSchema(_TIMES)]
 Output = Literal["q", "q_dot", "frame", "omega", "spheroconic", "tau1"]
 
 
+#: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
+_DEEPEST = 8
+
+
 class _Request(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -116,10 +120,28 @@ _Model = TypeVar("_Model", bound=_Request)
 
 def read_request(model: type[_Model], document: Any) -> _Model:
     """Return the request that a decoded JSON document states; raises InvalidRequest with every fault found."""
+    if _is_deeper(document, _DEEPEST):
+        raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
     try:
         return model.model_validate(document)
     except ValidationError as error:
         raise InvalidRequest([_fault(item) for item in error.errors(include_url=False, include_context=True)]) from None
+
+
+def _is_deeper(document: Any, levels: int) -> bool:
+    """Return whether a document nests deeper than so many levels, without recursion."""
+    layer = [document]
+    for _ in range(levels):
+        layer = [
+            item
+            for value in layer
+            if isinstance(value, (dict, list))
+            for item in (value.values() if isinstance(value, dict) else value)
+            if isinstance(item, (dict, list))
+        ]
+        if not layer:
+            return False
+    return True
 
 
 def _fault(item: Any) -> InvalidInput:

@@ -1,0 +1,150 @@
+"""The OpenAPI document: routes read their bodies themselves, so the models are put in here, with worked examples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic.json_schema import models_json_schema
+
+from veselova.mechanics.trajectory import OUTPUTS
+from veselova.service.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.problem_details import MEDIA_TYPE
+from veselova.service.routes import RESOURCES
+from veselova.service.tasks import TASKS
+from veselova.version import __version__
+
+__all__ = ["openapi_document"]
+
+_NUMBERS: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+_MATRIX: dict[str, Any] = {"type": "array", "items": _NUMBERS}
+_SERIES = {
+    name: {"type": "array", "items": {0: {"type": "number"}, 1: _NUMBERS, 2: _MATRIX}[len(axes)]}
+    for name, axes in OUTPUTS.items()
+}
+_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
+
+
+def _object(properties: dict[str, Any], required: list[str] | None = None) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "required": list(properties) if required is None else required}
+
+
+_PROVENANCE = _object(
+    {
+        "engine": {"type": "string"},
+        "method": {"type": "string"},
+        "digits": {"type": "integer"},
+        "version": {"type": "string"},
+        "seconds": {"type": "number"},
+        "details": {"type": "object"},
+    }
+)
+
+#: Schemas of answers, by the kind of answer; a problem document is one of them.
+_ANSWERS: dict[str, dict[str, Any]] = {
+    "Trajectory": _object(
+        {
+            "engine": {"type": "string"},
+            "times": _NUMBERS,
+            "series": _object(_SERIES, required=[]),
+            "integrals": {
+                "type": "object",
+                "additionalProperties": _object(
+                    {"initial": {"anyOf": [{"type": "number"}, _NUMBERS]}, "drift": {"type": "number"}}
+                ),
+            },
+            "error": {**_NUMBERS, "description": "a bound on every component of q and frame at each time"},
+            "provenance": _PROVENANCE,
+        }
+    ),
+    "Comparison": _object(
+        {
+            "deviation": {**_BY_NAME, "description": "largest difference of the engines, per output"},
+            "agrees": {"type": "boolean", "description": "whether they differ by no more than both error estimates"},
+            "conditioning_floor": {"type": "number", "description": "what one rounding of the data moves at the last time"},
+            "error": _BY_NAME,
+            "drift": {"type": "object", "additionalProperties": _BY_NAME},
+            "seconds": _BY_NAME,
+            "provenance": {"type": "object", "additionalProperties": _PROVENANCE},
+            "analytic": {"$ref": "#/components/schemas/Trajectory"},
+            "numeric": {"$ref": "#/components/schemas/Trajectory"},
+        }
+    ),
+    "Torus": _object(
+        {
+            "n": {"type": "integer"},
+            "energy": {"type": "number"},
+            "constants": _NUMBERS,
+            "branch_points": _NUMBERS,
+            "origins": {"type": "array", "items": {"type": "string"}},
+            "periods": _MATRIX,
+            "riemann_matrix": _MATRIX,
+            "riemann_matrix_residual": {"type": "number"},
+            "frequencies_tau1": _NUMBERS,
+            "frequencies_t": _NUMBERS,
+            "phases": _NUMBERS,
+            "mean_rate": {"type": "number"},
+            "regime": {"type": "string"},
+        }
+    ),
+    "Problem": _object(
+        {
+            "type": {"type": "string", "examples": ["urn:veselova:problem:invalid-input"]},
+            "title": {"type": "string"},
+            "status": {"type": "integer"},
+            "detail": {"type": "string"},
+            "outcome": {"type": "string", "description": "the named outcome of an engine that cannot serve the problem"},
+            "errors": {"type": "array", "items": _object({"pointer": {"type": "string"}, "detail": {"type": "string"}})},
+        },
+        required=["type", "title", "status", "detail"],
+    ),
+}
+
+_REFUSALS = {
+    400: "Not JSON",
+    406: "No acceptable representation",
+    413: "Body too large",
+    415: "Not application/json",
+    422: "Invalid input, or a problem that the engine cannot serve",
+    500: "The server failed",
+    501: "An optional library is not installed on this server",
+    503: "Overloaded, or the worker was lost; see Retry-After",
+    504: "Over the time budget",
+}
+
+
+def openapi_document(app: FastAPI) -> dict[str, Any]:
+    """Return the OpenAPI document of the application, built once."""
+    if app.openapi_schema is None:
+        document = get_openapi(
+            title="veselova",
+            version=__version__,
+            summary="Motions of an n-dimensional rigid body under the Veselova constraint",
+            description="POST a problem and times; receive the motion in theta functions or by integration, with its error.",
+            routes=app.routes,
+        )
+        models = [(model, "validation") for model, _ in TASKS.values()]
+        _, definitions = models_json_schema(models, ref_template="#/components/schemas/{model}")  # type: ignore[arg-type]
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        schemas.update(definitions["$defs"], **_ANSWERS)
+        for path, (kind, _, content) in RESOURCES.items():
+            _describe(document["paths"][path]["post"], kind, content)
+        app.openapi_schema = document
+    return app.openapi_schema
+
+
+def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
+    """Put the body, the answer and the refusals of one resource into its operation."""
+    example = (
+        {"problem": BODY4_PROBLEM} if kind == "torus" else {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}
+    )
+    body = {"schema": {"$ref": f"#/components/schemas/{TASKS[kind][0].__name__}"}, "example": example}
+    operation["requestBody"] = {"required": True, "content": {"application/json": body}}
+    answer: dict[str, Any] = {"schema": {"$ref": f"#/components/schemas/{kind.capitalize()}"}}
+    if kind in ANSWERS:
+        answer["example"] = ANSWERS[kind]
+    operation["responses"] = {"200": {"description": content, "content": {"application/json": answer}}}
+    problem = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    for status, description in _REFUSALS.items():
+        operation["responses"][str(status)] = {"description": description, "content": problem}

@@ -1,0 +1,184 @@
+"""The command line, in processes of its own: output, files, exit statuses, one-sentence errors."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from io import BytesIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hostile import GOOD, INVALID, MALFORMED
+
+from veselova import __version__, solve
+from veselova.service.cli import main
+from veselova.service.examples import BODY4
+
+BODY4_FILE = Path(__file__).parent.parent / "examples" / "body4.json"
+
+
+def run(*arguments: str, stdin: bytes | None = None, cwd: Path | None = None) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run([sys.executable, "-m", "veselova", *arguments], input=stdin, capture_output=True, cwd=cwd, timeout=120)
+
+
+def request(**changes: Any) -> bytes:
+    return json.dumps({**GOOD, **changes}).encode()
+
+
+def test_the_example_file_is_the_worked_example() -> None:
+    assert json.loads(BODY4_FILE.read_text()) == BODY4
+
+
+def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
+    answer = run("demo", "--plot", "motion.png", cwd=tmp_path)
+    text = answer.stdout.decode()
+    assert answer.returncode == 0, answer.stderr
+    for word in ("frame", "omega", "conditioning floor", "error estimate, analytic", "error estimate, numeric", "agree within"):
+        assert word in text
+    deviations = {
+        line.split()[0]: float(line.split()[1]) for line in text.splitlines() if line[:5] in ("q    ", "frame", "omega")
+    }
+    assert deviations
+    assert max(deviations.values()) <= 1e-9
+    assert (tmp_path / "motion.png").stat().st_size > 20_000
+    assert answer.stderr == b""
+
+
+def test_the_taylor_method_agrees_to_eleven_digits() -> None:
+    answer = run("compare", str(BODY4_FILE), "--method", "taylor", "--json")
+    deviation = json.loads(answer.stdout)["deviation"]
+    assert max(deviation[name] for name in ("q", "frame", "omega")) <= 1e-11
+
+
+@pytest.mark.parametrize("command", ["solve", "compare", "torus"])
+def test_files_and_standard_input_are_the_same(command: str, tmp_path: Path) -> None:
+    (tmp_path / "body.json").write_bytes(request())
+    from_file, from_pipe = run(command, "body.json", cwd=tmp_path), run(command, "-", stdin=request())
+    assert from_file.returncode == from_pipe.returncode == 0, from_file.stderr
+    assert from_file.stdout.splitlines()[-1] == from_pipe.stdout.splitlines()[-1]
+
+
+def test_json_is_the_answer_of_the_http_api() -> None:
+    answer = run("solve", "-", "--json", stdin=request(outputs=["q", "tau1"]))
+    document = json.loads(answer.stdout)
+    expected = solve_good()
+    assert list(document["series"]) == ["q", "tau1"]
+    assert np.array_equal(document["series"]["q"], expected.q)
+    assert set(json.loads(run("torus", "-", "--json", stdin=request()).stdout)) >= {"periods", "riemann_matrix", "phases"}
+
+
+def solve_good() -> Any:
+    from veselova import Veselova
+
+    return solve(Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"]), GOOD["times"])
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".json"])
+def test_motions_are_written_to_files(suffix: str, tmp_path: Path) -> None:
+    answer = run("solve", "-", "--output", f"motion{suffix}", "--plot", "motion.svg", stdin=request(), cwd=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    assert (tmp_path / f"motion{suffix}").stat().st_size > 200
+    assert (tmp_path / "motion.svg").stat().st_size > 1000
+
+
+#: Limits of a server; the command line has none.
+SERVER_LIMITS = {"astronomical count", "too many times", "too large a dimension", "too long a budget"}
+REFUSED = [row for row in INVALID if row[0] not in SERVER_LIMITS]
+
+
+@pytest.mark.parametrize("body", [row[1].encode() for row in REFUSED], ids=[row[0] for row in REFUSED])
+def test_bad_input_exits_2_with_one_sentence(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    assert_refused(body, monkeypatch, capsys, "; given ")
+
+
+@pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])
+def test_what_is_not_json_exits_2(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    assert_refused(body, monkeypatch, capsys, "required one JSON document")
+
+
+def assert_refused(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any, part: str) -> None:
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=BytesIO(body)))
+    monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])
+    with pytest.raises(SystemExit) as raised:
+        main()
+    assert raised.value.code == 2
+    message = capsys.readouterr().err
+    assert message.startswith("veselova: ")
+    assert part in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("solve", "no-such-file.json"),
+        ("solve", "."),
+        ("solve", str(BODY4_FILE), "--output", "motion.xls"),
+        ("solve", str(BODY4_FILE), "--plot", "motion"),
+        ("solve", str(BODY4_FILE), "--output", "no/such/folder/motion.npz"),
+        ("solve",),
+        ("no-such-command",),
+        ("serve", "--port", "99999"),
+        ("compare", str(BODY4_FILE), "--method", "euler"),
+    ],
+)
+def test_bad_arguments_exit_2_without_a_traceback(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    answer = run(*arguments, cwd=tmp_path)
+    assert answer.returncode == 2
+    assert answer.stderr
+    assert b"Traceback" not in answer.stderr
+
+
+def test_what_cannot_be_solved_exits_1() -> None:
+    body = request(problem={**GOOD["problem"], "A": [1, 1, 1]})
+    answer = run("solve", "-", stdin=body)
+    assert answer.returncode == 1
+    assert answer.stderr.startswith(b"veselova: closed-cut: ")
+    assert answer.stderr.count(b"\n") == 1
+
+
+def test_bad_limits_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VESELOVA_WORKERS", "many")
+    answer = run("serve")
+    assert answer.returncode == 2
+    assert b"VESELOVA_WORKERS" in answer.stderr
+
+
+def test_settings_are_printed_with_their_meaning() -> None:
+    text = run("serve", "--settings").stdout.decode()
+    assert "VESELOVA_MAX_TIMES=100000" in text
+    assert "# longest budget_s" in text
+
+
+def test_version_and_help() -> None:
+    assert run("--version").stdout.decode().strip() == __version__
+    for command in ("", "demo", "solve", "compare", "torus", "serve"):
+        answer = run(*filter(None, [command, "--help"]))
+        assert answer.returncode == 0
+        assert b"Usage" in answer.stdout
+
+
+def test_interruption_is_not_a_traceback() -> None:
+    endless = request(engine="numeric", times=[0, 1e7])
+    command = [sys.executable, "-m", "veselova", "solve", "-"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdin
+        assert process.stderr
+        process.stdin.write(endless)
+        process.stdin.close()
+        time.sleep(2.5)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10) == 130
+        assert b"Traceback" not in process.stderr.read()
+
+
+def test_a_reader_that_goes_away_is_no_failure_of_ours() -> None:
+    command = f"{sys.executable} -m veselova solve {BODY4_FILE} --json | head -c 10"
+    answer = subprocess.run(["bash", "-c", command], capture_output=True, timeout=60)
+    assert answer.stderr == b""

@@ -1,0 +1,232 @@
+"""The Python client, synchronous and asynchronous: typed results, retries, timeouts, errors."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+import stamina
+from conftest import Server
+from hostile import GOOD
+from problems import tagged
+
+from veselova import (
+    AsyncClient,
+    Client,
+    InvalidInput,
+    InvalidRequest,
+    ProblemResponse,
+    ServiceUnreachable,
+    Trajectory,
+    Veselova,
+    compare,
+    solve,
+    torus,
+)
+from veselova.mechanics.trajectory import OUTPUTS
+
+PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
+TIMES = np.linspace(-1, 2, 7)
+
+
+@pytest.fixture(autouse=True)
+def fast_retries() -> Any:
+    """Retries without pauses: stamina's own test mode, with the number of attempts left as asked."""
+    with stamina.set_testing(True, attempts=4, cap=True):
+        yield
+
+
+@pytest.mark.parametrize("engine", ["analytic", "numeric"])
+def test_a_trajectory_comes_back_as_the_library_gives_it(server: Server, engine: str) -> None:
+    with Client(server.url) as client:
+        found = client.trajectory(PROBLEM, TIMES, engine)
+    expected = solve(PROBLEM, TIMES, engine)
+    assert isinstance(found, Trajectory)
+    for name in OUTPUTS:
+        assert np.array_equal(found.series(name), expected.series(name))
+    assert np.array_equal(found.error, expected.error)
+    assert found.provenance.method == expected.provenance.method
+    assert found.drift.keys() == expected.drift.keys()
+
+
+def test_problems_travel_exactly(server: Server) -> None:
+    for name in ("matrix-inertia", "random-n4-0", "large-units"):
+        problem = next(case for case in tagged("generic") if case.name == name).problem()
+        with Client(server.url) as client:
+            found = client.trajectory(problem, [1.0, 2.0], method="angles")
+        assert np.array_equal(found.frame, solve(problem, [1.0, 2.0], method="angles").frame)
+
+
+def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
+    with Client(server.url) as client:
+        found = client.trajectory(GOOD["problem"], {"start": 0, "stop": 1, "count": 3})
+        assert found.times.tolist() == [0, 0.5, 1]
+        with pytest.raises(InvalidRequest):
+            client.trajectory({**GOOD["problem"], "mass": 1}, [0, 1])
+        with pytest.raises(InvalidInput):
+            client.trajectory(3, [0, 1])  # type: ignore[arg-type]
+
+
+def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
+    with Client(server.url) as client:
+        comparison, found = client.compare(PROBLEM, TIMES, "taylor"), client.torus(PROBLEM)
+    assert comparison.agrees
+    assert comparison.deviation["frame"] == compare(PROBLEM, TIMES, "taylor").deviation["frame"]
+    expected = torus(PROBLEM)
+    assert found.as_dict() == expected.as_dict()
+    assert isinstance(found.periods, np.ndarray)
+
+
+def test_the_asynchronous_client_has_the_same_methods(server: Server) -> None:
+    async def ask() -> Any:
+        async with AsyncClient(server.url) as client:
+            motions = client.trajectory(PROBLEM, TIMES), client.trajectory(PROBLEM, [5.0])
+            return await asyncio.gather(client.compare(PROBLEM, TIMES), client.torus(PROBLEM), *motions)
+
+    comparison, found, trajectory, later = asyncio.run(ask())
+    assert np.array_equal(trajectory.frame, solve(PROBLEM, TIMES).frame)
+    assert comparison.agrees
+    assert found.n == 3
+    assert later.times.tolist() == [5.0]
+
+
+def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
+    public = {name for name in vars(Client) if not name.startswith("_")}
+    assert public == {name for name in vars(AsyncClient) if not name.startswith("_")}
+    assert public == {"trajectory", "compare", "torus", "close"}
+    for name in public:
+        assert getattr(Client, name).__doc__ == getattr(AsyncClient, name).__doc__
+
+
+def test_a_problem_document_becomes_an_exception_that_carries_it(server: Server) -> None:
+    with Client(server.url) as client:
+        with pytest.raises(ProblemResponse) as raised:
+            client.trajectory(PROBLEM, [0, 1], "magic")
+        assert raised.value.status == 422
+        assert raised.value.document["errors"][0]["pointer"] == "/engine"
+        assert "engine" in str(raised.value)
+        with pytest.raises(ProblemResponse) as raised:
+            client.trajectory(PROBLEM, [0, 1e7], "numeric", budget_s=0.3)
+        assert raised.value.status == 504
+
+
+class Script:
+    """A transport that answers from a list of statuses or exceptions, and counts."""
+
+    def __init__(self, *steps: Any, retry_after: str | None = None) -> None:
+        self.steps, self.calls, self.retry_after = list(steps), 0, retry_after
+        self.timeouts: list[Any] = []
+
+    def __call__(self, request: httpx2.Request) -> httpx2.Response:
+        self.calls += 1
+        self.timeouts.append(request.extensions["timeout"])
+        step = self.steps.pop(0)
+        if isinstance(step, type):
+            raise step("scripted", request=request)
+        if step == 200:
+            return httpx2.Response(200, json=torus(PROBLEM).as_dict())
+        headers = {"retry-after": self.retry_after} if self.retry_after else {}
+        return httpx2.Response(step, json={"detail": "scripted", "status": step}, headers=headers)
+
+
+def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
+    transport = httpx2.MockTransport(script)
+    if not asynchronous:
+        with Client("http://server", attempts=attempts, transport=transport) as client:
+            return client.torus(PROBLEM)
+
+    async def later() -> Any:
+        async with AsyncClient("http://server", attempts=attempts, transport=transport) as client:
+            return await client.torus(PROBLEM)
+
+    return asyncio.run(later())
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+@pytest.mark.parametrize(
+    "failure", [429, 503, httpx2.ConnectError, httpx2.ReadError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout]
+)
+def test_what_may_pass_is_tried_again(failure: Any, asynchronous: bool) -> None:
+    script = Script(failure, failure, 200)
+    assert ask(script, asynchronous).n == 3
+    assert script.calls == 3
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+@pytest.mark.parametrize("status", [400, 404, 413, 422, 500, 501, 504])
+def test_what_will_not_pass_is_not_tried_again(status: int, asynchronous: bool) -> None:
+    script = Script(status, 200)
+    with pytest.raises(ProblemResponse) as raised:
+        ask(script, asynchronous)
+    assert raised.value.status == status
+    assert script.calls == 1
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_attempts_end(asynchronous: bool) -> None:
+    script = Script(*[503] * 9)
+    with pytest.raises(ProblemResponse) as raised:
+        ask(script, asynchronous, attempts=3)
+    assert raised.value.status == 503
+    assert script.calls == 3
+    script = Script(*[httpx2.ConnectError] * 9)
+    with pytest.raises(ServiceUnreachable, match="http://server"):
+        ask(script, asynchronous, attempts=2)
+    assert script.calls == 2
+
+
+@pytest.mark.parametrize("failure", [httpx2.ReadTimeout, httpx2.UnsupportedProtocol])
+def test_a_late_answer_or_a_wrong_address_is_not_asked_for_again(failure: Any) -> None:
+    script = Script(failure, 200)
+    with pytest.raises(ServiceUnreachable):
+        ask(script, False)
+    assert script.calls == 1
+
+
+def test_the_pause_that_a_server_asks_for_is_kept() -> None:
+    from veselova.service.client import _pause_before_retry, _Retry
+
+    assert _pause_before_retry(_Retry(ValueError(), 7.0)) == 7.0
+    assert _pause_before_retry(_Retry(ValueError())) is True
+    assert _pause_before_retry(ValueError()) is False
+    core = Client("http://server")
+    for header, pause in (("3", 3.0), ("999", 30.0), ("Wed, 21 Oct 2026 07:28:00 GMT", None)):
+        response = httpx2.Response(503, json={}, headers={"retry-after": header})
+        with pytest.raises(_Retry) as raised:
+            core._result(None, response)  # type: ignore[arg-type]
+        assert raised.value.pause == pause
+
+
+def test_timeouts_follow_the_budget() -> None:
+    script = Script(200)
+    with Client("http://server", transport=httpx2.MockTransport(script)) as client:
+        client.torus(PROBLEM, budget_s=42)
+    assert script.timeouts[0]["read"] == 52
+    assert script.timeouts[0]["connect"] == 10
+
+
+@pytest.mark.parametrize("body", [b"<html>busy</html>", b"[]", b"\xff"])
+def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: bytes) -> None:
+    transport = httpx2.MockTransport(lambda request: httpx2.Response(502, content=body))
+    with Client("http://proxy", transport=transport) as client, pytest.raises(ProblemResponse) as raised:
+        client.torus(PROBLEM)
+    assert raised.value.status == 502
+    assert raised.value.document["status"] == 502
+
+
+def test_requests_are_what_the_openapi_document_says() -> None:
+    bodies: list[Any] = []
+
+    def keep(request: httpx2.Request) -> httpx2.Response:
+        bodies.append(json.loads(request.content))
+        return httpx2.Response(500, json={"detail": "seen"})
+
+    with Client("http://server", transport=httpx2.MockTransport(keep)) as client, pytest.raises(ProblemResponse):
+        client.trajectory(PROBLEM, range(3), "numeric", "taylor", budget_s=3)
+    assert bodies[0]["problem"] == GOOD["problem"] | {"normalize": False}
+    assert bodies[0]["times"] == [0, 1, 2]
+    assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == ("numeric", "taylor", 3)

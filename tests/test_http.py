@@ -1,0 +1,272 @@
+"""The HTTP door, through a real server process."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from conftest import Server, running_server
+from hostile import GOOD, INVALID, MALFORMED, changed
+
+from veselova import Veselova, compare, solve, torus
+from veselova.mechanics.trajectory import OUTPUTS
+from veselova.service.examples import ANSWERS, BODY4_PROBLEM
+
+JSON = {"content-type": "application/json"}
+PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
+
+
+def post(server: Server, path: str, body: Any, **headers: str) -> httpx2.Response:
+    content = body if isinstance(body, (bytes, str)) else json.dumps(body)
+    return httpx2.post(f"{server.url}{path}", content=content, headers={**JSON, **headers}, timeout=60)
+
+
+def is_problem(response: httpx2.Response, status: int, code: str) -> dict[str, Any]:
+    assert response.status_code == status, response.text[:500]
+    assert response.headers["content-type"] == "application/problem+json"
+    document: dict[str, Any] = response.json()
+    assert document["type"] == f"urn:veselova:problem:{code}"
+    assert document["status"] == status
+    assert document["title"]
+    assert document["detail"]
+    assert len(response.content) < 5000
+    return document
+
+
+@pytest.mark.parametrize("engine", ["analytic", "numeric"])
+def test_a_trajectory_is_the_one_of_the_library(server: Server, engine: str) -> None:
+    response = post(server, "/v1/trajectories", {**GOOD, "engine": engine})
+    assert response.status_code == 200
+    assert response.headers["content-type"] == "application/json"
+    document, expected = response.json(), solve(PROBLEM, [0, 1], engine)
+    assert document["engine"] == engine
+    assert document["times"] == [0, 1]
+    assert set(document["series"]) == set(OUTPUTS)
+    for name in OUTPUTS:
+        assert np.array_equal(np.array(document["series"][name]), expected.series(name))
+    assert document["error"] == expected.error.tolist()
+    assert document["integrals"]["energy"]["drift"] < 1e-11
+    assert document["provenance"]["engine"] == engine
+
+
+def test_outputs_and_uniform_times_are_the_callers_choice(server: Server) -> None:
+    request = {**GOOD, "times": {"start": -1, "stop": "1/2", "count": 4}, "outputs": ["tau1", "q"]}
+    document = post(server, "/v1/trajectories", request).json()
+    assert document["times"] == [-1, -0.5, 0, 0.5]
+    assert list(document["series"]) == ["tau1", "q"]
+
+
+def test_a_comparison_has_both_engines_and_their_differences(server: Server) -> None:
+    document = post(server, "/v1/comparisons", {**GOOD, "outputs": ["q"]}).json()
+    expected = compare(PROBLEM, [0, 1])
+    assert document["deviation"]["q"] == expected.deviation["q"]
+    assert set(document["deviation"]) == set(OUTPUTS)
+    assert document["agrees"] is True
+    assert set(document["seconds"]) == {"analytic", "numeric"}
+    assert list(document["analytic"]["series"]) == ["q"]
+    assert is_problem(post(server, "/v1/comparisons", {**GOOD, "engine": "numeric"}), 422, "invalid-input")
+
+
+def test_a_torus_is_the_one_of_the_library(server: Server) -> None:
+    document = post(server, "/v1/tori", {"problem": GOOD["problem"]}).json()
+    assert document == torus(PROBLEM).as_dict()
+
+
+def test_the_worked_examples_of_the_document_are_true(server: Server) -> None:
+    motion = post(server, "/v1/trajectories", {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}).json()
+    for name, values in ANSWERS["trajectory"]["series"].items():
+        assert np.allclose(motion["series"][name], values, atol=1e-12)
+    assert set(ANSWERS["trajectory"]) == set(motion)
+    found = post(server, "/v1/tori", {"problem": BODY4_PROBLEM}).json()
+    assert set(ANSWERS["torus"]) == set(found)
+    for name, value in ANSWERS["torus"].items():
+        same = found[name] == value if name in ("origins", "regime") else np.allclose(found[name], value, atol=1e-9)
+        assert same, name
+
+
+def test_the_openapi_document_describes_and_exemplifies_every_resource(server: Server) -> None:
+    document = httpx2.get(f"{server.url}/openapi.json").json()
+    assert set(document["paths"]) == {"/v1/trajectories", "/v1/comparisons", "/v1/tori", "/v1/systems", "/healthz", "/readyz"}
+    for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori"):
+        operation = document["paths"][path]["post"]
+        body = operation["requestBody"]["content"]["application/json"]
+        assert body["schema"]["$ref"].split("/")[-1] in document["components"]["schemas"]
+        assert post(server, path, body["example"]).status_code == 200
+        assert {"200", "400", "413", "415", "422", "503", "504"} <= set(operation["responses"])
+    assert httpx2.get(f"{server.url}/docs").status_code == 200
+
+
+def test_systems_health_and_readiness(server: Server) -> None:
+    systems = httpx2.get(f"{server.url}/v1/systems").json()
+    assert systems["systems"][0]["system"] == "veselova"
+    assert systems["systems"][0]["outputs"] == list(OUTPUTS)
+    assert systems["limits"]["max_times"] == 100_000
+    assert httpx2.get(f"{server.url}/healthz").json()["status"] == "ok"
+    assert httpx2.get(f"{server.url}/readyz").json() == {"status": "ready"}
+
+
+@pytest.mark.parametrize(("body", "pointer"), [row[1:] for row in INVALID], ids=[row[0] for row in INVALID])
+def test_invalid_input_gets_422_with_a_pointer(server: Server, body: str, pointer: str) -> None:
+    document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
+    fault = document["errors"][0]
+    assert fault["pointer"] == pointer
+    assert ": required " in fault["detail"]
+    assert "; given " in fault["detail"]
+    assert "\n" not in fault["detail"]
+
+
+@pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])
+def test_what_is_not_json_gets_400(server: Server, body: bytes) -> None:
+    is_problem(post(server, "/v1/tori", body), 400, "malformed-json")
+
+
+def test_several_faults_are_reported_together(server: Server) -> None:
+    document = is_problem(post(server, "/v1/trajectories", changed(engine="x", digits=3, outputs=[])), 422, "invalid-input")
+    assert {fault["pointer"] for fault in document["errors"]} == {"/engine", "/digits", "/outputs"}
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_body_of_200_megabytes_is_refused(server: Server, chunked: bool) -> None:
+    def chunks() -> Any:
+        for _ in range(200):
+            yield b" " * 1_000_000
+
+    content: Any = chunks() if chunked else b" " * 200_000_000
+    try:
+        response = httpx2.post(f"{server.url}/v1/tori", content=content, headers=JSON, timeout=60)
+    except (httpx2.WriteError, httpx2.ReadError, httpx2.RemoteProtocolError):
+        pass  # the server may close the connection while the body is still on its way
+    else:
+        is_problem(response, 413, "body-too-large")
+    assert httpx2.get(f"{server.url}/healthz").status_code == 200
+
+
+@pytest.mark.parametrize("media_type", ["text/plain", "application/x-www-form-urlencoded", ""])
+def test_another_media_type_gets_415(server: Server, media_type: str) -> None:
+    is_problem(post(server, "/v1/tori", GOOD, **{"content-type": media_type}), 415, "unsupported-media-type")
+
+
+@pytest.mark.parametrize("accept", ["application/json", "application/*;q=0.5", "*/*", "text/html, */*;q=0.1"])
+def test_json_is_served_to_who_takes_it(server: Server, accept: str) -> None:
+    assert post(server, "/v1/trajectories", GOOD, accept=accept).status_code == 200
+
+
+@pytest.mark.parametrize("accept", ["text/csv", "application/x-npz", "application/json;q=0"])
+def test_what_cannot_be_served_gets_406(server: Server, accept: str) -> None:
+    is_problem(post(server, "/v1/trajectories", GOOD, accept=accept), 406, "not-acceptable")
+
+
+def test_unknown_paths_and_methods_are_problems_too(server: Server) -> None:
+    is_problem(httpx2.get(f"{server.url}/v2"), 404, "not-found")
+    response = httpx2.get(f"{server.url}/v1/tori")
+    is_problem(response, 405, "method-not-allowed")
+    assert response.headers["allow"] == "POST"
+
+
+@pytest.mark.parametrize(("A", "outcome"), [([1, 1, 1], "closed-cut"), ([2, 1, 1], "closed-cut")])
+def test_a_named_outcome_is_a_problem_with_its_name(server: Server, A: list[float], outcome: str) -> None:
+    request = {**GOOD, "problem": {**GOOD["problem"], "A": A}}
+    assert is_problem(post(server, "/v1/trajectories", request), 422, "unsolved")["outcome"] == outcome
+    assert post(server, "/v1/trajectories", {**request, "engine": "numeric"}).status_code == 200
+
+
+def test_work_over_its_budget_is_stopped(server: Server) -> None:
+    endless = {**GOOD, "times": [0, 1e7], "engine": "numeric", "budget_s": 0.5}
+    before = set(server.workers())
+    began = time.monotonic()
+    is_problem(post(server, "/v1/trajectories", endless), 504, "over-budget")
+    assert time.monotonic() - began < 5
+    time.sleep(0.2)
+    stopped = before - set(server.workers())
+    assert len(stopped) == 1 or not before
+    assert post(server, "/v1/trajectories", GOOD).status_code == 200
+
+
+def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path) -> None:
+    with running_server(tmp_path, workers="1") as own:
+        answers: list[httpx2.Response] = []
+        endless = {**GOOD, "times": [0, 1e7], "engine": "numeric", "budget_s": 30}
+        thread = threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", endless)))
+        thread.start()
+        time.sleep(1.0)
+        os.kill(own.workers()[0], signal.SIGKILL)
+        thread.join(20)
+        is_problem(answers[0], 503, "worker-lost")
+        assert answers[0].headers["retry-after"] == "1"
+        assert post(own, "/v1/trajectories", GOOD).status_code == 200
+        os.kill(own.workers()[0], signal.SIGKILL)  # an idle worker: the next request may meet its remains, the one after not
+        assert post(own, "/v1/trajectories", GOOD).status_code in (200, 503)
+        assert post(own, "/v1/trajectories", GOOD).status_code == 200
+
+
+def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
+    with running_server(tmp_path, workers="1", max_waiting="1") as own:
+        answers: list[httpx2.Response] = []
+        endless = {**GOOD, "times": [0, 1e7], "engine": "numeric", "budget_s": 2}
+        threads = [threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", endless))) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        began = time.monotonic()
+        assert httpx2.get(f"{own.url}/healthz").status_code == 200
+        assert time.monotonic() - began < 1.0
+        for thread in threads:
+            thread.join(20)
+        assert sorted(answer.status_code for answer in answers) == [503, 503, 504, 504]
+        refused = next(answer for answer in answers if answer.status_code == 503)
+        assert is_problem(refused, 503, "overloaded")
+        assert refused.headers["retry-after"] == "2"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_the_server_cleanly(tmp_path: Path, number: signal.Signals) -> None:
+    with running_server(tmp_path, workers="1") as own:
+        workers = own.workers()
+        own.process.send_signal(number)
+        own.process.wait(15)
+        time.sleep(0.2)
+        assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
+        assert "Traceback" not in own.log.read_text()
+        assert "Application shutdown complete" in own.log.read_text()
+
+
+def test_sigterm_ends_work_in_flight_after_its_grace(tmp_path: Path) -> None:
+    with running_server(tmp_path, workers="1", shutdown_grace_s="1") as own:
+        workers = own.workers()
+        endless = {**GOOD, "times": [0, 1e7], "engine": "numeric", "budget_s": 30}
+        answers: list[Any] = []
+
+        def ask() -> None:
+            try:
+                answers.append(post(own, "/v1/trajectories", endless).status_code)
+            except httpx2.TransportError as error:
+                answers.append(error)
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        time.sleep(0.5)
+        own.process.send_signal(signal.SIGTERM)
+        assert own.process.wait(8) == 0
+        thread.join(8)
+        assert answers
+        assert answers[0] != 200
+        time.sleep(0.2)
+        assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
+
+
+def test_the_server_stays_small(server: Server) -> None:
+    """Resident memory of the server and one warm worker, idle: below 300 MB."""
+
+    def resident(pid: int) -> float:
+        line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS"))
+        return float(line.split()[1]) / 1024
+
+    with_one_worker = resident(server.process.pid) + max(resident(worker) for worker in server.workers())
+    assert with_one_worker < 300
