@@ -23,17 +23,10 @@ _PHASE = 8.0
 #: Relative rounding of f, F_0 and the clock in ε; periods of random problems agree with extended precision to 2 ε.
 _RATE = 4.0
 
-#: Angles at which the steepness is sampled, and the factor from the sampled to the true maximum.
-_SAMPLES = 48
-_SAMPLE_SAFETY = 2.0
-
-#: Step of the difference quotient in ψ: truncation and rounding both near 1e-8, ample for an estimate.
-_STEP = 1e-6
-
 
 def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock, method: str) -> Array:
     """Return a bound on every component of q and frame at each time, shape (N,)."""
-    steepness = _steepness(solution)
+    steepness = solution.steepness
     frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
     rounding = 0.0 if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
@@ -41,19 +34,3 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     along_flow = rounding * elapsed + clock.error(tau1)
     speed = float(np.max(np.abs(steepness @ solution.in_tau1.rates)))
     return np.asarray(_EVALUATION[method] * _EPSILON + phase @ np.max(np.abs(steepness), axis=0) + speed * along_flow)
-
-
-def _steepness(solution: Solution) -> Array:
-    """Return ∂(frame entry)/∂z_k at sampled angles, flattened to (samples·entries, g)."""
-    genus = solution.curve.genus
-    sample = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (_SAMPLES, genus))
-    psi = np.concatenate([sample, solution.start.angles[None, :]])
-    slopes = np.empty((psi.shape[0], genus + 1, genus + 1, genus))
-    for s in range(genus):
-        step = np.zeros(genus)
-        step[s] = _STEP / 2
-        upper, lower = solution.frame.at(psi + step), solution.frame.at(psi - step)
-        slopes[:, :, 0, s] = (upper.q - lower.q) / _STEP
-        slopes[:, :, 1:, s] = (upper.normals - lower.normals) / _STEP
-    per_phase = slopes.reshape(psi.shape[0], -1, genus) @ np.linalg.inv(solution.inversion.jacobian(psi))
-    return np.asarray(_SAMPLE_SAFETY * per_phase.reshape(-1, genus))

@@ -26,6 +26,9 @@ from veselova.analytic.precision import Values
 
 __all__ = ["Attitude", "Frame"]
 
+#: Step of the difference quotient in ψ: truncation and rounding both near 1e-8.
+_STEP = 1e-6
+
 
 @dataclass(frozen=True)
 class Attitude:
@@ -55,6 +58,18 @@ class Frame:
     def at(self, psi: Values) -> Attitude:
         """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π as they do in time."""
         return _Point(self, psi).attitude()
+
+    def slopes(self, psi: Values) -> Values:
+        """Return the derivatives of all frame entries in the angles, shape (N, n², g), to about 1e-8: a difference quotient."""
+        size, genus = self.periods.genus + 1, self.periods.genus
+        slopes = np.empty((psi.shape[0], size, size, genus))
+        for s in range(genus):
+            step = np.zeros(genus)
+            step[s] = _STEP / 2
+            upper, lower = self.at(psi + step), self.at(psi - step)
+            slopes[:, :, 0, s] = (upper.q - lower.q) / _STEP
+            slopes[:, :, 1:, s] = (upper.normals - lower.normals) / _STEP
+        return slopes.reshape(psi.shape[0], -1, genus)
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,10 @@ _FOURIER_FROM = {1: 3.0, 2: 10.0, 3: 100.0, 4: 2e3, 5: 2e4}
 _PANEL_CYCLES = 5e4
 
 
+#: Angles at which the steepness of the attitude is sampled.
+_SAMPLES = 48
+
+
 class Solution:
     """The closed-form motion of a moving body in the generic regime; raises Unsolved with the reason for any other."""
 
@@ -141,6 +145,14 @@ class Solution:
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times."""
         return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(times)))
+
+    @cached_property
+    def steepness(self) -> Array:
+        """Return twice ∂(frame entry)/∂z_k at sampled angles, a row per sample and entry, shape (·, g); twice, for what lies between."""
+        sample = np.random.default_rng(self.curve.genus).uniform(0.0, 2 * np.pi, (_SAMPLES, self.curve.genus))
+        psi = np.concatenate([sample, self.start.angles[None, :]])
+        slopes = self.frame.slopes(psi) @ np.linalg.inv(self.inversion.jacobian(psi))
+        return np.asarray(2 * slopes.reshape(-1, self.curve.genus))
 
     @cached_property
     def quotients(self) -> ThetaQuotients:

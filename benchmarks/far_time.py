@@ -1,0 +1,62 @@
+"""What does t = 10⁶ cost in closed form, how accurate is it, and what would integrating there cost?
+
+    python benchmarks/far_time.py      needs the extra `fast`
+
+Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶ after it (median of 9), heyoka's
+time to integrate to t = 1000, measured in the same run and scaled to 10⁶ (cost is proportional to time), their ratio; then the
+reported error, the difference to the same closed form without guard digits, and the conditioning floor ε|ω|t.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+
+import numpy as np
+
+import veselova as vs
+from veselova.analytic.solution import Solution
+from veselova.numeric.taylor import Taylor
+
+FAR = 1e6
+
+
+def main() -> None:
+    print("n    modes   set-up s   one attitude ms   integrating s (scaled)      ratio      error   unguarded differs    floor")
+    for n in (2, 3, 4, 5):
+        rng = np.random.default_rng(n)
+        problem = vs.Veselova(np.exp(rng.uniform(0, np.log(5), n)), rng.normal(size=n), rng.normal(size=n), normalize=True)
+        speed = float(np.linalg.norm(problem.q_dot))
+        times = np.array([FAR / speed])
+        began = time.perf_counter()
+        trajectory = vs.solve(problem, times)
+        setup = time.perf_counter() - began
+        single = []
+        for i in range(9):
+            began = time.perf_counter()
+            trajectory.at(times * (1 - 1e-7 * i))
+            single.append(time.perf_counter() - began)
+        one = statistics.median(single)
+
+        integrator = Taylor(problem.flow, Taylor.tolerances[0])
+        integrator.advance(problem.flow.initial, 0.0, 10.0, np.empty(0))
+        began = time.perf_counter()
+        state = problem.flow.initial
+        for k in range(100):
+            state = problem.flow.project(integrator.advance(state, 10.0 * k, 10.0 * (k + 1), np.empty(0))[1])
+        integrating = (time.perf_counter() - began) * FAR / 1000
+
+        solution = Solution(problem)
+        unguarded = solution.attitude(solution._fourier(False).tau1(times)[1], "angles")
+        difference = np.max(np.abs(solution.states(unguarded)[1] - trajectory.frame))
+        floor = problem.conditioning_floor(times)[0]
+        size = trajectory.provenance.details["clock_size"]
+        print(
+            f"{n}   {size:6d}   {setup:8.3f}   {one * 1e3:15.2f}   {integrating:22.1f}   {integrating / one:8.1e}"
+            f"   {trajectory.error[0]:8.1e}   {difference:17.1e}   {floor:6.1e}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

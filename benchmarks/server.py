@@ -1,0 +1,74 @@
+"""How much memory does an idle server hold, and what does a request cost beyond the solve?
+
+    python benchmarks/server.py
+
+Starts a server with one worker, then POSTs 1000 times of a four-dimensional body with its frame; server time beyond the solve
+is the time of the whole request, measured by the client on the same machine, less the seconds that the engine reports.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx2
+
+from veselova.service.examples import BODY4_PROBLEM
+
+
+def resident_megabytes(pid: int) -> float:
+    line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS"))
+    return float(line.split()[1]) / 1024
+
+
+def main() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
+    environment = {**os.environ, "VESELOVA_WORKERS": "1"}
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    url = f"http://127.0.0.1:{port}"
+    try:
+        with httpx2.Client(base_url=url, timeout=60) as client:
+            began = time.perf_counter()
+            while True:
+                try:
+                    if client.get("/readyz").status_code == 200:
+                        break
+                except httpx2.TransportError:
+                    time.sleep(0.02)
+            print(f"ready after {time.perf_counter() - began:.2f} s")
+            worker = int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
+            server_size, worker_size = resident_megabytes(process.pid), resident_megabytes(worker)
+            print(
+                f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {server_size + worker_size:.0f} MB"
+            )
+
+            body = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 99.9, "count": 1000}, "outputs": ["frame"]}
+            beyond, whole = [], []
+            for _ in range(30):
+                began = time.perf_counter()
+                response = client.post("/v1/trajectories", json=body)
+                seconds = time.perf_counter() - began
+                whole.append(seconds)
+                beyond.append(seconds - response.json()["provenance"]["seconds"])
+            print(
+                f"1000 frames, n = 4: {len(response.content) / 1e3:.0f} kB, whole request {statistics.median(whole) * 1e3:.1f} ms,"
+            )
+            print(
+                f"  beyond the solve {statistics.median(beyond) * 1e3:.1f} ms (median of 30; largest {max(beyond) * 1e3:.1f} ms)"
+            )
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait(20)
+
+
+if __name__ == "__main__":
+    main()
