@@ -47,9 +47,8 @@ def main() -> None:
             print(f"ready after {time.perf_counter() - began:.2f} s")
             worker = int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
             server_size, worker_size = resident_megabytes(process.pid), resident_megabytes(worker)
-            print(
-                f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {server_size + worker_size:.0f} MB"
-            )
+            total = server_size + worker_size
+            print(f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {total:.0f} MB")
 
             body = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 99.9, "count": 1000}, "outputs": ["frame"]}
             beyond, whole = [], []
@@ -59,12 +58,9 @@ def main() -> None:
                 seconds = time.perf_counter() - began
                 whole.append(seconds)
                 beyond.append(seconds - response.json()["provenance"]["seconds"])
-            print(
-                f"1000 frames, n = 4: {len(response.content) / 1e3:.0f} kB, whole request {statistics.median(whole) * 1e3:.1f} ms,"
-            )
-            print(
-                f"  beyond the solve {statistics.median(beyond) * 1e3:.1f} ms (median of 30; largest {max(beyond) * 1e3:.1f} ms)"
-            )
+            size, request, rest = len(response.content) / 1e3, statistics.median(whole), statistics.median(beyond)
+            print(f"1000 frames, n = 4: {size:.0f} kB, whole request {request * 1e3:.1f} ms (median of 30),")
+            print(f"  beyond the solve {rest * 1e3:.1f} ms (largest {max(beyond) * 1e3:.1f} ms)")
     finally:
         process.send_signal(signal.SIGTERM)
         process.wait(20)

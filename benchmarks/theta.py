@@ -40,9 +40,8 @@ def main() -> None:
         theirs = (time.perf_counter() - began) / count
         for i, value in enumerate(values):
             worst = max(worst, abs(complex(value[0, index]).real - ours[i]))
-        print(
-            f"{genus}   {each * 1e6:8.2f}   {theirs * 1e6:17.0f}   {theirs / each:5.0f}   {theirs / 4**genus * 1e6:20.1f}   {worst:18.1e}"
-        )
+        row = f"{genus}   {each * 1e6:8.2f}   {theirs * 1e6:17.0f}   {theirs / each:5.0f}"
+        print(f"{row}   {theirs / 4**genus * 1e6:20.1f}   {worst:18.1e}")
 
 
 if __name__ == "__main__":

@@ -148,7 +148,7 @@ class Solution:
 
     @cached_property
     def steepness(self) -> Array:
-        """Return twice ∂(frame entry)/∂z_k at sampled angles, a row per sample and entry, shape (·, g); twice, for what lies between."""
+        """Return ∂(frame entry)/∂z_k at sampled angles, doubled for what lies between, a row per sample and entry, (·, g)."""
         sample = np.random.default_rng(self.curve.genus).uniform(0.0, 2 * np.pi, (_SAMPLES, self.curve.genus))
         psi = np.concatenate([sample, self.start.angles[None, :]])
         slopes = self.frame.slopes(psi) @ np.linalg.inv(self.inversion.jacobian(psi))
