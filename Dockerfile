@@ -1,0 +1,28 @@
+# The service. Build: docker build -t veselova .      Run: docker run --rm -p 127.0.0.1:8000:8000 veselova
+# Any base with Python 3.11 or newer as python3 and its venv module will do (docs/container.md builds on a plain Debian).
+ARG BASE=python:3.11-slim-bookworm
+
+FROM ${BASE} AS build
+WORKDIR /src
+COPY requirements.lock ./
+RUN python3 -m venv /opt/veselova \
+ && /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock
+COPY pyproject.toml README.md LICENSE ./
+COPY src src
+RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
+ && /opt/veselova/bin/python -m pip uninstall --yes --quiet hatchling editables
+
+FROM ${BASE}
+LABEL org.opencontainers.image.title="veselova" \
+      org.opencontainers.image.description="Motions of an n-dimensional rigid body under the Veselova constraint, over HTTP" \
+      org.opencontainers.image.licenses="BSD-3-Clause"
+COPY --from=build /opt/veselova /opt/veselova
+# No account is created: a number needs no entry, and the process owns nothing but /tmp.
+USER 10001:10001
+WORKDIR /tmp
+ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
+EXPOSE 8000
+HEALTHCHECK --interval=10s --timeout=3s --start-period=20s --retries=3 \
+  CMD ["/opt/veselova/bin/python", "-c", "import urllib.request; urllib.request.urlopen('http://127.0.0.1:8000/healthz', timeout=2)"]
+ENTRYPOINT ["veselova", "serve"]
+CMD ["--host", "0.0.0.0", "--port", "8000"]
