@@ -10,7 +10,8 @@ RUN python3 -m venv /opt/veselova \
 COPY pyproject.toml README.md LICENSE ./
 COPY src src
 RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
- && /opt/veselova/bin/python -m pip uninstall --yes --quiet hatchling editables
+ && /opt/veselova/bin/python -m pip uninstall --yes --quiet \
+      hatchling editables pathspec pluggy tomlkit trove-classifiers setuptools pip
 
 FROM ${BASE}
 LABEL org.opencontainers.image.title="veselova" \
@@ -20,9 +21,12 @@ COPY --from=build /opt/veselova /opt/veselova
 # No account is created: a number needs no entry, and the process owns nothing but /tmp.
 USER 10001:10001
 WORKDIR /tmp
-ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
+# One BLAS thread in each process: the matrices are small, and a thread per processor would count against a limit on tasks.
+ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 OPENBLAS_NUM_THREADS=1
 EXPOSE 8000
+# By http.client, which takes no proxy from the environment.
 HEALTHCHECK --interval=10s --timeout=3s --start-period=20s --retries=3 \
-  CMD ["/opt/veselova/bin/python", "-c", "import urllib.request; urllib.request.urlopen('http://127.0.0.1:8000/healthz', timeout=2)"]
+  CMD ["/opt/veselova/bin/python", "-c", "import http.client, sys; c = http.client.HTTPConnection('127.0.0.1', 8000, timeout=2); \
+c.request('GET', '/healthz'); sys.exit(c.getresponse().status != 200)"]
 ENTRYPOINT ["veselova", "serve"]
 CMD ["--host", "0.0.0.0", "--port", "8000"]

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from draws import random_problem
 from problems import tagged
-
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.curve import Curve
 from veselova.analytic.frame import Frame

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hostile import GOOD, INVALID, MALFORMED
 
+from hostile import GOOD, INVALID, MALFORMED
 from veselova import __version__, solve
 from veselova.service.cli import main
 from veselova.service.examples import BODY4

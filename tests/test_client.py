@@ -10,10 +10,10 @@ import httpx2
 import numpy as np
 import pytest
 import stamina
+
 from conftest import Server
 from hostile import GOOD
 from problems import tagged
-
 from veselova import (
     AsyncClient,
     Client,

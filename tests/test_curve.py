@@ -8,9 +8,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+
 from draws import random_problem
 from problems import near_separatrix, tagged
-
 from veselova import Veselova
 from veselova.analytic.curve import Curve
 from veselova.analytic.interval import Interval

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from draws import random_problem
 from problems import TABLE, Case, tagged
 from truth import true_motion
-
 from veselova import Unsolved, Veselova, compare, solve, torus
 from veselova.analytic.solution import Solution
 

@@ -7,9 +7,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+
 from draws import random_problem
 from problems import near_separatrix, tagged
-
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow

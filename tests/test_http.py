@@ -13,9 +13,9 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+
 from conftest import Server, running_server
 from hostile import GOOD, INVALID, MALFORMED, changed
-
 from veselova import Veselova, compare, solve, torus
 from veselova.mechanics.trajectory import OUTPUTS
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM

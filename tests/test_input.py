@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from problems import TABLE
 
+from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
 from veselova.mechanics.errors import VeselovaError
 from veselova.mechanics.exact import exact_number, plain

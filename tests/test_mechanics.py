@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from draws import random_problem
 
+from draws import random_problem
 from veselova import InvalidInput, Veselova
 from veselova.mechanics import integrals
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from problems import tagged
 
+from problems import tagged
 from veselova import BackendMissing, Comparison, Trajectory, Unsolved, compare, solve, torus
 from veselova.mechanics.trajectory import OUTPUTS, Provenance
 

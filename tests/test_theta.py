@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from draws import random_problem, random_riemann_matrix
 from flint import acb, acb_mat, ctx
-from problems import tagged
 
+from draws import random_problem, random_riemann_matrix
+from problems import tagged
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta, lattice_points

@@ -1,0 +1,92 @@
+"""The misprints of the paper that docs/errata.md lists: the printed formula fails on random data, the corrected one holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from draws import random_problem
+from veselova.analytic.solution import Solution
+from veselova.mechanics import integrals
+from veselova.mechanics.spheroconic import to_spheroconic
+
+
+@pytest.mark.parametrize("N", range(2, 7))
+def test_the_jacobi_identities_hold_with_the_factors_turned_round(N: int, rng: np.random.Generator) -> None:
+    rho = rng.normal(size=N)
+
+    def total(m: int, sign: int) -> float:
+        return float(sum(rho[s] ** m / np.prod([sign * (rho[s] - rho[k]) for k in range(N) if k != s]) for s in range(N)))
+
+    assert all(abs(total(m, 1)) < 1e-8 for m in range(N - 1))
+    assert np.isclose(total(N - 1, 1), 1.0)
+    assert np.isclose(total(N - 1, -1), (-1) ** (N - 1))  # as printed, with ρ_l − ρ_s
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_the_lagrangian_in_spheroconic_coordinates_has_a_minus_sign(n: int, rng: np.random.Generator) -> None:
+    problem = random_problem(rng, n, 5.0)
+    A, q, inverse = problem.A, problem.q, 1 / problem.A
+    velocity = integrals.neumann_velocity(A, q, problem.q_dot)  # any tangent vector will do for dq/dτ
+    step = 1e-6
+    lam = to_spheroconic(A, q)
+
+    def moved(offset: float) -> Any:
+        x = q + offset * velocity
+        return to_spheroconic(A, x / np.linalg.norm(x))
+
+    rate = (moved(step) - moved(-step)) / (2 * step)
+    printed = 0.0
+    for k in range(n - 1):
+        others = np.prod([lam[k] - lam[s] for s in range(n - 1) if s != k])
+        printed += others / (np.prod(lam[k] - inverse) * lam[k]) * rate[k] ** 2 / 8
+    true = ((A * velocity) @ velocity * ((A * q) @ q) - ((A * q) @ velocity) ** 2) / (2 * (q @ (A * q)))
+    assert np.isclose(-printed, true, rtol=1e-5)
+
+
+def test_in_three_dimensions_the_factor_gamma_is_missing_after_4_2a(rng: np.random.Generator) -> None:
+    inertia, omega, gamma = np.diag([1.0, 2.0, 3.5]), rng.normal(size=3), rng.normal(size=3)
+    gamma /= np.linalg.norm(gamma)
+    m = inertia @ omega - (inertia @ omega @ gamma) * gamma + (omega @ gamma) * gamma
+    inverse_gamma = np.linalg.solve(inertia, gamma)
+    coefficient = (m @ inverse_gamma - m @ gamma) / (gamma @ inverse_gamma)
+    assert np.allclose(m - coefficient * gamma, inertia @ omega)
+    assert not np.allclose(m - coefficient, inertia @ omega)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_wurzel_takes_the_derivative_of_small_psi(n: int, rng: np.random.Generator) -> None:
+    """(q', n_k)² = |U(c_k)/ψ'(c_k)| with ψ(r) = Π(r − c_k); the printed derivative of Ψ(r) = Π(r − I_i) gives another length."""
+    solution = Solution(random_problem(rng, n, 5.0))
+    at = solution.attitude(rng.uniform(0, 1, (1, n - 1)), "angles")
+    constants = np.array([float(c) for c in solution.spectrum.constants])
+    inverse = np.array([float(x) for x in solution.spectrum.inverse])
+    components = (at.q_prime[0] @ at.normals[0])[: n - 2]
+    for k, component in enumerate(components, start=1):
+        U = np.prod(constants[k] - at.spheroconic[0])
+        small = np.prod([constants[k] - c for j, c in enumerate(constants) if j != k])
+        large = sum(np.prod([constants[k] - x for j, x in enumerate(inverse) if j != i]) for i in range(n))
+        assert np.isclose(component**2, abs(U / small), rtol=1e-8, atol=1e-14)
+        assert not np.isclose(component**2, abs(U / large), rtol=1e-3)
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_4_15_needs_its_second_weight_and_its_brackets(n: int, rng: np.random.Generator) -> None:
+    """Ξ = (Aq,q̇)𝓘ω·q − (Aq,q)𝓘ω·q̇ = −2h Aq up to a multiple of q, with 2h = [(Aq,q)(Aq̇,q̇) − (Aq,q̇)²]/det A."""
+    problem = random_problem(rng, n, 5.0)
+    A, q, v, det = problem.A, problem.q, problem.q_dot, np.prod(problem.A)
+    inertia_omega = (np.outer(A * q, A * v) - np.outer(A * v, A * q)) / det
+    first = (A * q) @ v * (inertia_omega @ q)
+    true = first - (A * q) @ q * (inertia_omega @ v)
+    printed = first - (A * q) @ v * (inertia_omega @ v)
+
+    def across(x: Any) -> Any:
+        return x - (x @ q) * q
+
+    expected = across(-2 * problem.energy * A * q)
+    assert np.allclose(across(true), expected, rtol=1e-9, atol=1e-12 * np.max(np.abs(expected)))
+    assert not np.allclose(across(printed), expected, rtol=1e-3)
+    unbracketed = (A * q) @ q * ((A * v) @ v) / det - ((A * q) @ v) ** 2
+    assert not np.isclose(unbracketed, 2 * problem.energy, rtol=1e-6)
