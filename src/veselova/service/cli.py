@@ -26,6 +26,8 @@ _Method = Annotated[str | None, typer.Option(help="theta or angles (analytic), d
 
 def main() -> None:
     """Run the command line; errors are one sentence on standard error."""
+    # As process 1 of a container the default action of SIGTERM would be to ignore it, and 143 is what a shell expects.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     with _reported():
         app()
 
@@ -146,6 +148,8 @@ def serve(
     settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
 ) -> None:
     """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
+    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     from pydantic import ValidationError
 
     from veselova.service.settings import Settings
@@ -164,9 +168,6 @@ def serve(
 
     from veselova.service.app import create_app
 
-    # uvicorn sends itself the signal again when it has shut down. The default action of SIGTERM would end the process before
-    # the event loop has killed the workers; leaving by SystemExit unwinds the loop.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=limits.shutdown_grace_s)
 
 

@@ -37,6 +37,7 @@ _REFUSALS = {
     "worker-lost": (503, "The worker process was lost"),
     "overloaded": (503, "Too many requests are waiting"),
     "not-ready": (503, "The server is starting"),
+    "shutting-down": (503, "The server is shutting down"),
     "over-budget": (504, "The time budget was used up"),
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+import anyio
 import orjson
 from fastapi import APIRouter, Request
 from starlette.responses import Response
@@ -73,7 +74,11 @@ def _computing(kind: str, settings: Settings, workers: Workers) -> Callable[[Req
         require_acceptable(request.headers.get("accept"))
         asked = read_request(model, await read_json(request, settings))
         admit(asked, settings)
-        body = await workers.run(kind, asked.model_dump(), asked.budget_s)
+        try:
+            body = await workers.run(kind, asked.model_dump(), asked.budget_s)
+        except anyio.get_cancelled_exc_class():
+            # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.
+            raise Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5) from None
         return Response(body, media_type="application/json")
 
     return compute
