@@ -21,8 +21,7 @@ COPY --from=build /opt/veselova /opt/veselova
 # No account is created: a number needs no entry, and the process owns nothing but /tmp.
 USER 10001:10001
 WORKDIR /tmp
-# One BLAS thread in each process: the matrices are small, and a thread per processor would count against a limit on tasks.
-ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 OPENBLAS_NUM_THREADS=1
+ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
 EXPOSE 8000
 # By http.client, which takes no proxy from the environment.
 HEALTHCHECK --interval=10s --timeout=3s --start-period=20s --retries=3 \

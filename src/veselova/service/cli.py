@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ _File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTT
 _Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
 _Output = Annotated[Path | None, typer.Option(help="write the motion to a file: .npz, .csv, .parquet or .json")]
 _Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
-_Method = Annotated[str | None, typer.Option(help="theta or angles (analytic), dop853 or taylor (numeric)")]
+_Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
 
 def main() -> None:
@@ -64,7 +65,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="print the ver
 
 
 @app.command()
-def demo(method: Annotated[str | None, typer.Option(help="numeric: dop853 or taylor")] = None, plot: _Plot = None) -> None:
+def demo(method: _Method = None, plot: _Plot = None) -> None:
     """Solve a four-dimensional body with both engines and show how they agree."""
     from veselova.service.examples import BODY4
 
@@ -150,6 +151,8 @@ def serve(
     """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
     # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pydantic import ValidationError
 
     from veselova.service.settings import Settings
