@@ -1,8 +1,9 @@
 """The problem table: motions with tags, through which every engine runs.
 
 Tags: ``generic`` (all branch points distinct), ``special-start`` (generic torus, start on a coordinate axis or at a turning
-point), ``near-degenerate`` (a gap or cut nearly closed), ``closed-cut``, ``closed-gap``, ``at-rest`` (the outcome that the
-analytic engine names), ``matrix`` (A given as a matrix), ``scaled`` (units far from one), ``reference`` (45-digit motion).
+point), ``near-degenerate`` (a gap or cut nearly closed), ``closed-cut`` (equal A's, or directions that do not move),
+``separatrix`` (some c_k = I_i), ``at-rest``, ``wide`` (A's over many orders of magnitude), ``matrix`` (A given as a matrix),
+``scaled`` (units far from one), ``reference`` (45-digit motion).
 """
 
 from __future__ import annotations
@@ -114,7 +115,7 @@ TABLE: tuple[Case, ...] = (
         "eight", [1, 2, 3, 4, 5, 6, 7, 8], [1, 1, -1, 1, 1, -1, 1, 1], [1, -2, 3, -4, 3, 2, -1, 0.5], _tags("generic"), horizon=20
     ),
     Case("ratio-100", [100, 10, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("generic")),
-    Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-gap")),
+    Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-cut")),
     Case("two-axes-vanish", [4, 3, 2, 1], [0, 0.6, 0.8, 0], [0.5, 0.8, -0.6, 0.3], _tags("generic", "special-start")),
     Case("large-units", [3e8, 2e8, 1.1e8], [0.3, 0.5, 0.8], [1e-6, -4e-7, 2e-7], _tags("generic", "scaled"), horizon=5e7),
     Case("fast", [3, 2, 1], [0.3, 0.5, 0.8], [1e9, -4e8, 2e8], _tags("generic", "scaled"), horizon=5e-8),
@@ -130,7 +131,48 @@ TABLE: tuple[Case, ...] = (
     ),
     _matrix_case(),
     Case("isotropic", [1, 1, 1], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("closed-cut")),
-    Case("unstable-circle", [3, 2, 1], [1, 0, 0], [0, 0, 1], _tags("closed-gap")),
+    Case("unstable-circle", [3, 2, 1], [1, 0, 0], [0, 0, 1], _tags("closed-cut")),
+    Case("two-pairs", [2, 1, 2, 1], [0.3, 0.5, -0.4, 0.7], [1, -0.4, 0.2, 0.1], _tags("closed-cut")),
+    Case("five-equal", [1, 1, 2, 1, 1, 1], [0.3, 0.5, 0.4, 0.7, -0.2, 0.1], [1, -0.4, 0.2, 0.1, 0.3, 0.6], _tags("closed-cut")),
+    Case("equal-and-frozen", [3, 2, 2, 2, 1], [0.6, 0, 0.5, 0, 0.4], [0.3, 0, 0.2, 0.7, 0], _tags("closed-cut")),
+    Case("equal-at-the-start-on-one", [2, 2, 1], [1, 0, 0], [0, 1, 0.3], _tags("closed-cut")),
+    Case("along-one-of-two-equal", [2, 2, 1], [1, 0, 0], [0, 0, 0.3], _tags("closed-cut")),
+    Case("hardly-moving-axis", [3, 2, 1], [0.6, "1e-170", 0.8], [0.8, "3e-170", -0.6], _tags("closed-cut")),
+    Case(
+        "narrow-frozen-cut",
+        [3, 2, 1.5, 1],
+        [0.6, 1e-100, 0.5, 0.6],
+        [0.8, 2e-100, -0.6, 0.1],
+        _tags("near-degenerate"),
+    ),
+    Case(
+        "narrow-cut",
+        [3, "2.0000000000000000000001", 2, 1],
+        [0.5] * 4,
+        [1.1, -0.7, 0.3, -0.7],
+        _tags("generic", "near-degenerate"),
+    ),
+    Case(
+        "clustered-constants",
+        ["3", "2.000000003", "2.000000002", "2.000000001", "2", "1"],
+        [0.5, 0.5, 0.5, 0.5, 0.3, 0.4],
+        [1.1, -0.7, 0.3, -0.7, 0.2, 0.6],
+        _tags("generic", "near-degenerate"),
+        horizon=20,
+    ),
+    Case("wide-ratio", [1e8, 1e4, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("wide"), horizon=5),
+    Case("huge-units", [3e150, 2e150, 1e150], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("generic", "scaled")),
+    Case("tiny-units", [3e-150, 2e-150, 1e-150], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("generic", "scaled")),
+    # c_2 = I_2 exactly: an umbilic of the ellipsoid has q_2 = 0 and λ_1 = λ_2 = I_2.
+    Case("umbilic", ["1", "1/10", "1/26"], ["3/5", 0, "4/5"], ["4/5", 1, "-3/5"], _tags("separatrix"), horizon=8),
+    Case(
+        "near-umbilic",
+        ["1", "1/10", "1/26"],
+        ["3/5", "1e-30", "4/5"],
+        ["4/5", 1, "-3/5"],
+        _tags("near-degenerate"),
+        horizon=8,
+    ),
     Case("at-rest", [3, 2, 1], [0.3, 0.5, 0.8], [0, 0, 0], _tags("at-rest")),
 )
 

@@ -13,7 +13,8 @@ from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.curve import Curve
 from veselova.analytic.frame import Frame
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE, Extended, extended
+from veselova.analytic.precision import DOUBLE, Extended
+from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import spectrum
 from veselova.analytic.start import start
 from veselova.mechanics.integrals import neumann_velocity
@@ -22,7 +23,7 @@ DIMENSIONS = range(2, 9)
 
 
 def inversion_of(problem: Any) -> AbelJacobi:
-    return AbelJacobi(Periods(Curve.of(spectrum(problem, extended(40)), DOUBLE)))
+    return AbelJacobi(Periods(Curve.of(spectrum(moving_part(problem), 15), DOUBLE)))
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -64,7 +65,7 @@ def test_the_map_is_quasi_periodic_and_odd(rng: np.random.Generator) -> None:
 
 def test_extended_inversion_starts_from_the_double_one(rng: np.random.Generator) -> None:
     problem = tagged("generic")[1].problem()
-    spectra = spectrum(problem, extended(40))
+    spectra = spectrum(moving_part(problem), 15)
     precise = AbelJacobi(Periods(Curve.of(spectra, Extended(30))), coarse=inversion_of(problem))
     z = precise.arithmetic.array(rng.uniform(-1, 1, (3, 2)))
     assert np.max(np.abs(precise.map(precise.invert(z)) - z)) < 1e-28
@@ -73,14 +74,14 @@ def test_extended_inversion_starts_from_the_double_one(rng: np.random.Generator)
 @pytest.mark.parametrize("case", tagged("generic"), ids=lambda case: case.name)
 def test_the_start_gives_back_position_and_velocity(case: Any) -> None:
     problem = case.problem()
-    spectra = spectrum(problem, extended(40))
+    moving = moving_part(problem)
+    spectra = spectrum(moving, 15)
     curve = Curve.of(spectra, DOUBLE)
     begin = start(spectra, curve)
     attitude = Frame(Periods(curve), begin.signs).at(begin.angles[None, :])
-    order = list(spectra.order)
-    v = neumann_velocity(problem.A, problem.q, problem.q_dot)
-    assert np.allclose(attitude.q[0], problem.q[order], atol=1e-14)
-    assert np.allclose(attitude.q_prime[0], v[order], atol=1e-13 * np.max(np.abs(v)))
+    v = neumann_velocity(problem.A, problem.q, problem.q_dot) * np.sqrt(float(moving.unit))
+    assert np.allclose(attitude.q[0] @ moving.directions.T, problem.q, atol=1e-14)
+    assert np.allclose(attitude.q_prime[0] @ moving.directions.T, v, atol=1e-13 * np.max(np.abs(v)))
 
 
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, -1)])

@@ -45,7 +45,7 @@ def test_truth_reproduces_the_reference_motions(case: Case) -> None:
 
 
 @pytest.mark.parametrize("method", ["theta", "angles"])
-@pytest.mark.parametrize("case", tagged("reference", "generic"), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: str) -> None:
     times, frame, q_dot, tau1 = reference(case)
     found = solve(case.problem(), times, "analytic", method)
@@ -70,10 +70,10 @@ def test_the_numeric_engine_reaches_the_reference_motions(case: Case, method: st
 @pytest.mark.parametrize(("engine", "method"), METHODS)
 @pytest.mark.parametrize("case", SOLVABLE, ids=lambda case: case.name)
 def test_true_errors_never_exceed_reported_ones(case: Case, engine: str, method: str) -> None:
-    if engine == "analytic" and "generic" not in case.tags:
+    if method == "angles" and case.name in ("umbilic", "near-umbilic", "narrow-frozen-cut"):
         with pytest.raises(Unsolved) as raised:
             solve(case.problem(), case.times(), engine, method)
-        assert raised.value.outcome in case.tags
+        assert raised.value.outcome == "narrow-gap"
         return
     found = solve(case.problem(), case.times(), engine, method)
     frame, q_dot, tau1 = truth(case)
@@ -115,15 +115,26 @@ def test_the_engines_agree_within_their_errors(case: Case) -> None:
     assert np.all(comparison.conditioning_floor > 0)
 
 
-def test_at_rest_the_numeric_engine_stands_still_and_the_analytic_one_says_so() -> None:
+@pytest.mark.parametrize("engine", ["analytic", "numeric"])
+def test_a_body_at_rest_stands_still(engine: str) -> None:
     problem = tagged("at-rest")[0].problem()
-    found = solve(problem, [-1, 0, 1e9], "numeric")
+    found = solve(problem, [-1, 0, 1e9], engine)
     assert np.array_equal(found.frame, np.tile(problem.frame, (3, 1, 1)))
     assert not found.tau1.any()
-    for call in (lambda: solve(problem, [1.0]), lambda: torus(problem)):
-        with pytest.raises(Unsolved) as raised:
-            call()
-        assert raised.value.outcome == "at-rest"
+    with pytest.raises(Unsolved, match="at-rest"):
+        torus(problem)
+
+
+def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
+    case = tagged("separatrix")[0]
+    times = np.linspace(0, 14, 29)
+    found = solve(case.problem(), times)
+    assert found.provenance.details["regime"] == "separatrix"
+    assert found.error[-1] > 1e3 * found.error[1]
+    frame = true_motion(case.problem(), times)[0]
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)
+    with pytest.raises(Unsolved, match="no-digit-left"):
+        solve(case.problem(), [1.0, 100.0])
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])

@@ -96,8 +96,8 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     z = rng.uniform(-1, 1, (40, n - 1))
     series = solution.mean_rate + clock._periodic(z - solution.in_tau1.start, clock.size)[1]
     q = solution.attitude(z, "angles").q
-    A = solution.problem.A[list(solution.spectrum.order)]
-    start = solution.problem.q @ (solution.problem.A * solution.problem.q)
+    A = np.array([float(a) for a in solution.moving.A])
+    start = np.array([float(x) for x in solution.spectrum.q]) ** 2 @ A
     expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.clock_rate)
     assert np.allclose(series, expected, rtol=1e-12)
     assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
@@ -120,7 +120,7 @@ def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
 
 def test_panels_stretch_to_the_wanted_times() -> None:
     solution = Solution(tagged("generic")[3].problem())
-    clock = PanelClock(solution.rate, solution.in_tau1, -0.5, 33.0)
+    clock = PanelClock(solution.rate_at, solution.mean_rate, solution.in_tau1, -0.5, 33.0)
     assert np.allclose(clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13)
 
 

@@ -171,11 +171,32 @@ def test_unknown_paths_and_methods_are_problems_too(server: Server) -> None:
     assert response.headers["allow"] == "POST"
 
 
-@pytest.mark.parametrize(("A", "outcome"), [([1, 1, 1], "closed-cut"), ([2, 1, 1], "closed-cut")])
-def test_a_named_outcome_is_a_problem_with_its_name(server: Server, A: list[float], outcome: str) -> None:
-    request = {**GOOD, "problem": {**GOOD["problem"], "A": A}}
-    assert is_problem(post(server, "/v1/trajectories", request), 422, "unsolved")["outcome"] == outcome
-    assert post(server, "/v1/trajectories", {**request, "engine": "numeric"}).status_code == 200
+@pytest.mark.parametrize(
+    ("path", "change", "outcome"),
+    [
+        ("/v1/trajectories", {"times": [1e40]}, "too-far"),
+        ("/v1/trajectories", {"times": [1e308]}, "too-far"),
+        ("/v1/tori", {"problem": {**GOOD["problem"], "q_dot": [0, 0, 0]}}, "at-rest"),
+        (
+            "/v1/trajectories",
+            {
+                "problem": {
+                    "system": "veselova",
+                    "A": ["1", "1/10", "1/26"],
+                    "q": ["3/5", 0, "4/5"],
+                    "q_dot": ["4/5", 1, "-3/5"],
+                },
+                "times": [90],
+            },
+            "no-digit-left",
+        ),
+    ],
+)
+def test_a_named_outcome_is_a_problem_with_its_name(server: Server, path: str, change: dict[str, Any], outcome: str) -> None:
+    request = {**GOOD, **change}
+    if path == "/v1/tori":
+        del request["times"]
+    assert is_problem(post(server, path, request), 422, "unsolved")["outcome"] == outcome
 
 
 def test_work_over_its_budget_is_stopped(server: Server) -> None:

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Arithmetic, Values
-from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.errors import InternalContradiction, Unsolved
 
 __all__ = ["AbelJacobi"]
 
 #: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches its neighbour.
 _MOST_STEPS = 100
+
+#: Relative gaps from which a failure to settle is the curve's, not ours.
+_NARROW_GAP = 1e-6
 
 #: A residual of this many ε per unit of z is rounding.
 _SETTLED = 8.0
@@ -67,7 +70,7 @@ class AbelJacobi:
     def invert(self, z: Values) -> Values:
         """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
 
-        Raises InternalContradiction where the iteration does not settle.
+        Raises Unsolved where the iteration does not settle for a gap that is too narrow (InternalContradiction otherwise).
         """
         xp = self.arithmetic
         cycles = xp.floor(z)
@@ -86,7 +89,10 @@ class AbelJacobi:
             open_ = open_[size > tolerance]
             if open_.size == 0:
                 return psi
-            step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[:, :, 0]
+            try:
+                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                break
             trial = psi[open_] - step_fraction[open_, None] * step
             trial_residual = self.map(trial) - z[open_]
             better = np.max(np.abs(trial_residual), axis=1) < np.max(np.abs(residual[open_]), axis=1)
@@ -97,6 +103,11 @@ class AbelJacobi:
             # A full step that no longer improves has met the rounding of the sums, which grows with their length.
             stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < 1e4 * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
+        gap = self.periods.curve.narrowest_gap
+        if gap < _NARROW_GAP:  # both neighbours can be near it, where phases hardly move with their angles
+            raise Unsolved(
+                "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
+            )
         raise InternalContradiction(f"the Abel–Jacobi inversion left a residual of {np.max(np.abs(residual)):.2g}")
 
     def _refine(self, z: Values, coarse: AbelJacobi) -> Values:

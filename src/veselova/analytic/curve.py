@@ -7,11 +7,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["BranchPoint", "Curve"]
+__all__ = ["BranchPoint", "Curve", "Layout"]
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,24 @@ class BranchPoint:
 
     kind: Literal["I", "c"]
     index: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
+
+    places (m,) their indices j · own_cut (m,) the cut (from 0) that each ends, −1 for c_1 = 0, which ends none
+    is_own (g, m) whether b_k ends cut s · mate (m,) the number of the cut's other end, −1 where that is of the other kind
+    beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k (m where there is none)
+    sides (g, m) the sign of λ_s − b_k
+    """
+
+    places: NDArray[np.intp]
+    own_cut: NDArray[np.intp]
+    is_own: NDArray[np.bool_]
+    mate: NDArray[np.intp]
+    beyond: NDArray[np.intp]
+    sides: NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -38,13 +57,9 @@ class Curve:
     @classmethod
     def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
-        labelled = [(c, BranchPoint("c", k)) for k, c in enumerate(spectrum.constants)]
-        labelled += [(x, BranchPoint("I", i)) for i, x in enumerate(spectrum.inverse)]
-        # c_1 = 0 is the smallest; sorting by value alone would let rounding put a c_k that equals an I on either side.
-        labelled.sort(key=lambda item: (item[0], item[1].kind))
-        points = np.array([value for value, _ in labelled], dtype=object)
+        points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
         differences = points[None, :] - points[:, None]
-        origins = tuple(origin for _, origin in labelled)
+        origins = tuple(BranchPoint("I" if kind == "I" else "c", index) for _, kind, index in spectrum.branch_points)
         return cls(arithmetic, arithmetic.array(points), arithmetic.array(differences), origins)
 
     @property
@@ -57,6 +72,16 @@ class Curve:
         """Return the index j of each branch point by (kind, index)."""
         return {(origin.kind, origin.index): j for j, origin in enumerate(self.origins)}
 
+    def layout(self, kind: Literal["I", "c"]) -> Layout:
+        """Return where the branch points of one kind stand."""
+        count = self.genus + 1 if kind == "I" else self.genus
+        places = np.array([self.place[kind, index] for index in range(count)])
+        own_cut, cuts = (places + 1) // 2 - 1, np.arange(self.genus)[:, None]
+        others = [self.origins[j + 1 if j % 2 == 1 else j - 1] if j > 0 else None for j in places]
+        mate = np.array([other.index if other is not None and other.kind == kind else -1 for other in others])
+        beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
+        return Layout(places, own_cut, cuts == own_cut, mate, beyond, np.where(places <= 2 * cuts + 1, 1, -1))
+
     def cut_of(self, j: int) -> int:
         """Return the cut s = 1…g that ends at b_j, j ≥ 1."""
         return (j + 1) // 2
@@ -67,8 +92,9 @@ class Curve:
         even = np.arange(2, 2 * self.genus, 2)
         return (self.differences[:, even] + self.differences[:, even + 1]) / 2
 
-    def relative_widths(self) -> Values:
-        """Return the width of each interval [b_j, b_{j+1}], j = 0…2g−1, divided by b_{2g}."""
-        g = self.genus
-        widths = self.differences[np.arange(2 * g), np.arange(1, 2 * g + 1)]
-        return np.asarray(widths / self.branch_points[-1])
+    @cached_property
+    def narrowest_gap(self) -> float:
+        """Return the least gap but the lowest, divided by b_{2g}: how near a separatrix is; 1 for genus one."""
+        even = np.arange(2, 2 * self.genus, 2)
+        gaps = [float(gap / self.branch_points[-1]) for gap in self.differences[even, even + 1]]
+        return min(gaps, default=1.0)

@@ -23,14 +23,24 @@ _PHASE = 8.0
 #: Relative rounding of f, F_0 and the clock in ε; periods of random problems agree with extended precision to 2 ε.
 _RATE = 4.0
 
+#: The same where they carry guard digits: 30 digits in the leading and the following double.
+_GUARDED_RATE = 1e-30
+
+
+#: Rounding of the principal axes and of the data along them, in units of the conditioning floor.
+_AXES_ROUNDING = 8.0
+
 
 def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock, method: str) -> Array:
     """Return a bound on every component of q and frame at each time, shape (N,)."""
     steepness = solution.steepness
     frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
-    rounding = 0.0 if solution.is_guarded(times) else _RATE * _EPSILON
+    rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     phase = _PHASE * _EPSILON + rounding * elapsed[:, None] * frequencies
     along_flow = rounding * elapsed + clock.error(tau1)
-    speed = float(np.max(np.abs(steepness @ solution.in_tau1.rates)))
-    return np.asarray(_EVALUATION[method] * _EPSILON + phase @ np.max(np.abs(steepness), axis=0) + speed * along_flow)
+    along_flow = rounding * elapsed + clock.error(tau1)
+    error = _EVALUATION[method] * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow
+    if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
+        error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
+    return np.asarray(error)

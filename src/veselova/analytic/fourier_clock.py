@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from veselova.analytic.clock import Clock, ClockRate
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
+from veselova.mechanics.errors import Unsolved
 
 __all__ = ["FourierClock"]
 
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 #: Modes below this fraction of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
+
+#: Modes before giving up, and what a mode and a torus cost: 300 MB and a minute at genus five.
+_MOST_MODES = 1_000_000
 
 #: Modes that bring the inverse clock near its answer before all of them are summed.
 _FIRST_MODES = 64
@@ -132,6 +136,8 @@ def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
         kept_values.append(values[large])
         neighbours = (frontier[large][:, None, :] + steps).reshape(-1, genus)
         frontier = _unseen(_half_space(neighbours), seen)
+        if len(seen) > _MOST_MODES:
+            raise Unsolved("too-far", f"the clock has more than {_MOST_MODES} Fourier modes, and the time is too far for panels")
     modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
     moving = np.any(modes != 0, axis=1)
     return modes[moving].astype(np.float64), values[moving]

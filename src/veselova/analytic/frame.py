@@ -15,19 +15,24 @@ accuracy where a coordinate turns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
+from veselova.analytic.curve import Curve, Layout
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import Values
+from veselova.analytic.precision import Arithmetic, Values
 
-__all__ = ["Attitude", "Frame"]
+__all__ = ["Attitude", "Frame", "slopes"]
 
-#: Step of the difference quotient in ψ: truncation and rounding both near 1e-8.
+#: Step of the difference quotients: truncation and rounding both near 1e-8.
 _STEP = 1e-6
+
+#: Distances |λ_s−b_i| held at once: 16 MB.
+_BLOCK = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,11 @@ class Attitude:
         """Return q' = dq/dτ₁ = Σ_k v_k n_k, shape (N, n)."""
         return np.asarray(np.sum(self.normals * self.components[:, None, :], axis=2))
 
+    @classmethod
+    def joined(cls, parts: list[Attitude]) -> Attitude:
+        """Return the attitudes one after the other."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -57,128 +67,125 @@ class Frame:
 
     def at(self, psi: Values) -> Attitude:
         """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π as they do in time."""
-        return _Point(self, psi).attitude()
+        size = max(1, _BLOCK // (self.periods.genus * (2 * self.periods.genus + 1)))
+        blocks = [_attitude(self, psi[first : first + size]) for first in range(0, max(psi.shape[0], 1), size)]
+        return blocks[0] if len(blocks) == 1 else Attitude.joined(blocks)
 
-    def slopes(self, psi: Values) -> Values:
-        """Return the derivatives of all frame entries in the angles, shape (N, n², g), to about 1e-8: a difference quotient."""
-        size, genus = self.periods.genus + 1, self.periods.genus
-        slopes = np.empty((psi.shape[0], size, size, genus))
-        for s in range(genus):
-            step = np.zeros(genus)
-            step[s] = _STEP / 2
-            upper, lower = self.at(psi + step), self.at(psi - step)
-            slopes[:, :, 0, s] = (upper.q - lower.q) / _STEP
-            slopes[:, :, 1:, s] = (upper.normals - lower.normals) / _STEP
-        return slopes.reshape(psi.shape[0], -1, genus)
+    def slopes(self, psi: Values, directions: Values) -> Values:
+        """Return the derivatives of all frame entries along directions (N, g, d) of the angles, shape (N, n², d)."""
+        return slopes(self.at, psi, directions)
+
+
+def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
+    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-8, (N, n², d)."""
+    count, genus, number = directions.shape
+    result = np.empty((count, genus + 1, genus + 1, number))
+    for d in range(number):
+        step = directions[:, :, d] * (_STEP / 2)
+        upper, lower = attitude(points + step), attitude(points - step)
+        result[:, :, 0, d] = (upper.q - lower.q) / _STEP
+        result[:, :, 1:, d] = (upper.normals - lower.normals) / _STEP
+    return result.reshape(count, -1, number)
 
 
 @dataclass(frozen=True)
 class _Point:
-    """The distances and signed roots at given angles, computed once and shared by the products."""
+    """The distances and signed roots at given angles, shared by the products. Axes: N points, s = 1…g, branch points b_i."""
 
     frame: Frame
     psi: Values
 
-    @cached_property
-    def _curve(self) -> Any:
+    @property
+    def curve(self) -> Curve:
+        """Return the curve."""
         return self.frame.periods.curve
 
     @cached_property
-    def _on_cuts(self) -> list[tuple[Values, Values, Values, Values]]:
-        return [cut.distances(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
+    def on_cuts(self) -> tuple[Values, Values, Values, Values]:
+        """Return sn, cn, λ_s−b_{2s−1} and b_{2s}−λ_s, each (N, g)."""
+        of_cuts = [cut.distances(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
+        sn, cn, below, above = (np.stack(values, axis=1) for values in zip(*of_cuts, strict=True))
+        return sn, cn, below, above
 
     @cached_property
-    def _to_points(self) -> list[list[Values]]:
-        """Return |λ_s−b_i| by cut s and branch point i."""
-        cuts = self.frame.periods.cuts
-        return [
-            [cut.from_branch_point(i, below, above) for i in range(len(self._curve.origins))]
-            for cut, (_, _, below, above) in zip(cuts, self._on_cuts, strict=True)
-        ]
+    def to_points(self) -> Values:
+        """Return |λ_s−b_i|, (N, g, 2g+1)."""
+        _, _, below, above = self.on_cuts
+        return np.stack([cut.to_branch_points(below[:, s], above[:, s]) for s, cut in enumerate(self.frame.periods.cuts)], axis=1)
 
     @cached_property
-    def _between(self) -> dict[tuple[int, int], Values]:
-        """Return |λ_s−λ_j| for s ≠ j (from 0): what is above λ_s on its cut, the stretch between, what is below λ_j."""
-        d, result = self._curve.differences, {}
-        for j in range(len(self._on_cuts)):
-            for s in range(j):
-                result[s, j] = result[j, s] = self._on_cuts[s][3] + d[2 * s + 2, 2 * j + 1] + self._on_cuts[j][2]
+    def between(self) -> Values:
+        """Return |λ_s−λ_j|, (N, g, g), one for s = j: what is above λ_s on its cut, the stretch between, what is below λ_j."""
+        _, _, below, above = self.on_cuts
+        g = self.curve.genus
+        stretch = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
+        forward = above[:, :, None] + stretch + below[:, None, :]
+        lower = np.arange(g)[:, None] < np.arange(g)
+        result = np.where(lower, forward, np.swapaxes(forward, 1, 2))
+        result[:, np.arange(g), np.arange(g)] = self.curve.arithmetic.number(1)
         return result
 
-    def _own_root(self, i: int) -> Values:
-        """Return the signed root of |λ_s−b_i| at an end b_i of cut s: along sn at the lower end, along cn at the upper."""
-        sn, cn, below, above = self._on_cuts[self._curve.cut_of(i) - 1]
-        distance, wave = (below, sn) if i % 2 == 1 else (above, cn)
-        root = self._curve.arithmetic.sqrt(distance)
-        return np.asarray(np.where(wave < 0, -root, root))
+    @cached_property
+    def own_roots(self) -> Values:
+        """Return the signed root of |λ_s−b_i| at each end b_i, i = 1…2g, of its cut s: along sn or cn, (N, 2g)."""
+        sn, cn, below, above = self.on_cuts
+        waves, distances = (np.stack(pair, axis=2).reshape(sn.shape[0], -1) for pair in ((sn, cn), (below, above)))
+        roots = self.curve.arithmetic.sqrt(distances)
+        return np.asarray(np.where(waves < 0, -roots, roots))
 
-    def _column(self, kind: str, index: int) -> tuple[Values, int | None]:
-        """Return √(|U(b)/Φ'(b)|) without the factor of b's own cut, and that cut (from 0; None for c_1 = 0, which ends none)."""
-        curve, g = self._curve, self._curve.genus
-        b = curve.place[kind, index]
-        own = None if b == 0 else curve.cut_of(b) - 1
-        size = g + 1 if kind == "I" else g
-        product = 0 * self.psi[:, 0] + 1
-        for s in range(g):
-            partner = s if s < index else s + 1  # the branch point of the same kind beyond λ_s, as seen from b
-            ratio = product if s == own else product * self._to_points[s][b]
-            product = ratio / abs(curve.differences[b, curve.place[kind, partner]]) if partner < size else ratio
-        return curve.arithmetic.sqrt(product), own
 
-    def _row(self, kind: str, s: int) -> tuple[Values, list[int]]:
-        """Return √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b of one kind that are not ends of cut s, and those that are."""
-        curve, g = self._curve, self._curve.genus
-        ends = [i for i in (2 * s + 1, 2 * s + 2) if curve.origins[i].kind == kind]
-        product = 0 * self.psi[:, 0] + 1
-        # b_2 … b_s pair with the λ_j below, b_{s+1} … b_g with those above; the outermost (c_1, or I_1 and I_n) are left over.
-        partners = {index: (index - 1 if index <= s else index) for index in range(1, g)}
-        for index in range(g + 1 if kind == "I" else g):
-            b = curve.place[kind, index]
-            if b not in ends:
-                product = product * self._to_points[s][b]
-            if index in partners:
-                product = product / self._between[s, partners[index]]
-        return curve.arithmetic.sqrt(product), ends
+def _attitude(frame: Frame, psi: Values) -> Attitude:
+    """Return the attitude at a block of angles: q and v are columns of the two matrices, the normals their product."""
+    point, g = _Point(frame, psi), frame.periods.genus
+    q, position = _orthogonal(point, "I", frame.signs)
+    v, velocity = _orthogonal(point, "c", None)
+    order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
+    normals = np.swapaxes(position, 1, 2) @ velocity[:, :, order]
+    lower_ends = frame.periods.curve.branch_points[1 : 2 * g : 2]
+    return Attitude(q, normals, v[:, order], lower_ends + point.on_cuts[2])
 
-    def _orthogonal(self, kind: str, count: int) -> tuple[list[Values], list[Values], list[list[Values]]]:
-        """Return the signed columns (q_i or v_k), rows (y_s or x_s), and the matrix column·row/(λ_s−b) by row s and column."""
-        curve, g = self._curve, self._curve.genus
-        columns = [self._column(kind, index) for index in range(count)]
-        rows = [self._row(kind, s) for s in range(g)]
-        if kind == "I":
-            columns = [(sign * value, own) for sign, (value, own) in zip(self.frame.signs, columns, strict=True)]
-        places = [curve.place[kind, index] for index in range(count)]
-        whole_columns = [
-            value if own is None else value * self._own_root(b) for (value, own), b in zip(columns, places, strict=True)
-        ]
-        whole_rows = [self._times_roots(value, ends) for value, ends in rows]
-        matrix = []
-        for s, (row, ends) in enumerate(rows):
-            entries = []
-            for index, b in enumerate(places):
-                side = 1 if b <= 2 * s + 1 else -1  # the sign of λ_s − b
-                if b in ends:  # the root of |λ_s−b| stands in both factors and cancels the quotient
-                    others = [i for i in ends if i != b]
-                    entries.append(side * columns[index][0] * self._times_roots(row, others))
-                else:
-                    entries.append(side * whole_columns[index] * whole_rows[s] / self._to_points[s][b])
-            matrix.append(entries)
-        return whole_columns, whole_rows, matrix
 
-    def _times_roots(self, value: Values, ends: list[int]) -> Values:
-        for i in ends:
-            value = value * self._own_root(i)
-        return value
+def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) -> tuple[Values, Values]:
+    """Return the signed column values (q_i or v_k), (N, m), and the matrix column·row/(λ_s−b), (N, g, m), for one kind of b."""
+    curve, xp, g = point.curve, point.curve.arithmetic, point.curve.genus
+    layout = curve.layout(kind)
+    to_own_kind = point.to_points[:, :, layout.places]
+    columns = _columns(to_own_kind, layout, curve)
+    if signs is not None:
+        columns = columns * signs
+    rows = _rows(to_own_kind, point.between, layout, g, xp)
+    ends = np.flatnonzero(layout.own_cut >= 0)
+    own = np.ones_like(columns)
+    own[:, ends] = point.own_roots[:, layout.places[ends] - 1]
+    whole_rows = rows.copy()
+    for k in ends:
+        whole_rows[:, layout.own_cut[k]] = whole_rows[:, layout.own_cut[k]] * own[:, k]
+    near = xp.sqrt(np.where(layout.is_own, xp.number(1), to_own_kind))
+    matrix = layout.sides * ((columns * own)[:, None, :] / near) * (whole_rows[:, :, None] / near)
+    for k in ends:  # the root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays
+        s, mate = layout.own_cut[k], layout.mate[k]
+        entry = layout.sides[s, k] * columns[:, k] * rows[:, s]
+        matrix[:, s, k] = entry if mate < 0 else entry * own[:, mate]
+    return columns * own, matrix
 
-    def attitude(self) -> Attitude:
-        curve, g = self._curve, self._curve.genus
-        q, _, position = self._orthogonal("I", g + 1)
-        v, _, velocity = self._orthogonal("c", g)
-        m: Values = np.moveaxis(np.array(position), 2, 0)  # (N, s, i)
-        o: Values = np.moveaxis(np.array(velocity), 2, 0)  # (N, s, k)
-        order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
-        normals = np.sum(m[:, :, :, None] * o[:, :, None, order], axis=1)
-        spheroconic = np.stack(
-            [curve.branch_points[2 * s + 1] + below for s, (_, _, below, _) in enumerate(self._on_cuts)], axis=1
-        )
-        return Attitude(np.stack(q, axis=1), normals, np.stack(v, axis=1)[:, order], spheroconic)
+
+def _columns(to_own_kind: Values, layout: Layout, curve: Curve) -> Values:
+    """Return √(|U(b)/Φ'(b)|) without the factor of b's own cut, (N, m): ratios to the b of the same kind beyond each λ_s."""
+    one, inside = curve.arithmetic.number(1), layout.beyond < layout.places.size
+    partners = layout.places[np.where(inside, layout.beyond, 0)]
+    stretches = np.where(inside, abs(curve.differences[layout.places, partners]), one)
+    distances = np.where(layout.is_own, one, to_own_kind)
+    return np.asarray(np.prod(curve.arithmetic.sqrt(distances / stretches), axis=1))
+
+
+def _rows(to_own_kind: Values, between: Values, layout: Layout, g: int, xp: Arithmetic) -> Values:
+    """Return √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b of one kind that are not ends of cut s, (N, g).
+
+    b_2 … b_s pair with the λ_j below, b_{s+1} … b_g with those above; the outermost (c_1, or I_1 and I_n) are left over.
+    """
+    cuts = np.arange(g)[:, None]
+    ratios = np.where(layout.is_own, xp.number(1), to_own_kind)
+    inner = np.arange(1, g)
+    partners = np.where(inner <= cuts, inner - 1, inner)
+    ratios[:, :, 1:g] = ratios[:, :, 1:g] / between[:, cuts, partners]
+    return np.asarray(np.prod(xp.sqrt(ratios), axis=2))

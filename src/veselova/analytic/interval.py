@@ -78,37 +78,28 @@ class Interval:
             below, above = (before + self._widths[1]) * below, before * above
         return below / (below + above), above / (below + above)
 
-    def from_branch_point(self, i: int, below: Values, above: Values) -> Values:
-        """Return |λ−b_i|, from λ−b_1 = ``below`` and b_2−λ = ``above``: a sum of positive terms."""
+    def to_branch_points(self, below: Values, above: Values) -> Values:
+        """Return |λ−b_i| for all i, shape (..., 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
         d, j = self.curve.differences, self.left
-        return np.asarray(d[i, j] + below if i <= j else above + d[j + 1, i])
+        return np.concatenate([d[: j + 1, j] + below[..., None], above[..., None] + d[j + 1, j + 1 :]], axis=-1)
 
     def forms(self, below: Values, above: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, ...): holomorphic forms p_k dλ/(2√|R|).
+        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N): holomorphic forms p_k dλ/(2√|R|).
 
         p_g = Π(λ−ζ_l) over the midpoints ζ_l of all inner gaps, and p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l is divided by
         the root of its own gap's ends, so every factor is of order one at any genus.
         """
-        xp, g = self.curve.arithmetic, self.curve.genus
-        one = 0 * below + 1
-
-        def root_of(ends: list[int]) -> Values:
-            result = one
-            for i in ends:
-                if not self.left - 1 <= i <= self.left + 2:  # the four nearest went into the substitution
-                    result = result * self.from_branch_point(i, below, above)
-            return np.asarray(xp.sqrt(result))
-
-        zeros, j = self.curve.midpoints, self.left
-        numerators = [(below - zeros[j, m]) if 2 * (m + 1) <= j else -(above + zeros[j + 1, m]) for m in range(g - 1)]
-        roots = [root_of([2 * (m + 1), 2 * (m + 1) + 1]) for m in range(g - 1)]
-        common = self.density / root_of([0, 1, 2 * g] if g > 0 else [0])
-        factors = [numerator / root for numerator, root in zip(numerators, roots, strict=True)]
-        before, after = [one], [one]
-        for factor in factors:
-            before.append(before[-1] * factor)
-        for factor in reversed(factors):
-            after.append(after[-1] * factor)
-        after.reverse()
-        lower = [common * before[k] * after[k + 1] / roots[k] for k in range(g - 1)]
-        return np.stack([*lower, common * before[-1]])
+        xp, g, j = self.curve.arithmetic, self.curve.genus, self.left
+        roots = xp.sqrt(self.to_branch_points(below, above))
+        nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
+        roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
+        zeros, split = self.curve.midpoints, j // 2
+        numerators = np.concatenate([below[:, None] - zeros[j, :split], -(above[:, None] + zeros[j + 1, split:])], axis=1)
+        of_gaps = roots[:, 2:-1:2] * roots[:, 3::2]
+        common = self.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1)
+        factors = numerators / of_gaps
+        one = np.ones_like(below)[:, None]
+        lower = np.cumprod(np.concatenate([one, factors], axis=1), axis=1)
+        upper = np.cumprod(np.concatenate([one, factors[:, ::-1]], axis=1), axis=1)[:, ::-1]
+        omitted = lower[:, :-1] * upper[:, 1:] / of_gaps
+        return np.asarray((common[:, None] * np.concatenate([omitted, lower[:, -1:]], axis=1)).T)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.frame import Attitude, Frame
+from veselova.analytic.frame import Attitude, Frame, slopes
 from veselova.analytic.theta import Theta
 
 __all__ = ["ThetaQuotients"]
@@ -61,6 +61,17 @@ class ThetaQuotients:
         best = np.argmax(np.abs(raw), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
+
+    def position(self, z: Array) -> Array:
+        """Return q along sorted axes at points z of shape (N, g), modulo 2."""
+        n = self.theta.genus + 1
+        values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *self._characteristics[:n]])
+        return np.asarray(values[:, 1:] / values[:, :1] * self.constants[:n])
+
+    def slopes(self, z: Array) -> Array:
+        """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-8."""
+        genus = self.theta.genus
+        return np.asarray(slopes(self.at, z, np.broadcast_to(np.eye(genus), (z.shape[0], genus, genus))))
 
     def at(self, z: Array) -> Attitude:
         """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are left to the caller (empty)."""

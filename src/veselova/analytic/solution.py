@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -18,10 +21,12 @@ from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, extended
 from veselova.analytic.quotients import ThetaQuotients
-from veselova.analytic.spectrum import Spectrum, spectrum
+from veselova.analytic.reduction import moving_part
+from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.theta import Theta
-from veselova.mechanics.errors import InternalContradiction, Unsolved
+from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.exact import to_float
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.veselova import Veselova
 
@@ -35,44 +40,76 @@ METHODS = ("theta", "angles")
 #: Largest genus at which theta quotients cost no more than inversion in angles (g = 3: 15 µs a point both; g = 4: 80 against 15).
 _THETA_GENUS = 3
 
-#: Digits of the spectra: double precision for differences down to 1e-25 of the largest branch point.
-_SPECTRUM_DIGITS = 40
+#: Gaps from which inversion in angles meets Jacobians as small as they are: with both neighbours near such a gap, phases hardly
+#: move with the angles.
+_NARROW_GAP = 1e-6
 
-#: Intervals narrower than this fraction of the largest branch point count as closed: the spectra cannot resolve them.
-_CLOSED = 1e-24
+#: Largest genus at which theta sums are taken there all the same.
+_SEPARATRIX_GENUS = 7
 
 #: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
 _GUARDED_FROM = 200.0
 _GUARD_DIGITS = 30
 
+#: Cycles from which frequencies of that many digits leave none of the phases.
+_MOST_CYCLES = 1e28
+
 #: Cycles from which the Fourier clock is cheaper than panels, by genus (set-up of the modes against inversions along the orbit).
-_FOURIER_FROM = {1: 3.0, 2: 10.0, 3: 100.0, 4: 2e3, 5: 2e4}
+_FOURIER_FROM = {1: 3.0, 2: 10.0, 3: 30.0, 4: 200.0, 5: 3e3}
 
 #: Cycles that panels are willing to cover: about a minute at g = 7.
 _PANEL_CYCLES = 5e4
 
 
-#: Angles at which the steepness of the attitude is sampled.
+#: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
+_SIGN_ROUNDING = 8 * DOUBLE.epsilon
+
+#: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
 _SAMPLES = 48
+_FEW = 16
+_FEW_SAMPLES = 4
+
+
+@dataclass(frozen=True)
+class Steepness:
+    """The largest |∂(frame entry)/∂z_k|, shape (g,), and |d(frame entry)/dτ₁| along the flow."""
+
+    by_phase: Array
+    along_flow: float
+
+    @classmethod
+    def of(cls, slopes: Array, rates: Array) -> Steepness:
+        """Return it from derivatives in every phase, shape (N, n², g)."""
+        return cls(np.max(np.abs(slopes), axis=(0, 1)), float(np.max(np.abs(slopes @ rates))))
 
 
 class Solution:
-    """The closed-form motion of a moving body in the generic regime; raises Unsolved with the reason for any other."""
+    """The closed-form motion of a moving body: its moving part, in units of its largest I, and the frame around it.
 
-    def __init__(self, problem: Veselova) -> None:
+    ``distance`` moves a start on a separatrix, where branch points coincide, by that much relative to itself (see
+    analytic.reduction). Raises Unsolved at rest, where there is no curve.
+    """
+
+    def __init__(self, problem: Veselova, distance: Fraction | None = None) -> None:
         if not problem.moves:
-            raise Unsolved(
-                "at-rest", "q_dot = 0: the body rests, and Neumann time does not run; the numeric engine returns the rest state"
-            )
-        self.problem = problem
-        self.spectrum: Spectrum = spectrum(problem, extended(_SPECTRUM_DIGITS))
+            raise Unsolved("at-rest", "q_dot = 0: the body rests, and without energy there is neither a curve nor Neumann time")
+        found = resolved(moving_part(problem), DOUBLE.digits, distance)
+        self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
         self.curve = Curve.of(self.spectrum, DOUBLE)
-        _require_generic(self.curve)
         self.periods = Periods(self.curve)
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, self.start.signs)
         self._origin: Array = self.inversion.map(self.start.angles[None, :])[0]
+        #: √(A that counts as 1): τ₁ in the problem's units is this times τ₁ here, where the largest I is 1.
+        self.tau1_unit = math.sqrt(found.moving.unit)
+
+    @property
+    def regime(self) -> str:
+        """Return ``separatrix``, ``closed-cut`` (two A's or two c's coincide, or some direction is frozen) or ``generic``."""
+        if self.separatrices:
+            return "separatrix"
+        return "closed-cut" if self.moving.turned or self.moving.frozen else "generic"
 
     def _mean(self, inversion: AbelJacobi) -> Any:
         """Return F_0 in the arithmetic of an inversion."""
@@ -91,6 +128,19 @@ class Solution:
     def rate(self) -> ClockRate:
         """Return dt/dτ₁ on the torus, in double precision."""
         return self._rate(self.inversion)
+
+    def rate_at(self, z: Array) -> Array:
+        """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
+        if not self.near_separatrix:
+            return np.asarray(self.rate.at(self.inversion.invert(z)))
+        A, start = to_float(self.moving.A), np.asarray(self.spectrum.q, dtype=np.float64)
+        weight = self.quotients.position(z) ** 2 @ A
+        return np.asarray(np.sqrt(weight / (start**2 @ A)) / float(self.spectrum.clock_rate))
+
+    @property
+    def near_separatrix(self) -> bool:
+        """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
+        return self.curve.narrowest_gap < _NARROW_GAP and self.curve.genus <= _SEPARATRIX_GENUS
 
     @cached_property
     def mean_rate(self) -> float:
@@ -119,14 +169,19 @@ class Solution:
         """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given."""
         earliest, latest = float(times[0]), float(times[-1])
         cycles, guarded = self.cycles(times), self.is_guarded(times)
+        if not cycles <= _MOST_CYCLES:
+            raise Unsolved(
+                "too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {_GUARD_DIGITS} digits"
+            )
         if name is None:
-            name = "fourier" if cycles > _FOURIER_FROM.get(self.curve.genus, np.inf) else "panels"
+            few = _PANEL_CYCLES if self.near_separatrix else _FOURIER_FROM.get(self.curve.genus, np.inf)
+            name = "fourier" if cycles > few else "panels"
         if name == "fourier":
             return self._fourier(guarded)
         if cycles > _PANEL_CYCLES:
             limit = f"panels go to {_PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {limit}")
-        return PanelClock(self.rate, self._guarded[0] if guarded else self.in_tau1, earliest, latest)
+        return PanelClock(self.rate_at, self.mean_rate, self._guarded[0] if guarded else self.in_tau1, earliest, latest)
 
     def _fourier(self, guarded: bool) -> FourierClock:
         if guarded not in self._fourier_clocks:
@@ -144,15 +199,25 @@ class Solution:
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times."""
-        return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(times)))
+        with np.errstate(over="ignore"):
+            return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(times)))
 
     @cached_property
-    def steepness(self) -> Array:
-        """Return ∂(frame entry)/∂z_k at sampled angles, doubled for what lies between, a row per sample and entry, (·, g)."""
-        sample = np.random.default_rng(self.curve.genus).uniform(0.0, 2 * np.pi, (_SAMPLES, self.curve.genus))
+    def steepness(self) -> Steepness:
+        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
+        genus, rates = self.curve.genus, self.in_tau1.rates
+        sample = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (_SAMPLES if genus <= _FEW else _FEW_SAMPLES, genus))
+        if self.near_separatrix:
+            return Steepness.of(2 * self.quotients.slopes(np.concatenate([sample / np.pi, self._origin[None, :]])), rates)
         psi = np.concatenate([sample, self.start.angles[None, :]])
-        slopes = self.frame.slopes(psi) @ np.linalg.inv(self.inversion.jacobian(psi))
-        return np.asarray(2 * slopes.reshape(-1, self.curve.genus))
+        to_angles = np.linalg.inv(self.inversion.jacobian(psi))
+        if genus <= _FEW:
+            return Steepness.of(2 * self.frame.slopes(psi, to_angles), rates)
+        # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
+        signs = np.sign(np.random.default_rng(genus).normal(size=(genus, _FEW)))
+        slopes = 2 * self.frame.slopes(psi, to_angles @ np.column_stack([signs, rates]))
+        spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
+        return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
@@ -160,8 +225,8 @@ class Solution:
         return ThetaQuotients(Theta(np.asarray(self.periods.riemann_matrix, dtype=np.float64)), self.frame)
 
     def default_method(self) -> str:
-        """Return the cheaper route."""
-        return "theta" if self.curve.genus <= _THETA_GENUS else "angles"
+        """Return the cheaper route, or theta near a separatrix."""
+        return "theta" if self.curve.genus <= _THETA_GENUS or self.near_separatrix else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""
@@ -169,37 +234,39 @@ class Solution:
 
     @cached_property
     def rotation(self) -> Array:
-        """Return the constant ℜ of (orth): frame(0) = [q, (n_2 … γ)ℜ]. For the natural frame it is a matrix of signs, exactly."""
+        """Return the constant ℜ of (orth): moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, shape (g, n−1).
+
+        For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of that.
+        """
         normals = self.frame.at(self.start.angles[None, :]).normals[0]
-        raw = normals.T @ self.problem.frame[list(self.spectrum.order), 1:]
-        if not self.problem.exact.natural:
+        raw = normals.T @ self.moving.directions.T @ self.problem.frame[:, 1:]
+        if not self.problem.exact.natural or raw.shape[0] != raw.shape[1]:
             return np.asarray(raw)
         signs = np.rint(raw)
-        if np.max(np.abs(raw - signs)) > 1e-3:  # eigenvectors of clustered constants are only known to ε/gap
-            raise InternalContradiction("the natural frame of the problem is not the one of the curve")
-        return np.asarray(signs)
+        return np.asarray(signs if np.max(np.abs(raw - signs)) <= _SIGN_ROUNDING * self.problem.n else raw)
+
+    @cached_property
+    def _frozen_part(self) -> Array:
+        """Return what stays of e_2 … e_n: their components along the directions that do not move."""
+        directions, normals = self.moving.directions, self.problem.frame[:, 1:]
+        return np.asarray(normals - directions @ (directions.T @ normals))
 
     def states(self, attitude: Attitude) -> tuple[Array, Array, Array]:
         """Return (q̇, frame, λ) along the problem's principal axes."""
-        n, order = self.problem.n, np.argsort(self.spectrum.order)
+        moving, n = self.moving, self.problem.n
         frame = np.empty((attitude.q.shape[0], n, n))
-        frame[:, :, 0] = attitude.q
-        frame[:, :, 1:] = attitude.normals @ self.rotation
-        frame = frame[:, order]
+        frame[:, :, 0] = attitude.q @ moving.directions.T
+        frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
+        if moving.frozen:
+            frame[:, :, 1:] += self._frozen_part
         # dτ₁/dt = √(W/(q,Aq)), W fixed by the start; q' = Σ v_k n_k.
-        weight = np.sum(frame[:, :, 0] ** 2 * self.problem.A, axis=1)
-        start_weight = np.sum(self.problem.q**2 * self.problem.A)
-        rate = float(self.spectrum.clock_rate) * np.sqrt(start_weight / weight)
-        q_dot = attitude.q_prime[:, order] * rate[:, None]
-        spheroconic = attitude.spheroconic if attitude.spheroconic.size else to_spheroconic(self.problem.A, frame[:, :, 0])
+        A = to_float(moving.A)
+        weight, start = attitude.q**2 @ A, float(np.asarray(self.spectrum.q**2, dtype=np.float64) @ A)
+        rate = float(self.spectrum.clock_rate) * np.sqrt(start / weight)
+        q_dot = (attitude.q_prime @ moving.directions.T) * rate[:, None]
+        if attitude.spheroconic.size:
+            frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
+            spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)
+        else:
+            spheroconic = to_spheroconic(self.problem.A, frame[:, :, 0])
         return q_dot, frame, spheroconic
-
-
-def _require_generic(curve: Curve) -> None:
-    widths = np.asarray(curve.relative_widths(), dtype=np.float64)
-    for j in np.flatnonzero(widths <= _CLOSED):
-        ends = " = ".join(f"{o.kind}_{o.index + 1}" for o in curve.origins[j : j + 2])
-        kind = "closed-cut" if j % 2 == 1 else "closed-gap"
-        raise Unsolved(
-            kind, f"branch points coincide ({ends}, axes sorted by decreasing A); the numeric engine solves this start"
-        )

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
 from veselova.analytic.solution import METHODS, Solution
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
@@ -15,40 +23,91 @@ from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
 
+Array = NDArray[np.float64]
+
+#: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few roundings of the data.
+_DATA_ROUNDING = Fraction(1, 2**50)
+
+#: An error above this leaves no digit of the attitude.
+_NO_DIGIT = 0.1
+
 
 def solve(problem: Veselova, times: Any, *, method: str | None = None, clock: str | None = None) -> Trajectory:
     """Return the motion at the given times in closed form.
 
     ``method``: ``theta`` (every entry of the attitude a theta quotient) or ``angles`` (Abel–Jacobi inversion, then the
     algebraic frame); None takes the cheaper. ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the
-    same with the Fourier clock. Raises InvalidInput for bad times or names, Unsolved outside the generic regime.
-    Accuracy: see the trajectory's ``error``; about 1e-14 at t of order 10². Tested for n = 2…8, ratios of A up to 100.
+    same with the Fourier clock. Every start is served: equal A's, frozen directions, coinciding constants, rest. On a
+    separatrix the error is that of starts a rounding away, and grows like e^(rate·t).
+    Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer.
+    Accuracy: see the trajectory's ``error``; about 1e-14 at t of order 10².
     """
     grid = validated_times(times)
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
-    began = time.perf_counter()
-    return _evaluate(Solution(problem), grid, method, clock, began)
+    return _Motion(problem, method, clock)(grid)
 
 
-def _evaluate(solution: Solution, grid: Any, method: str | None, clock_name: str | None, began: float) -> Trajectory:
-    route = method or solution.default_method()
-    clock = solution.clock(grid, clock_name)
+@dataclass(frozen=True)
+class _Motion:
+    """A motion that can be asked for times; the solution is kept, and made again where it was left behind by pickling."""
+
+    problem: Veselova
+    method: str | None
+    clock: str | None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"problem": self.problem, "method": self.method, "clock": self.clock}
+
+    @cached_property
+    def _solution(self) -> Solution:
+        return Solution(self.problem)
+
+    @cached_property
+    def _neighbours(self) -> tuple[Solution, ...]:
+        if not self._solution.separatrices:
+            return ()
+        return tuple(Solution(self.problem, sign * _DATA_ROUNDING) for sign in (1, -1))
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times."""
+        began, grid = time.perf_counter(), validated_times(times)
+        if not self.problem.moves:
+            return self._resting(grid, began)
+        solution, route = self._solution, self.method or self._solution.default_method()
+        clock = solution.clock(grid, self.clock)
+        tau1, states, error = _evaluated(solution, clock, grid, route)
+        for neighbour in self._neighbours:
+            other = _evaluated(neighbour, neighbour.clock(grid, self.clock), grid, route)[1]
+            error = np.maximum(error, np.max(np.abs(other[1] - states[1]), axis=(1, 2)))
+        lost = np.flatnonzero(~(error <= _NO_DIGIT))
+        if lost.size:
+            first = grid[lost[np.argmin(np.abs(grid[lost]))]]
+            raise Unsolved(
+                "no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: the data determine no digit there"
+            )
+        details = {
+            "regime": solution.regime,
+            "clock": clock.name,
+            "clock_size": clock.size,
+            "guard_digits": solution.is_guarded(grid),
+            "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
+            "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
+        }
+        provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
+        return Trajectory.of_principal(self.problem, grid, (tau1, *states), error, provenance, dense=self)
+
+    def _resting(self, grid: Array, began: float) -> Trajectory:
+        n, frame = self.problem.n, np.tile(self.problem.frame, (grid.size, 1, 1))
+        states = np.zeros((grid.size, n)), frame, to_spheroconic(self.problem.A, frame[:, :, 0])
+        provenance = Provenance("analytic", "rest", 15, __version__, time.perf_counter() - began, {"regime": "rest"})
+        error = np.full(grid.size, np.finfo(float).eps)
+        return Trajectory.of_principal(self.problem, grid, (np.zeros(grid.size), *states), error, provenance, dense=self)
+
+
+def _evaluated(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:
+    """Return τ₁, the states (q̇, frame, λ) and their error."""
     tau1, z = clock.tau1(grid)
     states = solution.states(solution.attitude(z, route))
-    error = estimated_error(solution, grid, tau1, clock, route)
-    details = {
-        "clock": clock.name,
-        "clock_size": clock.size,
-        "guard_digits": solution.is_guarded(grid),
-        "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
-        "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
-        "riemann_matrix_residual": solution.periods.riemann_matrix_residual,
-    }
-    provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
-
-    def again(times: Any) -> Trajectory:
-        return _evaluate(solution, validated_times(times), method, clock_name, time.perf_counter())
-
-    return Trajectory.of_principal(solution.problem, grid, (tau1, *states), error, provenance, dense=again)
+    return tau1 * solution.tau1_unit, states, estimated_error(solution, grid, tau1, clock, route)

@@ -1,41 +1,46 @@
-"""The two spectra that give the branch points, to more digits than the curve needs.
+"""The two spectra that give the branch points, to as many digits as their differences ask for.
 
-I_1 < … < I_n are the inverses of the A's; c_1 = 0 < c_2 < … < c_{n−1} are the zeros of N(λ), the eigenvalues of
-A⁻¹ − q'q'ᵀ on q⊥; the spheroconic coordinates λ_1 < … < λ_{n−1} at the start are those of A⁻¹ on q⊥. They interlace:
-max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). Coefficients are exact rationals of the data, so the differences of nearby
-branch points keep their digits however small they are.
+I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1} at the start are the
+eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the components x_s of q' along the eigenvectors,
+c_1 = 0 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s). So they interlace by
+construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact rationals, and digits are added until every
+difference of neighbours has enough of its own: a gap of 1e-300 is as good as one of 0.1.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from veselova.analytic.precision import Extended, Values
+from veselova.analytic.precision import Extended, Values, extended
+from veselova.analytic.reduction import Moving
+from veselova.analytic.secular import zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
-from veselova.mechanics.integrals import neumann_polynomial
-from veselova.mechanics.veselova import Veselova
 
-__all__ = ["Spectrum", "spectrum"]
+__all__ = ["Resolved", "Spectrum", "resolved", "spectrum"]
 
-#: Newton's method from an eigenvalue good to 1e-15 doubles its digits each time; ten steps reach 10⁴ digits.
-_NEWTON_STEPS = 14
+#: Branch points nearer than this part of the largest count as one: differences are doubles, and their squares roots of them.
+_COINCIDE = -290
+
+#: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by 1e-16) for the sums themselves.
+_SPARE = 12
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Body axes sorted by increasing I, and the spectra there, as numbers of ``arithmetic``.
+    """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I.
 
-    order (n,) the user's axis of each sorted one · inverse (n,) the I's · q, q_prime (n,) with q_prime = dq/dτ₁
-    constants (n−1,) c_1 = 0 … c_{n−1} · spheroconic (n−1,) λ's at t = 0 · clock_rate dτ₁/dt at t = 0
+    inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime = dq/dτ₁
+    constants (m−1,) c_1 = 0 … c_{m−1} · spheroconic (m−1,) λ's at t = 0 · clock_rate dτ₁/dt at t = 0
     """
 
     arithmetic: Extended
-    order: tuple[int, ...]
     inverse: Values
     q: Values
     q_prime: Values
@@ -43,72 +48,121 @@ class Spectrum:
     spheroconic: Values
     clock_rate: Any
 
+    @cached_property
+    def branch_points(self) -> list[tuple[Any, str, int]]:
+        """Return (value, kind, index), increasing; c_1 = 0 first, and a c before the I that it equals."""
+        labelled = [(c, "c", k) for k, c in enumerate(self.constants)]
+        labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
+        return sorted(labelled, key=lambda item: item[:2])
 
-def spectrum(problem: Veselova, arithmetic: Extended) -> Spectrum:
-    """Return the spectra of a moving body, each number to the digits of ``arithmetic`` relative to max I_i."""
-    exact = problem.exact
-    order = tuple(sorted(range(problem.n), key=lambda i: -exact.A[i]))
-    A = [exact.A[i] for i in order]
-    q = [exact.q[i] for i in order]
-    wedge = [[exact.wedge[i][j] for j in order] for i in order]
-    qq = sum(x * x for x in q)
-    qAq = sum(a * x * x for a, x in zip(A, q, strict=True))
-    rate_squared = sum(A[i] * A[j] * wedge[i][j] ** 2 for j in range(problem.n) for i in range(j)) / qAq
-    inverse = [1 / a for a in A]
-    q_squared = [x * x / qq for x in q]
-    wedge_squared = [[w * w / (qq * rate_squared) for w in row] for row in wedge]
-
-    number = arithmetic.number
-    I = arithmetic.array(inverse)
-    q2, P2 = arithmetic.array(q_squared), arithmetic.array(wedge_squared)
-    length, rate = arithmetic.sqrt(number(qq)), arithmetic.sqrt(number(rate_squared))
-    u = arithmetic.array(q) / length
-    # (q∧q̇)ᵀq/(q,q) is the tangential part of q̇.
-    tangent = [sum(q[i] * wedge[i][j] for i in range(problem.n)) / qq for j in range(problem.n)]
-    v = arithmetic.array(tangent) / rate
-
-    zero = 0 * P2
-    spheroconic = _polished(lambda x: neumann_polynomial(x, I, q2, zero), problem.spheroconic, arithmetic)
-    constants = _polished(lambda x: neumann_polynomial(x, I, q2, P2), problem.constants, arithmetic)
-    if spheroconic is None or constants is None or not _interlace(I, spheroconic, constants):
-        spheroconic, constants = _eigenvalues(arithmetic, I, u, v)
-    return Spectrum(arithmetic, order, I, u, v, arithmetic.array([0, *constants]), arithmetic.array(spheroconic), rate)
+    @property
+    def widths(self) -> list[Any]:
+        """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
+        points = [value for value, _, _ in self.branch_points]
+        return [b - a for a, b in itertools.pairwise(points)]
 
 
-def _polished(function: Callable[[Any], tuple[Any, Any]], guesses: Values, arithmetic: Extended) -> list[Any] | None:
-    """Return the roots near the guesses by Newton's method, or None where two guesses lead to one root."""
-    roots = []
-    for guess in guesses.tolist():
-        x = arithmetic.number(guess)
-        for _ in range(_NEWTON_STEPS):
-            value, slope = function(x)
-            if value == 0 or slope == 0:
-                break
-            step = value / slope
-            x = x - step
-            if abs(step) <= 10 * arithmetic.epsilon * abs(x):
-                break
-        roots.append(x)
-    return roots if all(a < b for a, b in itertools.pairwise(roots)) else None
+@dataclass(frozen=True)
+class Resolved:
+    """The spectrum of a start without coincidences; ``separatrices`` are the axes i (sorted) where c_k = I_i had to be opened."""
+
+    moving: Moving
+    spectrum: Spectrum
+    separatrices: tuple[int, ...]
 
 
-def _interlace(inverse: Values, spheroconic: list[Any], constants: list[Any]) -> bool:
-    slack = 1e-20 * abs(inverse[-1])
-    lower = [inverse[0], *(max(c, i) for c, i in zip(constants, inverse[1:]))]
-    upper = [*(min(c, i) for c, i in zip(constants, inverse[1:])), inverse[-1]]
-    return all(low - slack <= x <= up + slack for low, x, up in zip(lower, spheroconic, upper, strict=True))
+def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> Resolved:
+    """Return the spectrum in which every interval is open and known to twice ``digits``.
+
+    Coincidences are opened by moving the start by ``distance``, by default 10^(−2·digits−10); where I_i = c_k is an end of a
+    closed cut, or moves less than 1e-145 of the rest, the direction is frozen.
+    """
+    opening = Fraction(1, 10 ** (2 * digits + 10))
+    moving = moving.opened(opening)
+    separatrices: set[int] = set()
+    while True:
+        found = spectrum(moving, digits)
+        closed = [j for j, width in enumerate(found.widths) if width < _threshold(found.arithmetic)]
+        if not closed:
+            return Resolved(moving, found, tuple(sorted(separatrices)))
+        j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
+        axis = next((index for _, kind, index in ends if kind == "I"), None)
+        if axis is None:  # c_k = c_{k+1}
+            moving = moving.moved(0, opening)
+        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10**-_COINCIDE)):
+            moving = moving.without(axis)
+        elif axis in separatrices:
+            raise InternalContradiction("a closed gap did not open")
+        else:
+            separatrices.add(axis)
+            moving = moving.moved(axis, opening if distance is None else distance)
 
 
-def _eigenvalues(arithmetic: Extended, inverse: Values, u: Values, v: Values) -> tuple[list[Any], list[Any]]:
-    """Return both spectra as eigenvalues in extended precision: slower, and indifferent to clusters."""
-    n = len(u)
-    w = u.copy()
-    w[-1] = w[-1] + (1 if w[-1] >= 0 else -1)
-    basis = (arithmetic.array(np.eye(n).tolist()) - np.outer(w, w) * (2 / sum(w * w)))[:, :-1]
-    position = basis.T @ (basis * inverse[:, None])
-    along = basis.T @ v
-    spheroconic = arithmetic.symmetric_eigenvalues(position)
-    constants = arithmetic.symmetric_eigenvalues(position - np.outer(along, along))[1:]
-    if not _interlace(inverse, spheroconic, constants):
-        raise InternalContradiction("spectra do not interlace")
-    return spheroconic, constants
+def _threshold(arithmetic: Extended) -> Any:
+    return arithmetic.number(10) ** _COINCIDE
+
+
+def spectrum(moving: Moving, digits: int) -> Spectrum:
+    """Return the spectra of what moves with enough digits for all differences of neighbouring branch points."""
+    wanted = 2 * digits + _SPARE
+    working = wanted + 10
+    most = wanted - _COINCIDE
+    while True:
+        found = _spectrum(moving, extended(working))
+        narrowest = min(found.widths)
+        known = narrowest > found.arithmetic.number(10) ** -(working - _SPARE)
+        needed = wanted + math.ceil(-math.log10(float(narrowest))) if known and narrowest > 1e-300 else 2 * working
+        if working >= min(needed, most):
+            return found
+        working = min(most, needed)
+
+
+def _spectrum(moving: Moving, arithmetic: Extended) -> Spectrum:
+    q, v, rate = _tangent(moving, arithmetic)
+    inverse = arithmetic.array([1 / a for a in moving.A])
+    points = zeros_between_poles(inverse, q * q, 0, arithmetic)
+    along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
+    spheroconic = arithmetic.array(points)
+    if abs(1 - np.sum(along * along / spheroconic)) > math.sqrt(arithmetic.epsilon):
+        raise InternalContradiction("c_1 = 0 is not an eigenvalue")
+    constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
+    return Spectrum(arithmetic, inverse, q, v, arithmetic.array([0, *constants]), spheroconic, rate)
+
+
+def _tangent(moving: Moving, arithmetic: Extended) -> tuple[Values, Values, Any]:
+    """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/dt.
+
+    (dτ₁/dt)² = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(Aq,q), exact until the root is taken.
+    """
+    triples = list(zip(moving.q_squared, moving.v_squared, moving.qv, strict=True))
+    qq = sum(moving.q_squared, Fraction())
+    along = sum(moving.qv, Fraction()) / qq
+    qAq = sum((a * x for a, x in zip(moving.A, moving.q_squared, strict=True)), Fraction())
+    vAv = sum((a * x for a, x in zip(moving.A, moving.v_squared, strict=True)), Fraction())
+    qAv = sum((a * x for a, x in zip(moving.A, moving.qv, strict=True)), Fraction())
+    rate = arithmetic.sqrt(arithmetic.number((vAv * qAq - qAv * qAv) / qAq))
+    q = arithmetic.sqrt(arithmetic.array([q2 / qq for q2, _, _ in triples]))
+    v = [
+        arithmetic.number(qv - along * q2) / arithmetic.sqrt(arithmetic.number(q2))
+        if q2
+        else arithmetic.sqrt(arithmetic.number(v2))
+        for q2, v2, qv in triples
+    ]
+    return q, arithmetic.array(v) / rate, rate
+
+
+def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Extended) -> list[Any]:
+    """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or too small for the digits)."""
+    on_plane = {I: i for i, I in enumerate(inverse) if not q[i] > 0}
+    live = {I: i for i, I in enumerate(inverse) if q[i] > 0}
+    axes = list(live.values())
+    components = []
+    for point in points:
+        if point in on_plane:
+            components.append(v[on_plane.pop(point)])
+        elif point in live:
+            components.append(v[live[point]])
+        else:
+            row = q[axes] / (point - inverse[axes])
+            components.append(np.sum(row * v[axes]) / arithmetic.sqrt(np.sum(row * row)))
+    return components

@@ -23,7 +23,7 @@ class Start:
 
 def start(spectrum: Spectrum, curve: Curve) -> Start:
     """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum."""
-    ends = _ordered(spectrum)
+    ends = [value for value, _, _ in spectrum.branch_points]
     increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
     angles = [
         _angle(Interval(curve, 2 * s + 1), x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
@@ -39,10 +39,6 @@ def start(spectrum: Spectrum, curve: Curve) -> Start:
             root_positive = lower_end or angle < curve.arithmetic.pi
             signs.append((1 if position > 0 else -1) * (1 if root_positive else -1))
     return Start(curve.arithmetic.array(angles), curve.arithmetic.array(signs))
-
-
-def _ordered(spectrum: Spectrum) -> list[Any]:
-    return sorted([*spectrum.constants, *spectrum.inverse])
 
 
 def _direction(spectrum: Spectrum, point: Any) -> bool:

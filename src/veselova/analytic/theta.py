@@ -17,7 +17,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,9 +78,12 @@ class Theta:
         return int(self._gaussian_lattice.shape[0] * self._wave_lattice((0,) * self.genus).shape[0])
 
     def _wave_lattice(self, epsilon: tuple[int, ...]) -> Array:
+        """Return the x with a term above e^−39 of the largest: where T is large (a narrow cut) ε = ½ makes all of them small."""
         S = self._parts[0]
         shift = np.array([epsilon[i] / 2 for i in self._split[0]])
-        return lattice_points(S, np.sqrt(_EXPONENT / np.pi), shift)
+        nearest = np.array(list(product(*[(-h, h) if h else (0.0,) for h in shift.tolist()])))
+        least = float(np.min(np.sum((nearest @ S) * nearest, axis=1))) if shift.size else 0.0
+        return lattice_points(S, np.sqrt(_EXPONENT / np.pi + least), shift)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).

@@ -15,13 +15,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Torus:
-    """The torus of one motion, g = n−1.
+    """The torus of one motion. g = n−1, less one for every direction that does not move.
 
-    energy h · constants (g−1,) c_2 ≤ … ≤ c_{n−1} · branch_points (2g+1,) b_0 = 0 < … < b_{2g}
+    energy h · constants (n−2,) c_2 ≤ … ≤ c_{n−1} · branch_points (2g+1,) b_0 = 0 < … < b_{2g}
     origins (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a c_k (``c1`` is 0)
     periods (g, g) a_{ks} = (−1)^{g−s} ∮ λ^{k−1}dλ/(2√|R|) over cut s · riemann_matrix (g, g) T, Riemann matrix iT
     riemann_matrix_residual: max |T − Tᵀ|/max |T| before symmetrisation
     frequencies_tau1, frequencies_t (g,) cycles per unit τ₁ and t · phases (g,) z⁰ in [0, 1) · mean_rate: mean of dt/dτ₁
+    regime: ``generic``, ``closed-cut`` (directions that do not move, or equal A's) or ``separatrix`` (some c_k = I_i: periods are
+    infinite there, and the torus is that of a start 1e-40 away)
     """
 
     n: int

@@ -1,0 +1,155 @@
+"""What of a start moves, in exact rationals: frozen directions are dropped, equal A's turned, coincidences opened.
+
+A coordinate with q_i = q̇_i = 0 stays zero for ever (there c_k = λ_s = I_i: a closed cut). Inside a group of equal A's the
+motion stays in the span of q and q̇ there: a turn of the axes leaves at most two moving coordinates. What is left may still
+have coinciding branch points, I_i = I_{i+1} or c_k = I_i or c_k = c_{k+1}; a start moved by far less than any digit asked
+for has none, and its motion is the same to all of them (on a separatrix, for as long as the digits of the data last).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.exact import to_float
+from veselova.mechanics.veselova import Veselova
+
+__all__ = ["Moving", "moving_part"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A start along its m moving directions, sorted by decreasing A; exact, with A in units of its smallest entry.
+
+    A (m,) · q_squared, v_squared, qv (m,): q_a², q̇_a², q_aq̇_a; q_a ≥ 0, and q̇_a > 0 where q_a = 0, by choice of the directions
+    directions (n, m) orthonormal columns along the problem's principal axes · axes (m,) the principal axis of each, or the first
+    of its group · unit: the A that counts as 1 · frozen: the A's of the directions that do not move, in the problem's units
+    turned: whether a group of equal A's has two moving directions
+    """
+
+    A: tuple[Fraction, ...]
+    q_squared: tuple[Fraction, ...]
+    v_squared: tuple[Fraction, ...]
+    qv: tuple[Fraction, ...]
+    directions: Array
+    axes: tuple[int, ...]
+    unit: Fraction
+    frozen: tuple[Fraction, ...]
+    turned: bool
+
+    @property
+    def size(self) -> int:
+        """Return m, the dimension of what moves: genus + 1."""
+        return len(self.A)
+
+    def opened(self, distance: Fraction) -> Moving:
+        """Return the part with equal A's drawn apart by a relative ``distance``."""
+        A = list(self.A)
+        for i in range(1, len(A)):
+            if A[i] == A[i - 1]:
+                A[i] *= 1 - distance
+        unit = A[-1]
+        return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
+
+    def hardly_moves(self, axis: int, share: Fraction) -> bool:
+        """Return whether q_i and q̇_i are both below √share of |q| and |q̇|."""
+        q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
+        return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
+
+    def without(self, axis: int) -> Moving:
+        """Return the part without a direction that moves less than any digit shows."""
+        keep = [i for i in range(self.size) if i != axis]
+        unit = self.A[keep[-1]]
+        return Moving(
+            A=tuple(self.A[i] / unit for i in keep),
+            q_squared=tuple(self.q_squared[i] for i in keep),
+            v_squared=tuple(self.v_squared[i] for i in keep),
+            qv=tuple(self.qv[i] for i in keep),
+            directions=self.directions[:, keep],
+            axes=tuple(self.axes[i] for i in keep),
+            unit=self.unit * unit,
+            frozen=(*self.frozen, self.A[axis] * self.unit),
+            turned=self.turned,
+        )
+
+    def moved(self, axis: int, distance: Fraction) -> Moving:
+        """Return the part with q_i scaled by 1 + ``distance``, or set to ``distance``·q̇_i where q_i = 0 (in units of |q̇|)."""
+        q_squared, v_squared, qv = list(self.q_squared), self.v_squared, list(self.qv)
+        directions = self.directions
+        if q_squared[axis] != 0:
+            q_squared[axis] *= (1 + distance) ** 2
+            qv[axis] *= 1 + distance
+        else:  # q_i = s q̇_i with s = distance/|q̇|, a rational number near it
+            s = distance / _near_root(sum(v_squared, Fraction()))
+            q_squared[axis], qv[axis] = s * s * v_squared[axis], s * v_squared[axis]
+            if s < 0:  # q_i keeps its sign by the choice of the direction
+                directions = directions.copy()
+                directions[:, axis] = -directions[:, axis]
+        return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), directions=directions)
+
+
+def moving_part(problem: Veselova) -> Moving:
+    """Return what moves of a problem with q̇ ≠ 0: at least two directions, and no more than two for any value of A."""
+    exact = problem.exact
+    along = _dot(exact.q, exact.q_dot) / _dot(exact.q, exact.q)
+    velocity = [d - along * x for x, d in zip(exact.q, exact.q_dot, strict=True)]
+    groups: dict[Fraction, list[int]] = {}
+    for i, a in enumerate(exact.A):
+        groups.setdefault(a, []).append(i)
+    kept: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Array]] = []
+    frozen: list[Fraction] = []
+    for a in sorted(groups, reverse=True):
+        axes = groups[a]
+        turned = _turned([exact.q[i] for i in axes], [velocity[i] for i in axes])
+        frozen += [a] * (len(axes) - len(turned))
+        for squares, vector in turned:
+            direction = np.zeros(problem.n)
+            direction[axes] = vector
+            kept.append((a, axes[0], squares, direction))
+    unit = kept[-1][0]
+    return Moving(
+        A=tuple(a / unit for a, _, _, _ in kept),
+        q_squared=tuple(squares[0] for _, _, squares, _ in kept),
+        v_squared=tuple(squares[1] for _, _, squares, _ in kept),
+        qv=tuple(squares[2] for _, _, squares, _ in kept),
+        directions=np.stack([direction for _, _, _, direction in kept], axis=1),
+        axes=tuple(axis for _, axis, _, _ in kept),
+        unit=unit,
+        frozen=tuple(frozen),
+        turned=any(a == b for (a, *_), (b, *_) in itertools.pairwise(kept)),
+    )
+
+
+def _turned(q: Sequence[Fraction], velocity: Sequence[Fraction]) -> list[tuple[tuple[Fraction, Fraction, Fraction], Array]]:
+    """Return (q², q̇², qq̇) and the unit vector of each moving direction of one group: q first, then q̇ across it."""
+    qq, qv, vv = _dot(q, q), _dot(q, velocity), _dot(velocity, velocity)
+    zero = Fraction()
+    if qq == 0:
+        return [((zero, vv, zero), _unit(velocity))] if vv else []
+    turned = [((qq, qv * qv / qq, qv), _unit(q))]
+    if vv * qq != qv * qv:
+        turned.append(((zero, vv - qv * qv / qq, zero), _unit([qq * d - qv * x for x, d in zip(q, velocity, strict=True)])))
+    return turned
+
+
+def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    return sum((x * y for x, y in zip(a, b, strict=True) if x and y), Fraction())
+
+
+def _unit(vector: Sequence[Fraction]) -> Array:
+    largest = max(abs(x) for x in vector)
+    scaled = to_float([x / largest for x in vector])
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
+def _near_root(value: Fraction) -> Fraction:
+    """Return a power of two within a factor of two of √value."""
+    bits = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    return Fraction(2) ** bits
