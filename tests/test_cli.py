@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -140,6 +141,65 @@ def test_what_cannot_be_solved_exits_1() -> None:
     assert answer.returncode == 1
     assert answer.stderr.startswith(b"veselova: too-far: ")
     assert answer.stderr.count(b"\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (("solve", str(BODY4_FILE), "--output", "{folder}"), 2, b"--output: required a file name ending"),
+        (("solve", str(BODY4_FILE), "--output", "{folder}/folder.csv"), 2, b"--output: required a file that can be written"),
+        (("solve", str(BODY4_FILE), "--output", "/proc/x.csv"), 1, b"writing /proc/x.csv failed"),
+        (("demo", "--plot", "{folder}/full.png"), 1, b"writing the answer failed"),
+        (("serve", "--host", "nonsense.invalid"), 2, b"--host: required an address of this machine"),
+        (("solve", "{folder}"), 2, b"FILE: required a readable file"),
+    ],
+)
+def test_files_and_addresses_that_fail_are_named(arguments: tuple[str, ...], status: int, words: bytes, tmp_path: Path) -> None:
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "full.png").symlink_to("/dev/full")
+    answer = run(*(argument.format(folder=tmp_path) for argument in arguments))
+    assert answer.returncode == status
+    assert words in answer.stderr
+    assert answer.stderr.count(b"\n") == 1
+
+
+def test_a_busy_port_is_named() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        answer = run("serve", "--port", str(taken.getsockname()[1]))
+    assert answer.returncode == 2
+    assert b"--port: required an address and a port to bind" in answer.stderr
+
+
+@pytest.mark.parametrize("stream", ["<&-", ">&-", ">/dev/full"])
+def test_streams_that_are_closed_or_full_end_without_a_traceback(stream: str) -> None:
+    for command in ("solve - --json", f"solve {BODY4_FILE}"):
+        answer = subprocess.run(
+            ["bash", "-c", f"{sys.executable} -m veselova {command} {stream}"], capture_output=True, input=request(), timeout=60
+        )
+        assert answer.returncode in ((0, 2) if stream == "<&-" else (1,))
+        assert b"Traceback" not in answer.stderr
+
+
+def test_a_stated_budget_is_kept() -> None:
+    began = time.monotonic()
+    answer = run("solve", "-", stdin=request(times=[0, 1e7], engine="numeric", budget_s=1))
+    assert answer.returncode == 1
+    assert b"stopped after its budget of 1 s" in answer.stderr
+    assert time.monotonic() - began < 20
+
+
+def test_more_times_than_memory_holds_are_refused() -> None:
+    answer = run("solve", "-", stdin=request(times={"start": 0, "stop": 1, "count": 10**12}))
+    assert answer.returncode == 2
+    assert b"times.count: required at most 10000000 times" in answer.stderr
+
+
+def test_an_unknown_field_is_refused_by_torus_too() -> None:
+    answer = run("torus", "-", stdin=request(typo=1))
+    assert answer.returncode == 2
+    assert b"typo" in answer.stderr
 
 
 def test_bad_limits_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

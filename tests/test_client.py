@@ -20,6 +20,7 @@ from veselova import (
     InvalidInput,
     InvalidRequest,
     ProblemResponse,
+    ServiceError,
     ServiceUnreachable,
     Trajectory,
     Veselova,
@@ -216,6 +217,23 @@ def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: by
         client.torus(PROBLEM)
     assert raised.value.status == 502
     assert raised.value.document["status"] == 502
+
+
+def test_an_answer_of_another_service_is_a_service_error() -> None:
+    for body in (b"<html>", b"{}", b"[1]"):
+        client = Client(
+            "http://elsewhere", transport=httpx2.MockTransport(lambda _, body=body: httpx2.Response(200, content=body))
+        )
+        with pytest.raises(ServiceError, match="something else than a result"):
+            client.trajectory(PROBLEM, [1.0])
+    client.close()
+    with pytest.raises(ServiceError, match="closed"):
+        client.trajectory(PROBLEM, [1.0])
+
+
+def test_bad_times_are_refused_before_anything_is_sent() -> None:
+    with pytest.raises(InvalidInput, match="times"):
+        Client("http://nowhere.invalid").trajectory(PROBLEM, [0, float("nan")])
 
 
 def test_requests_are_what_the_openapi_document_says() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -13,6 +14,7 @@ from problems import TABLE, Case, tagged
 from truth import true_motion
 from veselova import Unsolved, Veselova, compare, solve, torus
 from veselova.analytic.solution import Solution
+from veselova.analytic.solve import solve as solve_analytic
 
 #: The stated slack of every error estimate: the true error stays below this many times the reported one.
 SLACK = 2.0
@@ -135,6 +137,46 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)
     with pytest.raises(Unsolved, match="no-digit-left"):
         solve(case.problem(), [1.0, 100.0])
+
+
+def test_errors_grow_where_guard_digits_end() -> None:
+    """The same motion at another scale of A and of time, whose roundings are others, shows the error at any distance."""
+    problem = Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
+    scaled = Veselova([9, 6, "4.5", 3], ["0.5"] * 4, ["3.3", "-2.1", "0.9", "-2.1"])
+    for t in (3.0, 3e9, 3e16, 3e21, 3e25):
+        one, other = solve(problem, [t]), solve(scaled, [t / 3])
+        if 3 * (t / 3) == t:
+            assert np.max(np.abs(one.frame - other.frame)) <= SLACK * (one.error + other.error)
+        assert np.max(np.abs(np.swapaxes(one.frame, 1, 2) @ one.frame - np.eye(4))) < 1e-13
+    for t in (1e40, 1e302):
+        for engine in ("analytic", "numeric"):
+            with pytest.raises(Unsolved, match="too-far"):
+                solve(problem, [t], engine)
+
+
+def test_a_matrix_of_inertia_adds_the_rounding_of_its_axes() -> None:
+    """R diag(3,2,1) Rᵀ with rational R, against the same body in principal axes, where roundings of the data show."""
+    first, second = np.array([[3, -4, 0], [4, 3, 0], [0, 0, 5]]), np.array([[13, 0, 0], [0, 5, -12], [0, 12, 5]])
+    R = [[Fraction(int(x), 65) for x in row] for row in first @ second]
+    A = [[sum(R[i][k] * (3, 2, 1)[k] * R[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
+    q, q_dot = [Fraction(3, 5), Fraction(0), Fraction(4, 5)], [Fraction(4, 5), Fraction(1), Fraction(-3, 5)]
+    turned = [[sum(R[i][k] * x[k] for k in range(3)) for i in range(3)] for x in (q, q_dot)]
+    for t in (50.0, 1e3, 1e6):
+        plain, rotated = solve(Veselova([3, 2, 1], q, q_dot), [t]), solve(Veselova(A, *turned), [t])
+        expected = np.array(R, dtype=float) @ plain.q[0]
+        assert np.max(np.abs(rotated.q[0] - expected)) <= SLACK * (rotated.error[0] + plain.error[0])
+
+
+@pytest.mark.parametrize(("n", "cycles"), [(5, 150), (7, 120)])
+def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator) -> None:
+    """To a time of many cycles and, from the state there, home again: two curves, two starts, two clocks."""
+    problem = random_problem(rng, n)
+    t = cycles / float(np.max(np.abs(Solution(problem).in_time.rates)))
+    there = solve_analytic(problem, [t], clock="panels")
+    home = solve_analytic(Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True), [-t], clock="panels")
+    floor = problem.conditioning_floor(np.array([t]))[0]
+    assert np.max(np.abs(home.frame[0] - problem.frame)) <= 100 * floor
+    assert np.isclose(home.tau1[0], -there.tau1[0], rtol=1e-11)
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])

@@ -54,6 +54,10 @@ BAD = [
     ("frame[1][2]", {"frame": [[1, 0, 0], [0, 1, "x"], [0, 0, 1]]}),
     ("normalize", {"normalize": 1}),
     ("q_dot", {"q_dot": [0.8e200, 1e200, -0.6e200]}),
+    ("q_dot", {"A": [1, 2], "q": [0.6, 0.8], "q_dot": [1.7e308, -1.7e308], "normalize": True}),
+    ("q_dot", {"A": [[2, 0.5], [0.5, 1]], "q": [1, 0], "q_dot": [1.7e308, 1.7e308], "normalize": True}),
+    ("q[0]", {"q": [Decimal("1e99999999"), 0, 1]}),
+    ("q", {"q": np.ma.masked_array([0.6, 0.0, 0.8], [False, True, False])}),
 ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,17 @@ def test_series_have_the_promised_shapes(trajectory: Trajectory) -> None:
     assert {name: trajectory.series(name).shape for name in OUTPUTS} == shapes
     assert trajectory.times.shape == trajectory.error.shape == (N,)
     assert np.array_equal(trajectory.omega, -np.swapaxes(trajectory.omega, 1, 2))
+
+
+def test_results_are_short_to_read_and_survive_pickling(trajectory: Trajectory, comparison: Comparison) -> None:
+    assert len(repr(trajectory)) < 150
+    assert len(repr(comparison)) < 400
+    assert len(repr(trajectory.problem)) < 200
+    assert "\n" not in repr(trajectory.problem)
+    again = pickle.loads(pickle.dumps(trajectory))
+    assert np.array_equal(again.frame, trajectory.frame)
+    motion = pickle.loads(pickle.dumps(solve(trajectory.problem, [0.5])))
+    assert np.allclose(motion.at([0.25, 0.5]).frame[1], motion.frame[0], atol=1e-14)
 
 
 def test_a_trajectory_cannot_be_changed(trajectory: Trajectory) -> None:

@@ -29,7 +29,7 @@ def solve(problem: Veselova, times: Any, engine: str = "analytic", method: str |
     """
     if not isinstance(problem, Veselova):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    if engine not in ENGINES:
+    if not isinstance(engine, str) or engine not in ENGINES:
         raise InvalidInput(("engine",), f"one of {', '.join(ENGINES)}", shown(engine))
     options = {} if method is None else {"method": method}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)

@@ -47,7 +47,7 @@ def torus(problem: Veselova) -> Torus:
         riemann_matrix_residual=solution.periods.riemann_matrix_residual,
         frequencies_tau1=np.array(solution.in_tau1.rates) / root,
         frequencies_t=np.array(solution.in_time.rates),
-        phases=np.mod(solution.in_tau1.start, 1.0),
+        phases=np.mod(np.mod(solution.in_tau1.start, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
         mean_rate=solution.mean_rate / root,
         regime=solution.regime,
     )

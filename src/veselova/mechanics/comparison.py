@@ -19,12 +19,16 @@ __all__ = ["Comparison"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Both engines' answers to one problem at the same times, and how they agree."""
 
     analytic: Trajectory
     numeric: Trajectory
+
+    def __repr__(self) -> str:
+        agreement = "agree" if self.agrees else "disagree"
+        return f"<Comparison: {self.analytic!r} and {self.numeric!r} {agreement}, frames differ by {self.deviation['frame']:.2g}>"
 
     def difference(self, name: str) -> Array:
         """Return the largest difference of one output over its components, at each time, shape (N,)."""

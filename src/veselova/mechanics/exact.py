@@ -34,7 +34,7 @@ _LARGEST_EXPONENT = 400
 #: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
 _LONGEST_NUMERAL = 2100
 
-_REQUIRED = 'a finite real number (a JSON number, or a string such as "0.7" or "7/10")'
+_REQUIRED = 'a finite real number within the range of a float (a JSON number, or a string such as "0.7" or "7/10")'
 
 
 def exact_number(value: Any, path: Path) -> Fraction:
@@ -56,6 +56,8 @@ def _parse(value: Any) -> Fraction:
         raise TypeError("a boolean is not a number")
     if isinstance(value, str):
         return _parse_numeral(value)
+    if isinstance(value, Decimal) and value.is_finite() and value and abs(value.adjusted()) > _LARGEST_EXPONENT:
+        raise OverflowError("beyond float range")
     if isinstance(value, (Fraction, Decimal, float)):
         return Fraction(value)
     if isinstance(value, Integral):
@@ -79,6 +81,8 @@ def _parse_numeral(text: str) -> Fraction:
 
 
 def _items(values: Any, path: Path, required: str) -> list[Any]:
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise InvalidInput(path, required, "an array with masked entries")
     if isinstance(values, np.ndarray):
         values = values.tolist()
     if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
@@ -108,9 +112,9 @@ def plain(value: Any) -> Any:
     """Return an accepted number, vector or matrix in JSON types, without rounding: ratios and decimals become strings."""
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, Sequence) and not isinstance(value, str):
         return [plain(item) for item in value]
-    if isinstance(value, (Fraction, Decimal)):
+    if isinstance(value, (Fraction, Decimal)) or (type(value) is int and abs(value) >= 2**63):
         return str(value)
     return value.item() if isinstance(value, np.generic) else value
 

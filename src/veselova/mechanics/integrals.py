@@ -20,6 +20,7 @@ __all__ = [
     "neumann_integrals",
     "neumann_polynomial",
     "neumann_velocity",
+    "norm",
     "sliding_velocity",
     "tangent_basis",
     "unit_scale",
@@ -48,7 +49,7 @@ def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     return sliding
 
 
-def _norm(vectors: Array) -> Array:
+def norm(vectors: Array) -> Array:
     """Return the lengths of vectors whose squares may leave the float range."""
     largest = np.max(np.abs(vectors), axis=-1, keepdims=True)
     unit = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
@@ -58,7 +59,7 @@ def _norm(vectors: Array) -> Array:
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
     """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape (...)."""
     scaled, k = unit_scale(A)
-    w = _norm(np.sqrt(scaled) * sliding_velocity(scaled, q, q_dot))
+    w = norm(np.sqrt(scaled) * sliding_velocity(scaled, q, q_dot))
     with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
         h = w * w * (np.sum(scaled * q * q, axis=-1) / (2 * np.prod(scaled)))
         return np.asarray(np.ldexp(h, k * (2 - A.size)), dtype=np.float64)
@@ -77,7 +78,7 @@ def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
 
     Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is A-orthogonal to q.
     """
-    return _norm(np.sqrt(A) * sliding_velocity(A, q, q_dot))
+    return norm(np.sqrt(A) * sliding_velocity(A, q, q_dot))
 
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
@@ -96,6 +97,7 @@ def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
 
     Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
     """
+    A, _ = unit_scale(A)  # F_i has no units, and squares of I_i may leave the float range
     inverse = 1 / A
     v = neumann_velocity(A, q, q_dot)
     P = q[..., :, None] * v[..., None, :] - q[..., None, :] * v[..., :, None]
@@ -145,8 +147,9 @@ def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
     They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
     a symmetric eigenproblem with absolute error of a few ε·max I_i, whatever coincides.
     """
+    A, k = unit_scale(A)
     basis = tangent_basis(q)
     v = neumann_velocity(A, q, q_dot)
     form = np.diag(1 / A) - v[..., :, None] * v[..., None, :]
     restricted = np.swapaxes(basis, -1, -2) @ form @ basis
-    return np.asarray(np.linalg.eigvalsh(restricted)[..., 1:], dtype=np.float64)
+    return np.asarray(np.ldexp(np.linalg.eigvalsh(restricted)[..., 1:], -k), dtype=np.float64)

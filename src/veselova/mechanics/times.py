@@ -10,14 +10,23 @@ from numpy.typing import NDArray
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_vector, to_float
 
-__all__ = ["uniform_times", "validated_times"]
+__all__ = ["MOST_TIMES", "uniform_times", "validated_times"]
 
 Array = NDArray[np.float64]
+
+#: Times of one call: their frames alone take a gigabyte for n = 4.
+MOST_TIMES = 10_000_000
 
 
 def validated_times(times: Any) -> Array:
     """Return the times as a read-only float64 array; raises InvalidInput unless finite and strictly increasing."""
-    if isinstance(times, np.ndarray) and times.ndim == 1 and times.dtype == np.float64 and np.all(np.isfinite(times)):
+    if (
+        isinstance(times, np.ndarray)
+        and not isinstance(times, np.ma.MaskedArray)
+        and times.ndim == 1
+        and times.dtype == np.float64
+        and np.all(np.isfinite(times))
+    ):
         array = np.array(times)
         array.setflags(write=False)
     else:
@@ -27,7 +36,9 @@ def validated_times(times: Any) -> Array:
     falls = np.flatnonzero(np.diff(array) <= 0)
     if falls.size:
         i = int(falls[0]) + 1
-        raise InvalidInput(("times", i), f"a time greater than the one before it ({array[i - 1]!r})", repr(float(array[i])))
+        raise InvalidInput(
+            ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))
+        )
     return array
 
 
@@ -35,6 +46,8 @@ def uniform_times(start: float, stop: float, count: int) -> Array:
     """Return ``count`` equally spaced times from start to stop, both included; raises InvalidInput as above."""
     if count < 1:
         raise InvalidInput(("times", "count"), "at least 1", str(count))
+    if count > MOST_TIMES:
+        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(count)[:30])
     if count > 1 and not start < stop:
         raise InvalidInput(("times", "stop"), f"a time greater than start ({start!r})", repr(stop))
     if not np.isfinite(stop - start):

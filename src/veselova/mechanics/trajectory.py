@@ -49,7 +49,7 @@ class Provenance:
         return {**vars(self), "details": dict(self.details)}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """A motion at given times, in the body axes of the problem.
 
@@ -103,8 +103,8 @@ class Trajectory:
 
     @property
     def drift(self) -> dict[str, float]:
-        """Return, per integral of motion, its largest change against the first time, relative to its size there (or to 1)."""
-        return {name: _drift(values) for name, values in self.integrals.items()}
+        """Return, per integral of motion, its largest change against the first time, relative to its size there ((q,p) to 1)."""
+        return {name: _drift(values, vanishes=name == "q_p") for name, values in self.integrals.items()}
 
     def at(self, times: Any) -> Trajectory:
         """Return the same motion at other times; raises Unsolved where the engine left no dense answer."""
@@ -164,6 +164,11 @@ class Trajectory:
 
         return picture(self)
 
+    def __repr__(self) -> str:
+        span = f"{self.times.size} times from {self.times[0]:g} to {self.times[-1]:g}"
+        how = f"{self.provenance.engine} ({self.provenance.method})"
+        return f"<Trajectory: {self.problem.system}, n = {self.problem.n}, {span}, {how}, error ≤ {np.max(self.error):.2g}>"
+
     def _repr_html_(self) -> str:
         rows = {
             "system": f"{self.problem.system}, n = {self.problem.n}",
@@ -177,8 +182,8 @@ class Trajectory:
         return f"<table>{body}</table>"
 
 
-def _drift(values: Array) -> float:
-    scale = np.maximum(np.max(np.abs(values[:1]), initial=0.0), np.finfo(float).tiny)
-    if np.all(np.abs(values[:1]) < 1e-8):  # integrals that vanish, like (q,p), are measured against 1
-        scale = np.maximum(scale, 1.0)
-    return float(np.max(np.abs(values - values[:1]), initial=0.0) / scale)
+def _drift(values: Array, vanishes: bool) -> float:
+    """Return the largest change against the largest component at the first time; against 1 for what vanishes, or is at rest."""
+    scale = float(np.max(np.abs(values[:1]), initial=0.0))
+    change = float(np.max(np.abs(values - values[:1]), initial=0.0))
+    return change if vanishes or scale == 0 else change / scale

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 INPUT_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova:
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the constraint (44), n ≥ 2.
 
@@ -60,15 +60,18 @@ class Veselova:
         exact_q_dot = exact_vector(q_dot, ("q_dot",), n)
         if not any(exact_q):
             raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
-        position, velocity = to_float(exact_q), to_float(exact_q_dot)
+        largest = max(abs(x) for x in exact_q)
+        position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_q_dot)
         if not normalize:
             _require_on_sphere(position, velocity)
         given_frame = None if frame is None else to_float(exact_matrix(frame, ("frame",), n))
         if axes is not None:
-            position, velocity = axes.T @ position, axes.T @ velocity
+            with np.errstate(over="ignore", invalid="ignore"):  # refused below
+                position, velocity = axes.T @ position, axes.T @ velocity
             given_frame = None if given_frame is None else axes.T @ given_frame
+            _require_finite(velocity, exact_q_dot)
             exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
-        position, velocity = _unit(position), _tangent(exact_q, exact_q_dot)
+        position, velocity = _unit(position), _tangent(exact_q, exact_q_dot, n)
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
@@ -86,6 +89,11 @@ class Veselova:
                 value = np.array(value)
                 value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        # Vectors along the principal axes, to the digits that recognise them.
+        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
+        return f"Veselova({', '.join(parts)})".replace("\n", "")
 
     @property
     def n(self) -> int:
@@ -105,12 +113,12 @@ class Veselova:
     @cached_property
     def constants(self) -> Array:
         """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of the invariant polynomial N(λ), shape (n−2,)."""
-        return integrals.constants_of_motion(self.A, self.q, self.q_dot)
+        return _read_only(integrals.constants_of_motion(self.A, self.q, self.q_dot))
 
     @cached_property
     def spheroconic(self) -> Array:
         """Return the spheroconic coordinates λ_1 ≤ … ≤ λ_{n−1} at t = 0, shape (n−1,)."""
-        return to_spheroconic(self.A, self.q)
+        return _read_only(to_spheroconic(self.A, self.q))
 
     @cached_property
     def flow(self) -> ReducedFlow:
@@ -126,7 +134,7 @@ class Veselova:
             q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
         q = frame[..., 0]
         p = integrals.momentum(self.A, q, q_dot)
-        size = np.linalg.norm(p, axis=-1)
+        size = integrals.norm(p)
         return {
             "energy": integrals.energy(self.A, q, q_dot),
             "q_norm": np.sum(q * q, axis=-1),
@@ -193,15 +201,29 @@ def _principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
     return tuple(map(Fraction, values.tolist())), axes
 
 
+def _read_only(array: Array) -> Array:
+    array.setflags(write=False)
+    return array
+
+
 def _unit(vector: Array) -> Array:
     scaled = vector / np.max(np.abs(vector))  # squares of very large or small entries would leave the float range
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
-def _tangent(q: tuple[Fraction, ...], q_dot: tuple[Fraction, ...]) -> Array:
+def _tangent(q: tuple[Fraction, ...], q_dot: tuple[Fraction, ...], n: int) -> Array:
     """Return q̇ − (q,q̇)/(q,q) q, rounded once: exactly zero where q̇ is along q."""
     along = sum((a * b for a, b in zip(q, q_dot, strict=True)), Fraction()) / sum((a * a for a in q), Fraction())
-    return to_float([b - along * a for a, b in zip(q, q_dot, strict=True)])
+    try:
+        return to_float([b - along * a for a, b in zip(q, q_dot, strict=True)])
+    except OverflowError:
+        raise InvalidInput(("q_dot",), "a tangential part within the range of a float", f"{n} entries beyond it") from None
+
+
+def _require_finite(velocity: Array, given: tuple[Fraction, ...]) -> None:
+    if not np.all(np.isfinite(velocity)):
+        largest = f"entries up to {float(max(abs(x) for x in given)):.3g}"
+        raise InvalidInput(("q_dot",), "components along the principal axes within the range of a float", largest)
 
 
 def _require_on_sphere(q: Array, q_dot: Array) -> None:

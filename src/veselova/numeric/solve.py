@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
@@ -30,6 +31,9 @@ METHODS: Mapping[str, tuple[str, str]] = {
 
 #: Scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut the error from 1e-5 to 3.5e-10.
 _SEGMENT = 10.0
+
+#: Scaled time that an integration is begun for: hours at n = 3, and by then one rounding of the data has grown to 1e-7.
+_FARTHEST = 1e9
 
 #: How far from the data, in ε, the check run starts: rounding of the start and of each projection is common to equal starts.
 _DATA_ROUNDING = 32.0
@@ -53,7 +57,7 @@ def solve(problem: Veselova, times: Any, *, method: str = "dop853") -> Trajector
     Tested for n = 2…8, |ω t| ≤ 10⁴: the true error stays below twice the estimate.
     """
     grid = validated_times(times)
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InvalidInput(("method",), f"one of {', '.join(METHODS)}", shown(method))
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
@@ -66,14 +70,17 @@ def solve(problem: Veselova, times: Any, *, method: str = "dop853") -> Trajector
     states = (tau1, q_dot, frame, to_spheroconic(problem.A, frame[:, :, 0]))
     details = {"tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
     provenance = Provenance("numeric", method, 15, __version__, time.perf_counter() - began, details)
-    return Trajectory.of_principal(
-        problem, grid, states, error, provenance, dense=lambda wanted: solve(problem, wanted, method=method)
-    )
+    return Trajectory.of_principal(problem, grid, states, error, provenance, dense=partial(solve, problem, method=method))
 
 
 def _integrate_twice(problem: Veselova, grid: Array, backend: type[Integrator]) -> tuple[Array, Array, Array, Array, int]:
     flow = problem.flow
     asked = grid / flow.time_unit
+    farthest = float(np.max(np.abs(asked)))
+    if not farthest <= _FARTHEST:
+        raise Unsolved(
+            "too-far", f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}, the closed form farther"
+        )
     # Two runs may agree by chance at the few times asked for, not at all of these too.
     scaled = np.union1d(asked, np.linspace(min(asked[0], 0.0), max(asked[-1], 0.0), _CHECKPOINTS))
     neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)

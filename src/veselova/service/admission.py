@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import orjson
 from starlette.requests import Request
 
 from veselova.mechanics.errors import InvalidInput
@@ -15,15 +14,21 @@ from veselova.service.settings import Settings
 
 __all__ = ["admit", "decoded", "read_json", "require_acceptable"]
 
+#: Python reads integers of 4300 digits.
+_LONGEST_INTEGER = 4000
+
 
 def require_acceptable(accept: str | None) -> None:
     """Raise Refused unless an Accept header allows application/json."""
     if accept is None:
         return
+    accepted = {}
     for part in accept.split(","):
         media_range, *parameters = (piece.strip().lower() for piece in part.split(";"))
-        if media_range in ("application/json", "application/*", "*/*") and not _is_zero_quality(parameters):
-            return
+        accepted[media_range] = not _is_zero_quality(parameters)
+    # The most specific range decides (RFC 9110, 12.5.1).
+    if next((accepted[name] for name in ("application/json", "application/*", "*/*") if name in accepted), False):
+        return
     raise Refused("not-acceptable", f"This resource is application/json; the request accepts {accept[:100]}.")
 
 
@@ -53,15 +58,30 @@ def decoded(text: bytes) -> Any:
     """Return the document that a text states; raises Refused when it is not JSON.
 
     NaN, Infinity and 1e999 are no JSON, but their sender is helped more by the name of the field: Python's own parser takes
-    them, and the validation that follows refuses every number that is not finite.
+    them, and the validation that follows refuses every number that is not finite. Of two fields of one name neither is taken.
     """
     try:
-        return orjson.loads(text)
-    except orjson.JSONDecodeError as error:
-        try:
-            return json.loads(text.decode("utf-8"))
-        except (ValueError, RecursionError):
-            raise Refused("malformed-json", f"The body: required one JSON document; {error}.") from None
+        return json.loads(text.decode("utf-8"), object_pairs_hook=_once, parse_int=_integer)
+    except InvalidInput:
+        raise
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise Refused("malformed-json", f"The body: required one JSON document; {reason}.") from None
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise InvalidInput(
+            (next(name for name in names if names.count(name) > 1)[:100],), "each field once", "two fields of this name"
+        )
+    return fields
+
+
+def _integer(text: str) -> int | str:
+    """Return an integer; one of more digits than Python reads stays a text, which its field then refuses."""
+    return int(text) if len(text) < _LONGEST_INTEGER else text
 
 
 def admit(request: TorusRequest, settings: Settings) -> None:

@@ -20,7 +20,9 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 
 _File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input")]
 _Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
-_Output = Annotated[Path | None, typer.Option(help="write the motion to a file: .npz, .csv, .parquet or .json")]
+_Output = Annotated[
+    Path | None, typer.Option(help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet or .json")
+]
 _Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
 _Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
@@ -29,6 +31,8 @@ def main() -> None:
     """Run the command line; errors are one sentence on standard error."""
     # As process 1 of a container the default action of SIGTERM would be to ignore it, and 143 is what a shell expects.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if sys.stdout is None or sys.stderr is None:  # started with a closed stream
+        raise SystemExit(1)
     with _reported():
         app()
 
@@ -40,15 +44,50 @@ def _reported() -> Iterator[None]:
 
     try:
         yield
-    except (InvalidInput, InvalidRequest, Refused) as error:
+    except (InvalidInput, InvalidRequest) as error:
         _fail(str(error), 2)
+    except Refused as error:
+        _fail(str(error), 1 if error.code == "over-budget" else 2)
     except VeselovaError as error:
         _fail(str(error), 1)
     except BrokenPipeError:  # the reader of our output has gone, as in `veselova solve … | head`
         sys.stderr.close()
         raise SystemExit(1) from None
+    except OSError as error:
+        _give_up_output()
+        _fail(f"writing {error.filename or 'the answer'} failed: {error.strerror or error}", 1)
+    except MemoryError:
+        _fail("not enough memory for so many times and so large a body", 1)
     except KeyboardInterrupt:
         _fail("interrupted", 130)
+
+
+def _give_up_output() -> None:
+    """Keep the interpreter from failing once more when it flushes what could not be written."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def _within_budget(document: Any) -> Iterator[None]:
+    """Stop the work after the ``budget_s`` that a file states; without one it may take as long as it takes."""
+    stated = document.get("budget_s") if isinstance(document, dict) else None
+    if not isinstance(stated, (int, float)) or stated <= 0 or not hasattr(signal, "setitimer"):
+        yield
+        return
+    from veselova.service.problem_details import Refused
+
+    def stop(*_: object) -> None:
+        raise Refused("over-budget", f"the work was stopped after its budget of {stated:g} s")
+
+    signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, stated)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def _fail(message: str, status: int) -> None:
@@ -80,9 +119,11 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     from veselova.service.schemas import TrajectoryRequest, read_request
     from veselova.service.tasks import requested_trajectory
 
-    request = read_request(TrajectoryRequest, _document(file))
+    document = _document(file)
+    request = read_request(TrajectoryRequest, document)
     _check_suffixes(output, plot)
-    trajectory = requested_trajectory(request)
+    with _within_budget(document):
+        trajectory = requested_trajectory(request)
     if output:
         _write(trajectory, output, request.outputs)
     if plot:
@@ -91,6 +132,7 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
         _print_json(trajectory_document(trajectory, request.outputs))
     else:
         print_trajectory(_console(), trajectory)
+        _say_written(output, plot)
 
 
 @app.command()
@@ -112,7 +154,8 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
         document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
     request = read_request(ComparisonRequest, document)
     _check_suffixes(output, plot)
-    comparison = requested_comparison(request)
+    with _within_budget(document):
+        comparison = requested_comparison(request)
     if output:
         _write(comparison.analytic, output, request.outputs)
     if plot:
@@ -121,8 +164,7 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
         _print_json(comparison_document(comparison, request.outputs))
     else:
         print_comparison(_console(), comparison)
-        if plot:
-            print(f"Picture: {plot}")
+        _say_written(output, plot)
 
 
 @app.command()
@@ -134,8 +176,10 @@ def torus(file: _File, json: _Json = False) -> None:
 
     document = _document(file)
     if isinstance(document, dict):  # the file of a motion serves here too
-        document = {name: value for name, value in document.items() if name in ("problem", "budget_s")}
-    answer = requested_torus(read_request(TorusRequest, document))
+        document = {name: value for name, value in document.items() if name not in _OF_MOTIONS}
+    request = read_request(TorusRequest, document)
+    with _within_budget(document):
+        answer = requested_torus(request)
     if json:
         _print_json(answer.as_dict())
     else:
@@ -149,35 +193,17 @@ def serve(
     settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
 ) -> None:
     """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
-    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from pydantic import ValidationError
+    from veselova.service.serving import serve as run_server
 
-    from veselova.service.settings import Settings
-
-    try:
-        limits = Settings()
-    except ValidationError as error:
-        item = error.errors()[0]
-        _fail(f"VESELOVA_{str(item['loc'][0]).upper()}: {item['msg']}; given {item['input']}", 2)
-        return
-    if settings:
-        for name, value in limits.model_dump().items():
-            print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
-        return
-    import uvicorn
-
-    from veselova.service.app import create_app
-
-    uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=limits.shutdown_grace_s)
+    run_server(host, port, settings)
 
 
 def _document(file: str) -> Any:
     from veselova.mechanics.errors import InvalidInput
     from veselova.service.admission import decoded
 
+    if file == "-" and sys.stdin is None:
+        raise InvalidInput(("FILE",), "an open standard input", "a closed one")
     try:
         text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
     except OSError as error:
@@ -199,6 +225,9 @@ def _print_json(document: Any) -> None:
     sys.stdout.buffer.flush()
 
 
+#: Fields of a motion's request that say nothing of its torus.
+_OF_MOTIONS = ("times", "engine", "method", "outputs", "digits")
+
 _WRITERS = (".npz", ".csv", ".parquet", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
 
@@ -208,19 +237,27 @@ def _check_suffixes(output: Path | None, plot: Path | None) -> None:
     from veselova.mechanics.errors import InvalidInput
 
     for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
-        if path is not None and path.suffix not in suffixes:
+        if path is not None and path.suffix.lower() not in suffixes:
             raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
         if path is not None and not path.parent.is_dir():
             raise InvalidInput((option,), "a file in an existing folder", str(path))
+        if path is not None and (path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK)):
+            raise InvalidInput((option,), "a file that can be written", str(path))
 
 
 def _write(trajectory: Any, path: Path, outputs: list[Any]) -> None:
     from veselova.service.documents import encoded, trajectory_document
 
-    if path.suffix == ".json":
+    if path.suffix.lower() == ".json":
         path.write_bytes(encoded(trajectory_document(trajectory, outputs)))
     else:
-        getattr(trajectory, f"to_{path.suffix[1:]}")(path)
+        getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path)
+
+
+def _say_written(output: Path | None, plot: Path | None) -> None:
+    for name, path in (("Motion", output), ("Picture", plot)):
+        if path is not None:
+            print(f"{name}: {path}")
 
 
 def _draw(subject: Any, path: Path) -> None:

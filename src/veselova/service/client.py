@@ -6,19 +6,19 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import httpx2 as httpx
-import numpy as np
 import orjson
 import stamina
 
 from veselova.mechanics.comparison import Comparison
-from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceUnreachable, shown
+from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
 from veselova.mechanics.exact import plain
+from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova import Veselova
@@ -78,7 +78,10 @@ def _problem(problem: Veselova | Mapping[str, Any]) -> Veselova:
 
 
 def _times(times: Any) -> Any:
-    return dict(times) if isinstance(times, Mapping) else plain(np.asarray(times) if isinstance(times, range) else times)
+    if isinstance(times, Mapping):
+        return dict(times)
+    grid = validated_times(times)  # refuses here what the server would
+    return plain(list(times)) if isinstance(times, Sequence) and not isinstance(times, range) else grid.tolist()
 
 
 def _trajectory_call(
@@ -137,7 +140,10 @@ class _Core:
     def _result(self, call: _Call[T], response: httpx.Response) -> T:
         """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
         if response.status_code == httpx.codes.OK:
-            return call.result(orjson.loads(response.content))
+            try:
+                return call.result(orjson.loads(response.content))
+            except (ValueError, KeyError, TypeError):
+                raise ServiceError(f"{self._base_url}{call.path} answered with something else than a result") from None
         try:
             document = orjson.loads(response.content)
         except orjson.JSONDecodeError:
@@ -176,6 +182,8 @@ class Client(_Core):
                         response = self._http.request(**self._request(call))
                     except httpx.TransportError as error:
                         raise self._unreachable(error) from None
+                    except RuntimeError as error:
+                        raise ServiceError(f"the client is closed ({error})") from None
                     return self._result(call, response)
         except _Retry as retry:
             raise retry.cause from None
@@ -219,6 +227,8 @@ class AsyncClient(_Core):
                         response = await self._http.request(**self._request(call))
                     except httpx.TransportError as error:
                         raise self._unreachable(error) from None
+                    except RuntimeError as error:
+                        raise ServiceError(f"the client is closed ({error})") from None
                     return self._result(call, response)
         except _Retry as retry:
             raise retry.cause from None

@@ -35,6 +35,7 @@ _REFUSALS = {
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
+    "client-gone": (499, "The client closed the connection"),
     "overloaded": (503, "Too many requests are waiting"),
     "not-ready": (503, "The server is starting"),
     "shutting-down": (503, "The server is shutting down"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 import anyio
@@ -75,13 +76,40 @@ def _computing(kind: str, settings: Settings, workers: Workers) -> Callable[[Req
         asked = read_request(model, await read_json(request, settings))
         admit(asked, settings)
         try:
-            body = await workers.run(kind, asked.model_dump(), asked.budget_s)
+            body = await _while_connected(request, partial(workers.run, kind, asked.model_dump(), asked.budget_s))
         except anyio.get_cancelled_exc_class():
             # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.
             raise Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5) from None
         return Response(body, media_type="application/json")
 
     return compute
+
+
+async def _while_connected(request: Request, work: Callable[[], Awaitable[bytes]]) -> bytes:
+    """Return what the work gives; end it when the client has gone."""
+    answers: list[bytes] = []
+    failures: list[Exception] = []
+
+    async def run() -> None:
+        try:
+            answers.append(await work())
+        except Exception as error:
+            failures.append(error)
+        tasks.cancel_scope.cancel()
+
+    async def watch() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        tasks.cancel_scope.cancel()
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(run)
+        tasks.start_soon(watch)
+    if failures:
+        raise failures[0]
+    if not answers:
+        raise Refused("client-gone", "The client closed the connection, and the work was stopped.")
+    return answers[0]
 
 
 def _json(document: dict[str, Any]) -> Response:

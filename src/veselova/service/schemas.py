@@ -45,6 +45,12 @@ Output = Literal["q", "q_dot", "frame", "omega", "spheroconic", "tau1"]
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
 _DEEPEST = 8
 
+#: A request has seven fields at most; beyond this many, unknown ones are not listed one by one.
+_MOST_FIELDS = 40
+
+#: A field name is quoted up to here.
+_LONGEST_NAME = 100
+
 
 class _Request(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -84,7 +90,7 @@ class ComparisonRequest(TorusRequest):
 
     times: Annotated[_Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
     method: Annotated[str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")] = None
-    outputs: Annotated[list[Output], Field(min_length=1)] = list(OUTPUTS)  # type: ignore[arg-type]
+    outputs: Annotated[list[Output], Field(min_length=1, max_length=len(OUTPUTS))] = list(OUTPUTS)  # type: ignore[arg-type]
     digits: Annotated[int, Field(ge=15, le=15, description="decimal digits of the computation")] = 15
 
     def time_grid(self) -> Any:
@@ -122,6 +128,9 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     """Return the request that a decoded JSON document states; raises InvalidRequest with every fault found."""
     if _is_deeper(document, _DEEPEST):
         raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
+    for path, part in (((), document), (("problem",), document.get("problem") if isinstance(document, dict) else None)):
+        if isinstance(part, dict) and len(part) > _MOST_FIELDS:
+            raise InvalidRequest([InvalidInput(path, "the fields of a request", f"{len(part)} fields")])
     try:
         return model.model_validate(document)
     except ValidationError as error:
@@ -146,7 +155,8 @@ def _is_deeper(document: Any, levels: int) -> bool:
 
 def _fault(item: Any) -> InvalidInput:
     """Return pydantic's finding in the words of the other doors: field, required, given."""
-    path, kind, given = tuple(item["loc"]), item["type"], shown(item.get("input"))
+    path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
+    kind, given = item["type"], shown(item.get("input"))
     if kind == "missing":
         return InvalidInput(path, "this field", "nothing")
     if kind == "extra_forbidden":
@@ -156,5 +166,15 @@ def _fault(item: Any) -> InvalidInput:
     required: Sequence[str] = {
         "literal_error": [str(item.get("ctx", {}).get("expected", ""))],
         "bool_type": ["true or false"],
+        "too_short": ["at least one entry"],
+        "too_long": [f"at most {len(OUTPUTS)} entries"],
+        "float_type": ["a number"],
+        "int_type": ["a whole number"],
+        "greater_than": ["a number greater than 0"],
+        "finite_number": ["a finite number"],
+        "list_type": ["a list"],
+        "string_type": ["a string"],
+        "greater_than_equal": ["15 (more digits are not offered yet)"],
+        "less_than_equal": ["15 (more digits are not offered yet)"],
     }.get(kind, [item["msg"][:1].lower() + item["msg"][1:]])
     return InvalidInput(path, required[0], given)

@@ -34,7 +34,8 @@ class Workers:
         Raises Refused: ``overloaded`` when too many requests wait, ``over-budget`` when time is up (the process is killed),
         ``worker-lost`` when the process died. What the engines raise comes through.
         """
-        if self._limiter.statistics().tasks_waiting >= self._max_waiting:
+        load = self._limiter.statistics()
+        if load.borrowed_tokens >= load.total_tokens and load.tasks_waiting >= self._max_waiting:
             raise Refused("overloaded", f"{self._max_waiting} requests are waiting for a worker; try again later.", retry_after=2)
         try:
             with anyio.fail_after(budget_s):
