@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -28,3 +29,80 @@ def random_riemann_matrix(rng: np.random.Generator, genus: int, smallest: float 
     basis = np.linalg.qr(rng.normal(size=(genus, genus)))[0]
     T = basis @ np.diag(np.exp(rng.uniform(np.log(smallest), np.log(3.0), genus))) @ basis.T
     return (T + T.T) / 2  # FLINT answers NaN for a matrix that is symmetric only up to rounding
+
+
+def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
+    """Return the name of a class of starts at which closed forms usually fail, and one of it, in exact rationals."""
+    name = str(rng.choice(CLASSES))
+    A, q, v = (_fractions(rng, n, low) for low in (0.3, -1.0, -1.0))
+    A = [a + Fraction(1, 5) for a in A]
+    power = Fraction(1, 10 ** int(rng.integers(1, 290)))
+    if name in ("equal A's", "equal and frozen"):
+        values = A[: max(1, int(rng.integers(1, n)))]
+        A = [values[int(k)] for k in rng.integers(0, len(values), n)]
+    if name == "nearly equal A's":
+        A[1] = A[0] * (1 + power)
+    if name == "near three equal A's" and n > 2:
+        A[1], A[2] = A[0] * (1 + power), A[0] * (1 + 3 * power)
+    if name in ("frozen", "equal and frozen"):
+        for i in rng.permutation(n)[: int(rng.integers(0, n - 1))]:
+            q[i] = v[i] = Fraction()
+    if name == "nearly frozen" and n > 2:
+        q[0], v[0] = q[0] * power, v[0] * power
+    if name == "in planes q_i = 0":
+        for i in rng.permutation(n)[: int(rng.integers(1, n))]:
+            q[i] = Fraction()
+    if name == "near a plane q_i = 0":
+        q[0] *= power
+    if name == "wide A's":
+        A = [Fraction(round(10 ** rng.uniform(0, 6), 3)) * Fraction(10) ** int(rng.integers(-3, 4)) for _ in range(n)]
+    if name == "scaled":
+        scale, unit = (Fraction(10) ** int(rng.integers(-low, low)) for low in (141, 3))
+        v, A = [x * scale for x in v], [a * unit for a in A]
+    if name in ("separatrix", "near a separatrix") and n > 2:
+        A, q = _umbilic(rng, n, q)
+        q[0] = power if name == "near a separatrix" else Fraction()
+    if name == "along an axis":
+        q = [Fraction(int(i == 0)) for i in range(n)]
+    v = v if any(_wedge(q, v)) else [q[(i + 1) % n] * (1 if i % 2 else -1) + v[i] for i in range(n)]
+    return name, Veselova(A, q, v, normalize=True)
+
+
+#: The classes of adversarial starts; what cannot be had for n = 2 falls back to a plain draw.
+CLASSES = (
+    "plain",
+    "equal A's",
+    "nearly equal A's",
+    "near three equal A's",
+    "frozen",
+    "equal and frozen",
+    "nearly frozen",
+    "in planes q_i = 0",
+    "near a plane q_i = 0",
+    "along an axis",
+    "wide A's",
+    "scaled",
+    "separatrix",
+    "near a separatrix",
+)
+
+
+def _fractions(rng: np.random.Generator, n: int, low: float) -> list[Fraction]:
+    return [Fraction(int(x), 1000) for x in rng.integers(int(1000 * low), 1000, n)]
+
+
+def _wedge(q: list[Fraction], v: list[Fraction]) -> list[Fraction]:
+    return [q[i] * v[j] - q[j] * v[i] for i in range(len(q)) for j in range(i)]
+
+
+def _umbilic(rng: np.random.Generator, n: int, q: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
+    """Return A and q with Σ_{j≥1} q_j²/(I_0−I_j) = 0: where q_0 = 0 and q̇_0 ≠ 0 then F_0 = 0, so some c_k = I_0 exactly."""
+    while True:
+        inverse = [Fraction(int(x), 1000) for x in rng.integers(300, 3000, n)]
+        q = [x if x else Fraction(1, 7) for x in q]
+        if len({*inverse}) < n:
+            continue
+        partial = sum((q[j] ** 2 / (inverse[0] - inverse[j]) for j in range(1, n - 1)), Fraction())
+        last = inverse[0] + q[-1] ** 2 / partial if partial else Fraction()
+        if Fraction(1, 10) < last < 10 and last not in inverse[:-1]:
+            return [1 / x for x in (*inverse[:-1], last)], q

@@ -56,13 +56,16 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Arr
 
     mp = _CONTEXT
     exact, n = problem.exact, problem.n
-    A = [mp.mpf(a.numerator) / a.denominator for a in exact.A]
+    unit = max(exact.A)  # the motion does not know the unit of A, and time is counted in units of 1/max|q̇|
+    A = [mp.mpf((a / unit).numerator) / (a / unit).denominator for a in exact.A]
     q = [mp.mpf(x.numerator) / x.denominator for x in exact.q]
     q_dot = [mp.mpf(x.numerator) / x.denominator for x in exact.q_dot]
     length = mp.sqrt(mp.fsum(x * x for x in q))
     q = [x / length for x in q]
     slope = mp.fsum(x * y for x, y in zip(q, q_dot, strict=True))
     q_dot = [y - slope * x for x, y in zip(q, q_dot, strict=True)]
+    speed = max(abs(y) for y in q_dot)
+    q_dot = [y / speed for y in q_dot]
     wedge = mp.fsum(A[i] * A[j] * (q[i] * q_dot[j] - q[j] * q_dot[i]) ** 2 for j in range(n) for i in range(j))
     rate = mp.sqrt(wedge / mp.fsum(a * x * x for a, x in zip(A, q, strict=True)))
     columns = [q]
@@ -89,7 +92,7 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Arr
         integrator.state[:] = [quad(x) for x in start]
         indices = np.flatnonzero(times >= 0) if direction > 0 else np.flatnonzero(times < 0)[::-1]
         for index in indices:
-            integrator.propagate_until(hy.real128(float(times[index])))
+            integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed))
             results[index] = [float(x) for x in integrator.state]
     true_frame = np.empty((times.size, n, n))
     true_frame[:, :, 0] = results[:, :n]
@@ -97,4 +100,5 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Arr
     true_frame[:, :, 1:] = results[:, 2 * n : -1].reshape(-1, n - 1, n).transpose(0, 2, 1)
     velocity = results[:, n : 2 * n]
     weight = np.sum(results[:, :n] ** 2 * np.array([float(a) for a in A]), axis=1)
-    return true_frame, velocity * np.sqrt(float(wedge) / weight)[:, None], results[:, -1]
+    velocity = velocity * (np.sqrt(float(wedge) / weight)[:, None] * float(speed))
+    return true_frame, velocity, results[:, -1] * float(mp.sqrt(mp.mpf(unit.numerator) / unit.denominator))

@@ -11,6 +11,7 @@ e^(−2πN K'/K) however closely branch points cluster: a closing gap costs log(
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -45,16 +46,17 @@ class Interval:
             return Jacobi(self.curve.arithmetic, width / (width + after), after / (width + after))
         if after is None:
             return Jacobi(self.curve.arithmetic, width / (width + before), before / (width + before))
-        denominator = (width + after) * (width + before)
-        return Jacobi(self.curve.arithmetic, width * (before + width + after) / denominator, before * after / denominator)
+        # Ratios before products: the square of a width of 1e-200 is no float.
+        lower, upper = width + before, width + after
+        return Jacobi(self.curve.arithmetic, (width / lower) * ((before + upper) / upper), (before / lower) * (after / upper))
 
     @cached_property
     def density(self) -> Any:
         """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|)."""
         before, width, after = self._widths
         factors = [width + neighbour for neighbour in (before, after) if neighbour is not None]
-        product = factors[0] if len(factors) == 1 else factors[0] * factors[1]
-        return self.jacobi.quarter / self.curve.arithmetic.pi / self.curve.arithmetic.sqrt(product)
+        root = math.prod(self.curve.arithmetic.sqrt(factor) for factor in factors)
+        return self.jacobi.quarter / self.curve.arithmetic.pi / root
 
     def nodes(self, count: int) -> Values:
         """Return ``count`` midpoints of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
@@ -68,14 +70,14 @@ class Interval:
         if before is None:
             return sn, cn, width * sn * sn, width * cn * cn
         denominator = before + width * cn * cn
-        return sn, cn, width * before * sn * sn / denominator, width * (width + before) * cn * cn / denominator
+        return sn, cn, width * (before / denominator) * sn * sn, width * ((width + before) / denominator) * cn * cn
 
     def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
         """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``, the inverse of ``distances``."""
         before, _, _ = self._widths
         # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
         if before is not None:
-            below, above = (before + self._widths[1]) * below, before * above
+            above = above * (before / (before + self._widths[1]))
         return below / (below + above), above / (below + above)
 
     def to_branch_points(self, below: Values, above: Values) -> Values:

@@ -27,23 +27,26 @@ def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmeti
 def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Extended) -> Any:
     """Return the zero between poles a and a+1 by Newton's method for (x−p_a)(p_{a+1}−x) f(x), which has no pole there."""
     (low, lower_weight), (high, upper_weight) = live[a], live[a + 1]
-    others = live[:a] + live[a + 2 :]
     width = high - low
+    # Distances to all other poles are sums of positive terms, from whichever end of the interval is nearer.
+    before = [(low - pole, weight) for pole, weight in live[:a]]
+    beyond = [(pole - high, weight) for pole, weight in live[a + 2 :]]
     if width == 0:
         return low
     below = width * lower_weight / (lower_weight + upper_weight)
     least, most = 0 * width, width
     tiny = width * arithmetic.epsilon
     for _ in range(_MOST_STEPS):
-        x, above = low + below, width - below
-        rest, slope = 0 * x + constant, 0 * x
-        for pole, weight in others:
-            inverse = 1 / (x - pole)
-            term = weight * inverse
-            rest, slope = rest + term, slope - term * inverse
+        above = width - below
+        rest, slope = 0 * below + constant, 0 * below
+        for distances, sign, own in ((before, 1, below), (beyond, -1, above)):
+            for distance, weight in distances:
+                inverse = 1 / (distance + own)
+                term = weight * inverse
+                rest, slope = rest + sign * term, slope - term * inverse
         value = lower_weight * above - upper_weight * below + below * above * rest
         if value == 0:
-            return x
+            return low + below
         derivative = (above - below) * rest + below * above * slope - lower_weight - upper_weight
         least, most = (below, most) if value > 0 else (least, below)
         new = below - value / derivative if derivative < 0 else 2 * most

@@ -105,26 +105,37 @@ def _threshold(arithmetic: Extended) -> Any:
 def spectrum(moving: Moving, digits: int) -> Spectrum:
     """Return the spectra of what moves with enough digits for all differences of neighbouring branch points."""
     wanted = 2 * digits + _SPARE
-    working = wanted + 10
     most = wanted - _COINCIDE
+    working = min(most, wanted + 10 + _digits_between(moving))
     while True:
-        found = _spectrum(moving, extended(working))
-        narrowest = min(found.widths)
-        known = narrowest > found.arithmetic.number(10) ** -(working - _SPARE)
-        needed = wanted + math.ceil(-math.log10(float(narrowest))) if known and narrowest > 1e-300 else 2 * working
-        if working >= min(needed, most):
+        found = _spectrum(moving, extended(working), digits)
+        narrowest = min(found.widths) if found is not None else 0
+        if found is None or narrowest < found.arithmetic.number(10) ** -(working - _SPARE):
+            needed = 2 * working  # nothing can be said of that width but that it is small
+        else:
+            needed = wanted + math.ceil(-float(found.arithmetic.log(narrowest)) / math.log(10))
+        if found is not None and working >= min(needed, most):
             return found
-        working = min(most, needed)
+        if working > most:
+            raise InternalContradiction("the spectra do not settle")
+        working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
 
 
-def _spectrum(moving: Moving, arithmetic: Extended) -> Spectrum:
+def _digits_between(moving: Moving) -> int:
+    """Return how many digits the nearest two I's share, relative to the largest."""
+    nearest = min((1 / b - 1 / a for a, b in itertools.pairwise(moving.A)), default=Fraction(1))
+    return max(0, (nearest.denominator.bit_length() - nearest.numerator.bit_length()) * 3 // 10)
+
+
+def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
+    """Return the spectra at one precision; None where it is too low for c_1 = 0 to come out as an eigenvalue."""
     q, v, rate = _tangent(moving, arithmetic)
     inverse = arithmetic.array([1 / a for a in moving.A])
     points = zeros_between_poles(inverse, q * q, 0, arithmetic)
     along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
     spheroconic = arithmetic.array(points)
-    if abs(1 - np.sum(along * along / spheroconic)) > math.sqrt(arithmetic.epsilon):
-        raise InternalContradiction("c_1 = 0 is not an eigenvalue")
+    if abs(1 - np.sum(along * along / spheroconic)) > 10.0**-digits:
+        return None
     constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
     return Spectrum(arithmetic, inverse, q, v, arithmetic.array([0, *constants]), spheroconic, rate)
 
