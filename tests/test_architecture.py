@@ -24,7 +24,7 @@ ALLOWED = {
 
 #: What may be imported inside a function, because the library is optional or slow to load.
 ALLOWED_LATER = {
-    "mechanics": {"matplotlib", "pyarrow", "xarray"},
+    "mechanics": {"matplotlib", "pyarrow", "xarray", "veselova.engines"},  # Veselova.from_torus asks the table of engines
     "analytic": set(),
     "numeric": {"heyoka"},
 }

@@ -12,9 +12,11 @@ from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova import Veselova
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from veselova.mechanics.torus import Torus
 
-__all__ = ["ENGINES", "compare", "solve", "torus"]
+__all__ = ["ENGINES", "compare", "solve", "start_on_torus", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
@@ -39,6 +41,11 @@ def solve(problem: Veselova, times: Any, engine: str = "analytic", method: str |
 def compare(problem: Veselova, times: Any, method: str | None = None) -> Comparison:
     """Return both engines' answers and their differences; ``method`` is the numerical one (``dop853`` or ``taylor``)."""
     return Comparison(solve(problem, times, "analytic"), solve(problem, times, "numeric", method))
+
+
+def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the start (q, q̇) with given constants of motion and phases, for ``Veselova.from_torus``."""
+    return import_module("veselova.analytic.from_torus").start_on_torus(A, energy, constants, phases, signs)  # type: ignore[no-any-return]
 
 
 def torus(problem: Veselova) -> Torus:

@@ -85,20 +85,28 @@ class Interval:
         d, j = self.curve.differences, self.left
         return np.concatenate([d[: j + 1, j] + below[..., None], above[..., None] + d[j + 1, j + 1 :]], axis=-1)
 
+    def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
+        """Return (m, r) with dλ/(2√|R|) = m/Π_l r_l dψ: m (N,), and r_l, l = 1…g−1, (N, g−1), the root of the ends of gap l."""
+        xp, g, j = self.curve.arithmetic, self.curve.genus, self.left
+        roots = xp.sqrt(self.to_branch_points(below, above))
+        nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
+        roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
+        return self.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1), roots[:, 2:-1:2] * roots[:, 3::2]
+
+    def to_midpoints(self, below: Values, above: Values) -> Values:
+        """Return λ−ζ_l, l = 1…g−1, shape (N, g−1), with ζ_l the midpoint of gap l."""
+        zeros, j = self.curve.midpoints, self.left
+        split = j // 2
+        return np.concatenate([below[:, None] - zeros[j, :split], -(above[:, None] + zeros[j + 1, split:])], axis=1)
+
     def forms(self, below: Values, above: Values) -> Values:
         """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N): holomorphic forms p_k dλ/(2√|R|).
 
         p_g = Π(λ−ζ_l) over the midpoints ζ_l of all inner gaps, and p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l is divided by
         the root of its own gap's ends, so every factor is of order one at any genus.
         """
-        xp, g, j = self.curve.arithmetic, self.curve.genus, self.left
-        roots = xp.sqrt(self.to_branch_points(below, above))
-        nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
-        roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
-        zeros, split = self.curve.midpoints, j // 2
-        numerators = np.concatenate([below[:, None] - zeros[j, :split], -(above[:, None] + zeros[j + 1, split:])], axis=1)
-        of_gaps = roots[:, 2:-1:2] * roots[:, 3::2]
-        common = self.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1)
+        common, of_gaps = self.measure(below, above)
+        numerators = self.to_midpoints(below, above)
         factors = numerators / of_gaps
         one = np.ones_like(below)[:, None]
         lower = np.cumprod(np.concatenate([one, factors], axis=1), axis=1)

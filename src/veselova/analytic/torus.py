@@ -43,6 +43,9 @@ def torus(problem: Veselova) -> Torus:
         branch_points=np.array(curve.branch_points) / unit,
         origins=tuple(f"{o.kind}{moving.axes[o.index] + 1 if o.kind == 'I' else o.index + 1}" for o in curve.origins),
         periods=periods,
+        actions=_actions(solution.periods) / root,
+        rotation_numbers=np.array(solution.in_time.rates / solution.in_time.rates[0]),
+        signs=_signs(problem),
         riemann_matrix=np.array(solution.periods.riemann_matrix),
         riemann_matrix_residual=solution.periods.riemann_matrix_residual,
         frequencies_tau1=np.array(solution.in_tau1.rates) / root,
@@ -53,14 +56,35 @@ def torus(problem: Veselova) -> Torus:
     )
 
 
+def _signs(problem: Veselova) -> NDArray[np.int64]:
+    """Return the sign of each q_i at the start, of q̇_i where q_i = 0, and 0 where the coordinate rests in its plane."""
+    return np.sign(np.where(problem.q != 0, problem.q, problem.q_dot)).astype(np.int64)
+
+
+def _actions(periods: Periods) -> Array:
+    """Return J_s = (1/2π)∮ p_s dλ_s over cut s, p_s = ½√|λ Π(λ−c_k)/Π(λ−I_i)|, the momentum to λ_s of the metric |dq|².
+
+    With p_s dλ = |Π(λ−c_k)| dλ/(2√|R|), c_1 = 0 included, it is a mean over the angle of the cut.
+    """
+    curve, actions = periods.curve, []
+    places = curve.layout("c").places
+    for cut in periods.cuts:
+        psi = cut.nodes(periods.node_count(cut))
+        _, _, below, above = cut.distances(psi)
+        to_constants = cut.to_branch_points(below, above)[:, places]
+        common, of_gaps = cut.measure(below, above)
+        actions.append(np.mean(common * to_constants[:, 0] * np.prod(to_constants[:, 1:] / of_gaps, axis=1)))
+    return np.array(actions)
+
+
 def _monomial_cycles(periods: Periods) -> Array:
-    """Return a in the basis λ^{k−1}dλ/(2√|R|): the nodal form p_g divided by its polynomial, which has no zero on a cut."""
+    """Return a in the basis λ^{k−1}dλ/(2√|R|)."""
     g, columns = periods.genus, []
-    zeros = periods.curve.midpoints[0]
     for s, cut in enumerate(periods.cuts):
         psi = cut.nodes(periods.node_count(cut))
         _, _, below, above = cut.distances(psi)
         point = periods.curve.branch_points[2 * s + 1] + below
-        density = cut.forms(below, above)[g - 1] / np.prod(point[:, None] - zeros, axis=1)
+        common, of_gaps = cut.measure(below, above)
+        density = common / np.prod(of_gaps, axis=1)
         columns.append((-1) ** (g - s - 1) * 2 * np.pi * np.mean(point ** np.arange(g)[:, None] * density, axis=1))
     return np.stack(columns, axis=1)

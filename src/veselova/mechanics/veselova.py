@@ -83,6 +83,21 @@ class Veselova:
         given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
         object.__setattr__(self, "given", {name: plain(value) for name, value in given.items() if value is not None})
 
+    @classmethod
+    def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
+        """Return the problem whose motion has these constants and phases, as ``veselova.torus`` gives them.
+
+        A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 = 0 and the sorted I_i
+                interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases (n−1,) z⁰ of the start, modulo 1
+        signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as above
+
+        Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A up to 100.
+        """
+        from veselova.engines import start_on_torus
+
+        q, q_dot = start_on_torus(A, energy, constants, phases, signs)
+        return cls(A, q, q_dot, frame, normalize=True)
+
     def _set(self, **arrays: Array | None) -> None:
         for name, value in arrays.items():
             if value is not None:

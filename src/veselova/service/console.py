@@ -84,15 +84,16 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
 
 def print_torus(console: Console, torus: Torus) -> None:
     """Print the torus: constants, branch points, frequencies, periods."""
-    console.print(f"n = {torus.n}, genus {torus.n - 1}, energy {torus.energy:.12g}, regime {torus.regime}", highlight=False)
+    console.print(f"n = {torus.n}, genus {torus.phases.size}, energy {torus.energy:.12g}, regime {torus.regime}", highlight=False)
     _heading(console, "Branch points")
     table = _table("b", "origin", "value")
     for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
         table.add_row(f"b_{j}", origin, f"{value:.15g}")
     console.print(table)
     _heading(console, "Phases (cycles)")
-    table = _table("s", "z⁰", "per unit τ₁", "per unit t")
-    for s, row in enumerate(zip(torus.phases, torus.frequencies_tau1, torus.frequencies_t, strict=True), start=1):
+    table = _table("s", "z⁰", "per unit τ₁", "per unit t", "action J_s")
+    columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
+    for s, row in enumerate(zip(*columns, strict=True), start=1):
         table.add_row(str(s), *(f"{x:.15g}" for x in row))
     console.print(table)
     _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)

@@ -76,8 +76,9 @@ def comparison_of(problem: Veselova, document: Mapping[str, Any]) -> Comparison:
 def torus_of(document: Mapping[str, Any]) -> Torus:
     """Return the torus of a document."""
     values = dict(document)
-    for name in ("constants", "branch_points", "periods", "riemann_matrix", "frequencies_tau1", "frequencies_t", "phases"):
-        values[name] = np.array(values[name], dtype=np.float64)
+    for name, value in values.items():
+        if isinstance(value, list) and name != "origins":
+            values[name] = np.array(value, dtype=np.int64 if name == "signs" else np.float64)
     return Torus(**{**values, "origins": tuple(values["origins"])})
 
 
