@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import CLASSES, adversarial_start
 from truth import true_motion
 
-#: Seconds for the integration in binary128; A's over many orders make it very long for a few starts, which are then counted apart.
+#: Seconds for the integration in binary128; wide A's make it very long for a few starts, which are then counted apart.
 _TRUTH_S = 30
 
 
