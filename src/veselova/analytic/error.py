@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Rounding of one evaluation of the attitude, in ε; largest seen over the problem tables: 8 by angles, 20 by theta quotients.
+#: Rounding of one evaluation of the attitude, in ε; largest seen over the problem tables: 8 by angles, 20 by theta quotients, and
+#: there for each unit of the largest entry of T, whose rounding stands in an exponent.
 _EVALUATION = {"angles": 16.0, "theta": 40.0}
 
 #: Rounding of a phase in ε: the start's Abel map, the reduced advance, Newton's residual.
@@ -40,7 +41,8 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     phase = _PHASE * _EPSILON + rounding * elapsed[:, None] * frequencies
     along_flow = rounding * elapsed + clock.error(tau1)
     along_flow = rounding * elapsed + clock.error(tau1)
-    error = _EVALUATION[method] * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow
+    evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
+    error = evaluation * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
         error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
     return np.asarray(error)

@@ -40,6 +40,9 @@ METHODS = ("theta", "angles")
 #: Largest genus at which theta quotients cost no more than inversion in angles (g = 3: 15 µs a point both; g = 4: 80 against 15).
 _THETA_GENUS = 3
 
+#: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
+_LARGE_PERIOD = 8.0
+
 #: Gaps from which inversion in angles meets Jacobians as small as they are: with both neighbours near such a gap, phases hardly
 #: move with the angles.
 _NARROW_GAP = 1e-6
@@ -224,9 +227,16 @@ class Solution:
         """Return the theta route of this torus."""
         return ThetaQuotients(Theta(np.asarray(self.periods.riemann_matrix, dtype=np.float64)), self.frame)
 
+    @cached_property
+    def largest_period(self) -> float:
+        """Return max |T_ij|; it grows like log(1/width) of a narrow cut."""
+        return float(np.max(np.abs(self.quotients.theta.T)))
+
     def default_method(self) -> str:
-        """Return the cheaper route, or theta near a separatrix."""
-        return "theta" if self.curve.genus <= _THETA_GENUS or self.near_separatrix else "angles"
+        """Return theta near a separatrix, angles for a narrow cut, and otherwise the cheaper route."""
+        if self.near_separatrix:
+            return "theta"
+        return "theta" if self.curve.genus <= _THETA_GENUS and self.largest_period < _LARGE_PERIOD else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""
