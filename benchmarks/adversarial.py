@@ -5,12 +5,12 @@
 Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-290, and exactly zero), equal A's, coordinate subspaces, A's
 over twelve orders of magnitude, speeds from 1e-140 to 1e140; to ten radians or twenty cycles of the fastest phase. Prints per
 class how many there were and how many could not be solved, the largest true error of the frame, the largest reported one, and
-the largest true error over the one reported at the same time (the stated slack is 2); then the starts that broke a promise.
+the largest true error over the one reported at the same time (the stated slack is 2); then the starts that broke a promise. Wide
+A's can make the integration endless; such starts are counted as "without truth".
 """
 
 from __future__ import annotations
 
-import signal
 import sys
 import warnings
 from collections import defaultdict
@@ -26,13 +26,6 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import CLASSES, adversarial_start
 from truth import true_motion
 
-#: Seconds for the integration in binary128; wide A's make it very long for a few starts, which are then counted apart.
-_TRUTH_S = 30
-
-
-def _stop(*_: object) -> None:
-    raise TimeoutError
-
 
 def time_unit(problem: vs.Veselova) -> float:
     """Return the time of a radian of turning, or of two cycles of the fastest phase where that is shorter."""
@@ -44,7 +37,6 @@ def main(count: int, seed: int) -> None:
     rows: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     failures: dict[str, int] = defaultdict(int)
     unverified: dict[str, int] = defaultdict(int)
-    signal.signal(signal.SIGALRM, _stop)
     broken = []
     for i in range(count):
         rng = np.random.default_rng([seed, i])
@@ -58,15 +50,12 @@ def main(count: int, seed: int) -> None:
             failures[name] += 1
             broken.append((i, name, n, f"{type(error).__name__}: {error}"[:150]))
             continue
-        signal.alarm(_TRUTH_S)
         try:
             with np.errstate(all="ignore"):
                 frame = true_motion(problem, times)[0]
         except TimeoutError:
             unverified[name] += 1
             continue
-        finally:
-            signal.alarm(0)
         error = np.max(np.abs(found.frame - frame), axis=(1, 2))
         ratio = float(np.max(error / found.error))
         rows[name].append((float(np.max(error)), float(np.max(found.error)), ratio))

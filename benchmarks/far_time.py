@@ -23,7 +23,7 @@ FAR = 1e6
 
 def main() -> None:
     print("n    modes   set-up s   one attitude ms   integrating s (scaled)      ratio      error   unguarded differs    floor")
-    for n in (2, 3, 4, 5):
+    for n in (2, 3, 4, 5, 6):
         rng = np.random.default_rng(n)
         problem = vs.Veselova(np.exp(rng.uniform(0, np.log(5), n)), rng.normal(size=n), rng.normal(size=n), normalize=True)
         speed = float(np.linalg.norm(problem.q_dot))

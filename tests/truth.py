@@ -17,6 +17,9 @@ from veselova.mechanics.veselova import Veselova
 
 Array = NDArray[np.float64]
 
+#: Steps from one time to the next before giving up: minutes. A's over many orders of magnitude can ask for as many.
+_MOST_STEPS = 20_000
+
 _CONTEXT = mpmath.MPContext()
 _CONTEXT.dps = 45
 
@@ -92,7 +95,9 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Arr
         integrator.state[:] = [quad(x) for x in start]
         indices = np.flatnonzero(times >= 0) if direction > 0 else np.flatnonzero(times < 0)[::-1]
         for index in indices:
-            integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed))
+            outcome = integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed), max_steps=_MOST_STEPS)[0]
+            if outcome != hy.taylor_outcome.time_limit:
+                raise TimeoutError(f"integration in binary128 ended with {outcome}")
             results[index] = [float(x) for x in integrator.state]
     true_frame = np.empty((times.size, n, n))
     true_frame[:, :, 0] = results[:, :n]

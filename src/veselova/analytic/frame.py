@@ -81,10 +81,12 @@ def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: V
     count, genus, number = directions.shape
     result = np.empty((count, genus + 1, genus + 1, number))
     for d in range(number):
-        step = directions[:, :, d] * (_STEP / 2)
+        # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
+        length = _STEP / np.maximum(1.0, np.max(np.abs(directions[:, :, d]), axis=1))
+        step = directions[:, :, d] * (length[:, None] / 2)
         upper, lower = attitude(points + step), attitude(points - step)
-        result[:, :, 0, d] = (upper.q - lower.q) / _STEP
-        result[:, :, 1:, d] = (upper.normals - lower.normals) / _STEP
+        result[:, :, 0, d] = (upper.q - lower.q) / length[:, None]
+        result[:, :, 1:, d] = (upper.normals - lower.normals) / length[:, None, None]
     return result.reshape(count, -1, number)
 
 

@@ -43,9 +43,9 @@ _THETA_GENUS = 3
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
 
-#: Gaps from which inversion in angles meets Jacobians as small as they are: with both neighbours near such a gap, phases hardly
-#: move with the angles.
-_NARROW_GAP = 1e-6
+#: Gaps from which angles are left to theta quotients: with both neighbours near such a gap, phases hardly move with the angles.
+#: At 1e-12 angles still give 1e-12, but take the longer there the narrower the gap; theta sums are cheap up to genus three only.
+_NARROW_GAP, _NARROW_GAP_HIGH_GENUS = 1e-6, 1e-12
 
 #: Largest genus at which theta sums are taken there all the same.
 _SEPARATRIX_GENUS = 7
@@ -143,7 +143,8 @@ class Solution:
     @property
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
-        return self.curve.narrowest_gap < _NARROW_GAP and self.curve.genus <= _SEPARATRIX_GENUS
+        narrow = _NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
+        return self.curve.narrowest_gap < narrow and self.curve.genus <= _SEPARATRIX_GENUS
 
     @cached_property
     def mean_rate(self) -> float:
