@@ -80,16 +80,15 @@ class Moving:
         )
 
     def moved(self, axis: int, distance: Fraction) -> Moving:
-        """Return the part with q_i scaled by 1 + ``distance``, or set to ``distance``·q̇_i where q_i = 0 (in units of |q̇|)."""
-        q_squared, v_squared, qv = list(self.q_squared), self.v_squared, list(self.qv)
-        directions = self.directions
-        if q_squared[axis] != 0:
-            q_squared[axis] *= (1 + distance) ** 2
-            qv[axis] *= 1 + distance
-        else:  # q_i = s q̇_i with s = distance/|q̇|, a rational number near it
-            s = distance / _near_root(sum(v_squared, Fraction()))
-            q_squared[axis], qv[axis] = s * s * v_squared[axis], s * v_squared[axis]
-            if s < 0:  # q_i keeps its sign by the choice of the direction
+        """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that."""
+        q_squared, qv, directions = list(self.q_squared), list(self.qv), self.directions
+        square, product, v_squared = q_squared[axis], qv[axis], self.v_squared[axis]
+        if square >= distance**2 * sum(q_squared, Fraction()):
+            q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
+        else:
+            s = distance / _near_root(sum(self.v_squared, Fraction()))
+            q_squared[axis], qv[axis] = square + 2 * s * product + s * s * v_squared, product + s * v_squared
+            if (square + s * product if square else s) < 0:  # q_i keeps its sign by the choice of the direction
                 directions = directions.copy()
                 directions[:, axis] = -directions[:, axis]
         return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), directions=directions)

@@ -5,19 +5,28 @@ from __future__ import annotations
 from typing import Any
 
 from veselova.analytic.precision import Extended, Values
-from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["zeros_between_poles"]
+__all__ = ["TooFewDigits", "zeros_between_poles"]
 
-#: Newton's method doubles the digits; before, a bracket over many orders of magnitude is halved in the logarithm.
+#: Newton's method doubles the digits; where it leaves the bracket, that is halved in the logarithm.
 _MOST_STEPS = 300
+
+#: Where a bracket still begins at zero, its logarithm is halved down to this part of its end.
+_LEAST_PART = 1e-30
+
+#: A bracket over more than this is not one in which Newton's method converges quadratically.
+_WIDE_BRACKET = 1e3
+
+
+class TooFewDigits(Exception):
+    """The sums cancel below the digits of the arithmetic, so that an iteration does not settle: ask again with more."""
 
 
 def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmetic: Extended) -> list[Any]:
     """Return the zeros of f between increasing poles and the poles of weight zero, all increasing: m−1 numbers for m poles.
 
     They are the eigenvalues of diag(p) restricted to √w⊥ (κ = 0), or those of diag(p) − √w√wᵀ but the lowest (κ = 1), to
-    the digits of ``arithmetic`` relative to the largest pole. Raises InternalContradiction where the iteration does not settle.
+    the digits of ``arithmetic`` relative to the largest pole. Raises TooFewDigits.
     """
     live = [(p, w) for p, w in zip(poles, weights, strict=True) if w > 0]
     zeros = [p for p, w in zip(poles, weights, strict=True) if not w > 0]
@@ -25,43 +34,51 @@ def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmeti
 
 
 def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Extended) -> Any:
-    """Return the zero between poles a and a+1 by Newton's method for (x−p_a)(p_{a+1}−x) f(x), which has no pole there."""
-    (low, lower_weight), (high, upper_weight) = live[a], live[a + 1]
+    """Return the zero between poles a and a+1, found as its distance from the nearer one."""
+    (low, _), (high, _) = live[a], live[a + 1]
     width = high - low
-    # Distances to all other poles are sums of positive terms, from whichever end of the interval is nearer.
-    before = [(low - pole, weight) for pole, weight in live[:a]]
-    beyond = [(pole - high, weight) for pole, weight in live[a + 2 :]]
     if width == 0:
         return low
-    below = width * lower_weight / (lower_weight + upper_weight)
-    least, most = 0 * width, width
-    tiny = width * arithmetic.epsilon
-    for _ in range(_MOST_STEPS):
-        above = width - below
-        rest, slope = 0 * below + constant, 0 * below
-        for distances, sign, own in ((before, 1, below), (beyond, -1, above)):
-            for distance, weight in distances:
-                inverse = 1 / (distance + own)
-                term = weight * inverse
-                rest, slope = rest + sign * term, slope - term * inverse
-        value = lower_weight * above - upper_weight * below + below * above * rest
+    lower = [(low - pole, weight) for pole, weight in reversed(live[: a + 1])]
+    upper = [(pole - high, weight) for pole, weight in live[a + 1 :]]
+    if _scaled(lower, upper, constant, width, width / 2)[0] <= 0:
+        return low + _distance(lower, upper, constant, width, arithmetic)
+    return high - _distance(upper, lower, -constant, width, arithmetic)
+
+
+def _scaled(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: int, width: Any, own: Any) -> tuple[Any, Any]:
+    """Return δ(width−δ) h(δ) and its derivative, h = κ + Σ_near w/(d+δ) − Σ_far w/(d+width−δ); both lists start at d = 0.
+
+    All distances are sums of positive terms, and the product has no pole on [0, width].
+    """
+    other = width - own
+    rest, slope = 0 * own + constant, 0 * own
+    for distances, sign, to_end in ((near, 1, own), (far, -1, other)):
+        for distance, weight in distances[1:]:
+            inverse = 1 / (distance + to_end)
+            term = weight * inverse
+            rest, slope = rest + sign * term, slope - term * inverse
+    near_weight, far_weight = near[0][1], far[0][1]
+    value = near_weight * other - far_weight * own + own * other * rest
+    return value, (other - own) * rest + own * other * slope - near_weight - far_weight
+
+
+def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: int, width: Any, arithmetic: Extended) -> Any:
+    """Return the zero δ of h in (0, width/2] to the digits of the arithmetic relative to itself: bracketed Newton steps."""
+    least, most = 0 * width, width / 2
+    own = width * near[0][1] / (near[0][1] + far[0][1])
+    own = min(own, most)
+    for step in range(_MOST_STEPS):
+        value, derivative = _scaled(near, far, constant, width, own)
         if value == 0:
-            return low + below
-        derivative = (above - below) * rest + below * above * slope - lower_weight - upper_weight
-        least, most = (below, most) if value > 0 else (least, below)
-        new = below - value / derivative if derivative < 0 else 2 * most
-        if not least <= new <= most:
-            new = _middle(least, most, width, tiny, arithmetic)
-        change, below = abs(new - below), new
-        if change <= 4 * arithmetic.epsilon * min(below, width - below) or most - least <= tiny:
-            return low + below
-    raise InternalContradiction("the zero of a secular function was not found")
-
-
-def _middle(least: Any, most: Any, width: Any, tiny: Any, arithmetic: Extended) -> Any:
-    """Return a point between: the middle, or near an end of [0, width] the middle of the logarithms of the distances from it."""
-    if most <= width / 2:
-        return arithmetic.sqrt(most * max(least, tiny))
-    if least >= width / 2:
-        return width - arithmetic.sqrt((width - least) * max(width - most, tiny))
-    return (least + most) / 2
+            return own
+        least, most = (own, most) if value > 0 else (least, own)
+        new = own - value / derivative if derivative < 0 else 2 * most
+        # Towards a nearly double zero at the pole Newton's method only halves the distance, which may be 1e-300.
+        slow = step % 4 == 3 and most > _WIDE_BRACKET * least
+        if slow or not (least <= new <= most and new > 0):
+            new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
+        change, own = abs(new - own), new
+        if change <= 4 * arithmetic.epsilon * own:
+            return own
+    raise TooFewDigits

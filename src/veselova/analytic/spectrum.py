@@ -20,7 +20,7 @@ import numpy as np
 
 from veselova.analytic.precision import Extended, Values, extended
 from veselova.analytic.reduction import Moving
-from veselova.analytic.secular import zeros_between_poles
+from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
 
 __all__ = ["Resolved", "Spectrum", "resolved", "spectrum"]
@@ -30,6 +30,9 @@ _COINCIDE = -290
 
 #: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by 1e-16) for the sums themselves.
 _SPARE = 12
+
+#: Sums can cancel to the square of the smallest coordinate: digits go to this many times what the widths ask for.
+_MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def spectrum(moving: Moving, digits: int) -> Spectrum:
             needed = wanted + math.ceil(-float(found.arithmetic.log(narrowest)) / math.log(10))
         if found is not None and working >= min(needed, most):
             return found
-        if working > most:
+        if working > _MOST_ROUNDS * most:
             raise InternalContradiction("the spectra do not settle")
         working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
 
@@ -128,15 +131,18 @@ def _digits_between(moving: Moving) -> int:
 
 
 def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
-    """Return the spectra at one precision; None where it is too low for c_1 = 0 to come out as an eigenvalue."""
+    """Return the spectra at one precision; None where it is too low for iterations to settle, or for c_1 = 0 to come out."""
     q, v, rate = _tangent(moving, arithmetic)
     inverse = arithmetic.array([1 / a for a in moving.A])
-    points = zeros_between_poles(inverse, q * q, 0, arithmetic)
-    along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
-    spheroconic = arithmetic.array(points)
-    if abs(1 - np.sum(along * along / spheroconic)) > 10.0**-digits:
+    try:
+        points = zeros_between_poles(inverse, q * q, 0, arithmetic)
+        along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
+        spheroconic = arithmetic.array(points)
+        if abs(1 - np.sum(along * along / spheroconic)) > 10.0**-digits:
+            return None
+        constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
+    except TooFewDigits:
         return None
-    constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
     return Spectrum(arithmetic, inverse, q, v, arithmetic.array([0, *constants]), spheroconic, rate)
 
 

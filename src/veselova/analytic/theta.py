@@ -17,7 +17,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,9 +81,7 @@ class Theta:
         """Return the x with a term above e^−39 of the largest: where T is large (a narrow cut) ε = ½ makes all of them small."""
         S = self._parts[0]
         shift = np.array([epsilon[i] / 2 for i in self._split[0]])
-        nearest = np.array(list(product(*[(-h, h) if h else (0.0,) for h in shift.tolist()])))
-        least = float(np.min(np.sum((nearest @ S) * nearest, axis=1))) if shift.size else 0.0
-        return lattice_points(S, np.sqrt(_EXPONENT / np.pi + least), shift)
+        return lattice_points(S, np.sqrt(_EXPONENT / np.pi + _small_norm(S, shift)), shift)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
@@ -167,6 +165,17 @@ def _cheapest_waves(T: Array) -> tuple[int, ...]:
             if count < best_count:
                 best, best_count = F, count
     return best
+
+
+def _small_norm(form: Array, shift: Array) -> float:
+    """Return xᵀ form x for a short x of Z^d + shift: rounding from the last coordinate on (Babai's nearest plane)."""
+    upper = np.linalg.cholesky(form).T
+    x, norm = np.zeros(shift.size), 0.0
+    for i in range(shift.size - 1, -1, -1):
+        centre = -(upper[i, i + 1 :] @ x[i + 1 :]) / upper[i, i]
+        x[i] = np.rint(centre - shift[i]) + shift[i]
+        norm += float(upper[i, i] * (x[i] - centre)) ** 2
+    return norm
 
 
 def lattice_points(form: Array, radius: float, shift: Array) -> Array:
