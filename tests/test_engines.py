@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from draws import random_problem
+from draws import adversarial_start, random_problem
 from problems import TABLE, Case, tagged
 from truth import true_motion
 from veselova import Unsolved, Veselova, compare, solve, torus
@@ -125,6 +125,17 @@ def test_a_body_at_rest_stands_still(engine: str) -> None:
     assert not found.tau1.any()
     with pytest.raises(Unsolved, match="at-rest"):
         torus(problem)
+
+
+@pytest.mark.parametrize("seed", range(28))
+def test_adversarial_starts_are_served_honestly(seed: int) -> None:
+    name, problem = adversarial_start(np.random.default_rng([2024, seed]), 2 + seed % 4)
+    fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
+    times = np.array([-5, 0, 0.1, 1, 5]) * min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
+    found = solve(problem, times)
+    frame = true_motion(problem, times)[0]
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error), name
+    assert np.max(found.error) < 1e-9, name
 
 
 def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:

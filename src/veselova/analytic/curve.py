@@ -94,7 +94,8 @@ class Curve:
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least gap but the lowest, divided by b_{2g}: how near a separatrix is; 1 for genus one."""
-        even = np.arange(2, 2 * self.genus, 2)
-        gaps = [float(gap / self.branch_points[-1]) for gap in self.differences[even, even + 1]]
-        return min(gaps, default=1.0)
+        """Return the least inner gap against the wider of its two cuts: how near a separatrix is; 1 for genus one."""
+        j = np.arange(2, 2 * self.genus, 2)
+        gaps, before, after = (self.differences[j + k, j + k + 1] for k in (0, -1, 1))
+        ratios = [float(gap / (gap + max(cut, other))) for gap, cut, other in zip(gaps, before, after, strict=True)]
+        return min(ratios, default=1.0)

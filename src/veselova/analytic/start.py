@@ -32,11 +32,12 @@ def start(spectrum: Spectrum, curve: Curve) -> Start:
     signs = []
     for i, (position, velocity) in enumerate(zip(spectrum.q, spectrum.q_prime, strict=True)):
         b = curve.place["I", i]
-        lower_end, angle = b % 2 == 1, angles[curve.cut_of(b) - 1]
-        if position == 0:  # the root passes zero with ψ: upwards along sn at ψ = 0, downwards along cn at ψ = π
+        lower_end, s = b % 2 == 1, curve.cut_of(b) - 1
+        if position == 0 or spectrum.spheroconic[s] == spectrum.inverse[i]:
+            # The root passes zero with ψ: upwards along sn at ψ = 0, downwards along cn at ψ = π.
             signs.append((1 if velocity > 0 else -1) * (1 if lower_end else -1))
-        else:
-            root_positive = lower_end or angle < curve.arithmetic.pi
+        else:  # along cn it is positive on the way up, which ψ rounded to π no longer tells
+            root_positive = lower_end or increasing[s]
             signs.append((1 if position > 0 else -1) * (1 if root_positive else -1))
     return Start(curve.arithmetic.array(angles), curve.arithmetic.array(signs))
 
@@ -60,4 +61,4 @@ def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
     dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
     v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
     psi = xp.pi * v / jacobi.quarter
-    return psi if increasing or psi == 0 else 2 * xp.pi - psi
+    return psi if increasing else 2 * xp.pi - psi
