@@ -38,7 +38,10 @@ def eigenvalues(found: Spectrum) -> tuple[list[Any], list[Any]]:
     basis = (xp.array(np.eye(n).tolist()) - np.outer(w, w) * (2 / sum(w * w)))[:, :-1]
     position = basis.T @ (basis * found.inverse[:, None])
     along = basis.T @ found.q_prime
-    return xp.symmetric_eigenvalues(position), xp.symmetric_eigenvalues(position - np.outer(along, along))
+    with mpmath.workdps(xp.digits + 6):
+        matrices = (mpmath.matrix(values.tolist()) for values in (position, position - np.outer(along, along)))
+        spheroconic, constants = (sorted(mpmath.eigsy(matrix, eigvals_only=True)) for matrix in matrices)
+    return spheroconic, constants
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)

@@ -16,13 +16,14 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Arithmetic, Values
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
-__all__ = ["AbelJacobi"]
+__all__ = ["NARROW_GAP", "AbelJacobi"]
 
 #: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches its neighbour.
 _MOST_STEPS = 100
 
-#: Relative gaps from which a failure to settle is the curve's, not ours.
-_NARROW_GAP = 1e-6
+#: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near such a gap, phases hardly
+#: move with the angles.
+NARROW_GAP = 1e-6
 
 #: A residual of this many ε per unit of z is rounding.
 _SETTLED = 8.0
@@ -104,7 +105,7 @@ class AbelJacobi:
             stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < 1e4 * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
         gap = self.periods.curve.narrowest_gap
-        if gap < _NARROW_GAP:  # both neighbours can be near it, where phases hardly move with their angles
+        if gap < NARROW_GAP:
             raise Unsolved(
                 "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,7 @@ class Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
         differences = points[None, :] - points[:, None]
-        origins = tuple(BranchPoint("I" if kind == "I" else "c", index) for _, kind, index in spectrum.branch_points)
+        origins = tuple(BranchPoint(kind, index) for _, kind, index in spectrum.branch_points)
         return cls(arithmetic, arithmetic.array(points), arithmetic.array(differences), origins)
 
     @property
@@ -74,16 +74,23 @@ class Curve:
 
     def layout(self, kind: Literal["I", "c"]) -> Layout:
         """Return where the branch points of one kind stand."""
+        return self._layouts[kind]
+
+    @cached_property
+    def _layouts(self) -> dict[Literal["I", "c"], Layout]:
+        return {"I": self._layout("I"), "c": self._layout("c")}
+
+    def _layout(self, kind: Literal["I", "c"]) -> Layout:
         count = self.genus + 1 if kind == "I" else self.genus
         places = np.array([self.place[kind, index] for index in range(count)])
-        own_cut, cuts = (places + 1) // 2 - 1, np.arange(self.genus)[:, None]
+        own_cut, cuts = self.cut_of(places) - 1, np.arange(self.genus)[:, None]
         others = [self.origins[j + 1 if j % 2 == 1 else j - 1] if j > 0 else None for j in places]
         mate = np.array([other.index if other is not None and other.kind == kind else -1 for other in others])
         beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
         return Layout(places, own_cut, cuts == own_cut, mate, beyond, np.where(places <= 2 * cuts + 1, 1, -1))
 
-    def cut_of(self, j: int) -> int:
-        """Return the cut s = 1…g that ends at b_j, j ≥ 1."""
+    def cut_of(self, j: Any) -> Any:
+        """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for b_0, which ends none."""
         return (j + 1) // 2
 
     @cached_property

@@ -27,7 +27,6 @@ _RATE = 4.0
 #: The same where they carry guard digits: 30 digits in the leading and the following double.
 _GUARDED_RATE = 1e-30
 
-
 #: Rounding of the principal axes and of the data along them, in units of the conditioning floor.
 _AXES_ROUNDING = 8.0
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: Modes below this fraction of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
-#: Modes before giving up, and what a mode and a torus cost: 300 MB and a minute at genus five.
+#: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
 #: Modes that bring the inverse clock near its answer before all of them are summed.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -147,11 +147,6 @@ class Extended(Arithmetic):
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
         return self._context.det(self._context.matrix(matrix.tolist()))
-
-    def symmetric_eigenvalues(self, matrix: Values) -> list[Any]:
-        """Return the eigenvalues of a real symmetric matrix, increasing."""
-        values: Iterable[Any] = self._context.eigsy(self._context.matrix(matrix.tolist()), eigvals_only=True)
-        return sorted(values)
 
     def _from_matrix(self, matrix: Any) -> Values:
         result = np.empty((matrix.rows, matrix.cols), dtype=object)

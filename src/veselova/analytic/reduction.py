@@ -67,7 +67,8 @@ class Moving:
         """Return the part without a direction that moves less than any digit shows."""
         keep = [i for i in range(self.size) if i != axis]
         unit = self.A[keep[-1]]
-        return Moving(
+        return replace(
+            self,
             A=tuple(self.A[i] / unit for i in keep),
             q_squared=tuple(self.q_squared[i] for i in keep),
             v_squared=tuple(self.v_squared[i] for i in keep),
@@ -76,7 +77,6 @@ class Moving:
             axes=tuple(self.axes[i] for i in keep),
             unit=self.unit * unit,
             frozen=(*self.frozen, self.A[axis] * self.unit),
-            turned=self.turned,
         )
 
     def moved(self, axis: int, distance: Fraction) -> Moving:
@@ -97,8 +97,6 @@ class Moving:
 def moving_part(problem: Veselova) -> Moving:
     """Return what moves of a problem with q̇ ≠ 0: at least two directions, and no more than two for any value of A."""
     exact = problem.exact
-    along = _dot(exact.q, exact.q_dot) / _dot(exact.q, exact.q)
-    velocity = [d - along * x for x, d in zip(exact.q, exact.q_dot, strict=True)]
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
         groups.setdefault(a, []).append(i)
@@ -106,7 +104,7 @@ def moving_part(problem: Veselova) -> Moving:
     frozen: list[Fraction] = []
     for a in sorted(groups, reverse=True):
         axes = groups[a]
-        turned = _turned([exact.q[i] for i in axes], [velocity[i] for i in axes])
+        turned = _turned([exact.q[i] for i in axes], [exact.tangent[i] for i in axes])
         frozen += [a] * (len(axes) - len(turned))
         for squares, vector in turned:
             direction = np.zeros(problem.n)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
@@ -43,9 +43,9 @@ _THETA_GENUS = 3
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
 
-#: Gaps from which angles are left to theta quotients: with both neighbours near such a gap, phases hardly move with the angles.
-#: At 1e-12 angles still give 1e-12, but take the longer there the narrower the gap; theta sums are cheap up to genus three only.
-_NARROW_GAP, _NARROW_GAP_HIGH_GENUS = 1e-6, 1e-12
+#: Above genus three a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still
+#: give 1e-12, at a cost that grows as the gap closes, and theta sums are cheap up to genus three only.
+_NARROW_GAP_HIGH_GENUS = 1e-12
 
 #: Largest genus at which theta sums are taken there all the same.
 _SEPARATRIX_GENUS = 7
@@ -60,7 +60,7 @@ _MOST_CYCLES = 1e28
 #: Cycles from which the Fourier clock is cheaper than panels, by genus (set-up of the modes against inversions along the orbit).
 _FOURIER_FROM = {1: 3.0, 2: 10.0, 3: 30.0, 4: 200.0, 5: 3e3}
 
-#: Cycles that panels are willing to cover: about a minute at g = 7.
+#: Cycles that panels are willing to cover: minutes.
 _PANEL_CYCLES = 5e4
 
 
@@ -109,7 +109,7 @@ class Solution:
 
     @property
     def regime(self) -> str:
-        """Return ``separatrix``, ``closed-cut`` (two A's or two c's coincide, or some direction is frozen) or ``generic``."""
+        """Return ``separatrix``, ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
         if self.separatrices:
             return "separatrix"
         return "closed-cut" if self.moving.turned or self.moving.frozen else "generic"
@@ -136,14 +136,21 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
         if not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        A, start = to_float(self.moving.A), np.asarray(self.spectrum.q, dtype=np.float64)
-        weight = self.quotients.position(z) ** 2 @ A
-        return np.asarray(np.sqrt(weight / (start**2 @ A)) / float(self.spectrum.clock_rate))
+        return 1 / self._clock_rate(self.quotients.position(z))
+
+    def _clock_rate(self, q: Array) -> Array:
+        """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, W fixed by the start."""
+        start = np.asarray(self.spectrum.q, dtype=np.float64)
+        return np.asarray(float(self.spectrum.clock_rate) * np.sqrt((start**2 @ self._A) / (q**2 @ self._A)))
+
+    @cached_property
+    def _A(self) -> Array:
+        return to_float(self.moving.A)
 
     @property
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
-        narrow = _NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
+        narrow = NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
         return self.curve.narrowest_gap < narrow and self.curve.genus <= _SEPARATRIX_GENUS
 
     @cached_property
@@ -231,7 +238,7 @@ class Solution:
     @cached_property
     def largest_period(self) -> float:
         """Return max |T_ij|; it grows like log(1/width) of a narrow cut."""
-        return float(np.max(np.abs(self.quotients.theta.T)))
+        return float(np.max(np.abs(self.periods.riemann_matrix)))
 
     def default_method(self) -> str:
         """Return theta near a separatrix, angles for a narrow cut, and otherwise the cheaper route."""
@@ -270,11 +277,7 @@ class Solution:
         frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
-        # dτ₁/dt = √(W/(q,Aq)), W fixed by the start; q' = Σ v_k n_k.
-        A = to_float(moving.A)
-        weight, start = attitude.q**2 @ A, float(np.asarray(self.spectrum.q**2, dtype=np.float64) @ A)
-        rate = float(self.spectrum.clock_rate) * np.sqrt(start / weight)
-        q_dot = (attitude.q_prime @ moving.directions.T) * rate[:, None]
+        q_dot = (attitude.q_prime @ moving.directions.T) * self._clock_rate(attitude.q)[:, None]
         if attitude.spheroconic.size:
             frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
             spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)

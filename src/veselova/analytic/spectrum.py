@@ -4,7 +4,7 @@ I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinat
 eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the components x_s of q' along the eigenvectors,
 c_1 = 0 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s). So they interlace by
 construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact rationals, and digits are added until every
-difference of neighbours has enough of its own: a gap of 1e-300 is as good as one of 0.1.
+difference of neighbours has enough of its own: a gap of 1e-280 is as good as one of 0.1.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -52,9 +52,9 @@ class Spectrum:
     clock_rate: Any
 
     @cached_property
-    def branch_points(self) -> list[tuple[Any, str, int]]:
+    def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
         """Return (value, kind, index), increasing; c_1 = 0 first, and a c before the I that it equals."""
-        labelled = [(c, "c", k) for k, c in enumerate(self.constants)]
+        labelled: list[tuple[Any, Literal["I", "c"], int]] = [(c, "c", k) for k, c in enumerate(self.constants)]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
         return sorted(labelled, key=lambda item: item[:2])
 

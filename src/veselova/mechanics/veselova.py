@@ -71,7 +71,8 @@ class Veselova:
             given_frame = None if given_frame is None else axes.T @ given_frame
             _require_finite(velocity, exact_q_dot)
             exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
-        position, velocity = _unit(position), _tangent(exact_q, exact_q_dot, n)
+        exact = ExactState(diagonal, exact_q, exact_q_dot, natural=given_frame is None)
+        position, velocity = _unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
@@ -79,7 +80,7 @@ class Veselova:
         else:
             start_frame = _admissible_frame(given_frame, position)
         self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes)
-        object.__setattr__(self, "exact", ExactState(diagonal, exact_q, exact_q_dot, natural=given_frame is None))
+        object.__setattr__(self, "exact", exact)
         given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
         object.__setattr__(self, "given", {name: plain(value) for name, value in given.items() if value is not None})
 
@@ -187,9 +188,10 @@ class ExactState:
     natural: bool
 
     @cached_property
-    def wedge(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Return q∧q̇, which does not see the component of q̇ along q."""
-        return tuple(tuple(a * d - b * c for b, d in zip(self.q, self.q_dot)) for a, c in zip(self.q, self.q_dot))
+    def tangent(self) -> tuple[Fraction, ...]:
+        """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
+        along = sum((a * b for a, b in zip(self.q, self.q_dot)), Fraction()) / sum((a * a for a in self.q), Fraction())
+        return tuple(b - along * a for a, b in zip(self.q, self.q_dot))
 
 
 def _principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
@@ -226,13 +228,12 @@ def _unit(vector: Array) -> Array:
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
-def _tangent(q: tuple[Fraction, ...], q_dot: tuple[Fraction, ...], n: int) -> Array:
-    """Return q̇ − (q,q̇)/(q,q) q, rounded once: exactly zero where q̇ is along q."""
-    along = sum((a * b for a, b in zip(q, q_dot, strict=True)), Fraction()) / sum((a * a for a in q), Fraction())
+def _rounded(tangent: tuple[Fraction, ...]) -> Array:
     try:
-        return to_float([b - along * a for a, b in zip(q, q_dot, strict=True)])
+        return to_float(tangent)
     except OverflowError:
-        raise InvalidInput(("q_dot",), "a tangential part within the range of a float", f"{n} entries beyond it") from None
+        given = f"{len(tangent)} entries beyond it"
+        raise InvalidInput(("q_dot",), "a tangential part within the range of a float", given) from None
 
 
 def _require_finite(velocity: Array, given: tuple[Fraction, ...]) -> None:

@@ -121,7 +121,7 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
 
     document = _document(file)
     request = read_request(TrajectoryRequest, document)
-    _check_suffixes(output, plot)
+    _check_files(output, plot)
     with _within_budget(document):
         trajectory = requested_trajectory(request)
     if output:
@@ -153,7 +153,7 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     if isinstance(document, dict):
         document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
     request = read_request(ComparisonRequest, document)
-    _check_suffixes(output, plot)
+    _check_files(output, plot)
     with _within_budget(document):
         comparison = requested_comparison(request)
     if output:
@@ -232,7 +232,7 @@ _WRITERS = (".npz", ".csv", ".parquet", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
 
 
-def _check_suffixes(output: Path | None, plot: Path | None) -> None:
+def _check_files(output: Path | None, plot: Path | None) -> None:
     """Refuse a file name before the work, not after it."""
     from veselova.mechanics.errors import InvalidInput
 

@@ -6,7 +6,6 @@ problem is built, so that Python, command line and HTTP refuse the same input wi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
@@ -163,18 +162,18 @@ def _fault(item: Any) -> InvalidInput:
         return InvalidInput(path, "no field of this name", f"the field {shown(str(path[-1]))}")
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return InvalidInput(path, "a JSON object", given)
-    required: Sequence[str] = {
-        "literal_error": [str(item.get("ctx", {}).get("expected", ""))],
-        "bool_type": ["true or false"],
-        "too_short": ["at least one entry"],
-        "too_long": [f"at most {len(OUTPUTS)} entries"],
-        "float_type": ["a number"],
-        "int_type": ["a whole number"],
-        "greater_than": ["a number greater than 0"],
-        "finite_number": ["a finite number"],
-        "list_type": ["a list"],
-        "string_type": ["a string"],
-        "greater_than_equal": ["15 (more digits are not offered yet)"],
-        "less_than_equal": ["15 (more digits are not offered yet)"],
-    }.get(kind, [item["msg"][:1].lower() + item["msg"][1:]])
-    return InvalidInput(path, required[0], given)
+    required: str = {
+        "literal_error": str(item.get("ctx", {}).get("expected", "")),
+        "bool_type": "true or false",
+        "too_short": "at least one entry",
+        "too_long": f"at most {len(OUTPUTS)} entries",
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "greater_than": "a number greater than 0",
+        "finite_number": "a finite number",
+        "list_type": "a list",
+        "string_type": "a string",
+        "greater_than_equal": "15 (more digits are not offered yet)",
+        "less_than_equal": "15 (more digits are not offered yet)",
+    }.get(kind, item["msg"][:1].lower() + item["msg"][1:])
+    return InvalidInput(path, required, given)
