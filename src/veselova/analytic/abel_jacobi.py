@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE, Arithmetic, Values
+from veselova.analytic.precision import DOUBLE, Arithmetic, Sums, Values
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
 __all__ = ["NARROW_GAP", "AbelJacobi"]
@@ -24,6 +25,10 @@ _MOST_STEPS = 100
 #: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near such a gap, phases hardly
 #: move with the angles.
 NARROW_GAP = 1e-6
+
+#: Digits of the angles from which an inversion in balls starts, and those that a doubling by Newton's method loses to the slopes.
+_COARSE_DIGITS = 12
+_LOST_DIGITS = 2
 
 #: A residual of this many ε per unit of z is rounding.
 _SETTLED = 8.0
@@ -42,31 +47,28 @@ class AbelJacobi:
         return self.periods.arithmetic
 
     @cached_property
-    def _sines(self) -> Values:
-        """Return the coefficients of sin(mψ_s) in z_k, m ≥ 1, shape (g·M, g): rows (s, m), columns k."""
+    def _sines(self) -> Sums:
+        """Return ψ ↦ z − ψ/2π, whose coefficients have the axes s, m, k."""
         series = self.periods.angle_series[:, :, 1:]
         orders = self.arithmetic.array(list(range(1, series.shape[2] + 1)))
-        return np.ascontiguousarray((series / orders).transpose(1, 2, 0).reshape(-1, self.periods.genus))
+        return self.arithmetic.sine_sums(np.ascontiguousarray((series / orders).transpose(1, 2, 0)))
 
     @cached_property
-    def _cosines(self) -> Values:
-        """Return the coefficients of cos(mψ_s) in dz_k/dψ_s, shape (g, M, g): s, m, k."""
-        return np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0))
-
-    def _waves(self, psi: Values, first: int) -> Values:
-        orders = self.arithmetic.array(list(range(first, self.periods.angle_series.shape[2])))
-        return psi[..., None] * orders
+    def _cosines(self) -> Sums:
+        """Return ψ ↦ ∂z_k/∂ψ_s, whose coefficients have the axes s, m, k."""
+        return self.arithmetic.cosine_sums(np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0)))
 
     def map(self, psi: Values) -> Values:
         """Return z for angles ψ of shape (N, g); ψ_s + 2π adds one to z_s."""
-        xp, shape = self.arithmetic, psi.shape
-        waves = xp.sin(self._waves(psi, 1)).reshape(shape[0], -1)
-        return np.asarray(psi / (2 * xp.pi) + waves @ self._sines)
+        return np.asarray(psi / (2 * self.arithmetic.pi) + self._complete(self._sines(psi)))
 
     def jacobian(self, psi: Values) -> Values:
         """Return ∂z_k/∂ψ_s for angles of shape (N, g), shape (N, g, g) with k before s."""
-        waves = self.arithmetic.cos(self._waves(psi, 0))
-        return np.stack([waves[:, s] @ self._cosines[s] for s in range(self.periods.genus)], axis=2)
+        return np.swapaxes(self._complete(np.swapaxes(self._cosines(psi), 1, 2)), 1, 2)
+
+    def _complete(self, sums: Values) -> Values:
+        """Return sums of series, last axis k, with what they leave out."""
+        return self.arithmetic.widened(sums, self.periods.series_truncation) if self.arithmetic.rigorous else sums
 
     def invert(self, z: Values) -> Values:
         """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
@@ -76,7 +78,10 @@ class AbelJacobi:
         xp = self.arithmetic
         cycles = xp.floor(z)
         reduced = z - cycles
-        psi = self._newton(reduced) if self.coarse is None else self._refine(reduced, self.coarse)
+        if self.coarse is None:
+            psi = self._newton(reduced)
+        else:
+            psi = self._enclose(reduced, self.coarse) if xp.rigorous else self._refine(reduced, self.coarse)
         return np.asarray(psi + 2 * xp.pi * cycles)
 
     def _newton(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,3 +128,36 @@ class AbelJacobi:
             if np.max(np.abs(residual)) <= _SETTLED * xp.epsilon:
                 return np.asarray(psi)
         raise InternalContradiction("the Abel–Jacobi inversion did not settle in extended precision")
+
+    def _enclose(self, z: Values, coarse: AbelJacobi) -> Values:
+        """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the map has but one."""
+        xp: Any = self.arithmetic
+        centre = xp.midpoints(z)
+        nearest = coarse.invert(DOUBLE.array(centre))
+        psi, inverses = xp.array(nearest), xp.array(np.linalg.inv(coarse.jacobian(nearest)))
+        digits = known = _COARSE_DIGITS  # of the angles, and of the inverse slopes
+        while 2 * digits < xp.digits + _LOST_DIGITS:
+            if digits >= 2 * known:
+                with xp.at(digits) as working:
+                    inverses, known = _inverses(self.jacobian(psi), working), digits
+            digits += known - _LOST_DIGITS
+            with xp.at(digits + _LOST_DIGITS) as working:
+                psi = working.midpoints(psi - _applied(inverses, self.map(psi) - centre))
+        excess = self.map(psi) - z
+        with xp.at(digits) as working:
+            reach = working.around_zero(2 * _applied(inverses, excess))
+            slopes = self.jacobian(psi + reach)
+            inverses = _inverses(slopes, working)
+            rest = _applied(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
+        step = rest - _applied(inverses, excess)
+        if not xp.inside(step, reach):
+            raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
+        return np.asarray(psi + step)
+
+
+def _inverses(matrices: Values, arithmetic: Any) -> Values:
+    return np.stack([arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix))) for matrix in matrices])
+
+
+def _applied(matrices: Values, vectors: Values) -> Values:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.precision import Values
+from veselova.analytic.spectrum import Spectrum
 
 __all__ = ["Clock", "ClockRate"]
 
@@ -29,11 +30,20 @@ class ClockRate:
     inversion: AbelJacobi
     scale: Any
 
+    @classmethod
+    def of(cls, spectrum: Spectrum, inversion: AbelJacobi) -> ClockRate:
+        """Return the rate whose scale follows from its value at the start."""
+        curve, fine = inversion.periods.curve, spectrum.arithmetic
+        squared = fine.number(1)
+        for s, point in enumerate(spectrum.spheroconic):
+            squared = squared * point / fine.number(curve.branch_points[2 * s + 2])
+        return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * fine.sqrt(squared))))
+
     def at(self, psi: Values) -> Values:
         """Return dt/dτ₁ at angles of shape (N, g)."""
         rate = 0 * psi[:, 0] + self.scale
         for s, cut in enumerate(self.inversion.periods.cuts):
-            rate = rate * self._factor(s, cut.distances(psi[:, s])[2])
+            rate = rate * self._factor(s, cut.distances(psi[:, s])[0])
         return np.asarray(rate)
 
     def _factor(self, s: int, below: Values) -> Values:
@@ -51,7 +61,7 @@ class ClockRate:
         g, result = periods.genus, []
         for s, cut in enumerate(periods.cuts):
             psi = cut.nodes(count)
-            _, _, below, above = cut.distances(psi)
+            below, above = cut.distances(psi)
             forms = cut.forms(below, above) * self._factor(s, below)
             angles = np.zeros((count, g), dtype=psi.dtype)
             angles[:, s] = psi

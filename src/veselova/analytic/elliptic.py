@@ -68,7 +68,7 @@ class Jacobi:
     @cached_property
     def _terms(self) -> int:
         """Number of terms m ≥ 1 with nome^(m²−m) above the precision; the exponent is what is left after growth to v = K/2."""
-        return int(np.ceil(0.5 + np.sqrt(0.25 + np.log(1 / self.arithmetic.epsilon) / -float(self._log_nome))))
+        return int(np.ceil(0.5 + np.sqrt(0.25 + self.arithmetic.nats / -float(self._log_nome))))
 
     def _constants(self) -> tuple[Any, Any, Any]:
         """Return θ_2/q^{1/4}, θ_3, θ_4 at zero."""
@@ -79,7 +79,15 @@ class Jacobi:
             power = xp.exp(self._log_nome * m * m)
             t2 = t2 + 2 * xp.exp(self._log_nome * (m * m + m))
             t3, t4 = t3 + 2 * power, t4 + 2 * (-1) ** m * power
-        return t2, t3, t4
+        return self._truncated(t2, t3, t4)
+
+    def _truncated(self, *sums: Any) -> tuple[Any, ...]:
+        """Return sums over m ≤ M = _terms with what they leave out.
+
+        Omitted terms are at most 4 nome^(m²+m/2), all that y ≤ ¼|log nome| adds included, so together below nome^(M²−M).
+        """
+        bound = self.arithmetic.exp(self._log_nome * (self._terms**2 - self._terms))
+        return tuple(self.arithmetic.widened(value, bound) for value in sums)
 
     def _trigonometric(self, psi: Values) -> tuple[Values, Values, Values]:
         """sn = (θ3/θ2) θ1(z)/θ4(z), cn = (θ4/θ2) θ2(z)/θ4(z), dn = (θ4/θ3) θ3(z)/θ4(z), z = πv/2K = ψ/2."""
@@ -95,6 +103,7 @@ class Jacobi:
             z1, z2 = z1 + 2 * (-1) ** m * odd * xp.sin((2 * m + 1) * z), z2 + 2 * odd * xp.cos((2 * m + 1) * z)
             wave = even * xp.cos(2 * m * z)
             z3, z4 = z3 + wave, z4 + (-1) ** m * wave
+        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
         return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
 
     def _hyperbolic(self, psi: Values) -> tuple[Values, Values, Values]:
@@ -113,4 +122,5 @@ class Jacobi:
             z2 = z2 + growth * (1 + xp.exp(-(4 * m + 2) * y))
             wave = xp.exp(q * m * m + (2 * m - 1) * y) * (1 + xp.exp(-4 * m * y))
             z3, z4 = z3 + wave, z4 + (-1) ** m * wave
+        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
         return (t3 / t4) * z1 / z2, (t2 / t4) * z4 / z2, (t2 / t3) * z3 / z2

@@ -39,7 +39,6 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     phase = _PHASE * _EPSILON + rounding * elapsed[:, None] * frequencies
     along_flow = rounding * elapsed + clock.error(tau1)
-    along_flow = rounding * elapsed + clock.error(tau1)
     evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
     error = evaluation * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them

@@ -103,22 +103,27 @@ class _Point:
         return self.frame.periods.curve
 
     @cached_property
-    def on_cuts(self) -> tuple[Values, Values, Values, Values]:
-        """Return sn, cn, λ_s−b_{2s−1} and b_{2s}−λ_s, each (N, g)."""
-        of_cuts = [cut.distances(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
-        sn, cn, below, above = (np.stack(values, axis=1) for values in zip(*of_cuts, strict=True))
-        return sn, cn, below, above
+    def own_roots(self) -> Values:
+        """Return the signed root of |λ_s−b_i| at each end b_i, i = 1…2g, of its cut s: along sn or cn, (N, 2g)."""
+        of_cuts = [cut.roots(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
+        return np.stack([root for roots in of_cuts for root in roots], axis=1)
+
+    @cached_property
+    def on_cuts(self) -> tuple[Values, Values]:
+        """Return λ_s−b_{2s−1} and b_{2s}−λ_s, each (N, g)."""
+        squares = self.own_roots * self.own_roots
+        return squares[:, ::2], squares[:, 1::2]
 
     @cached_property
     def to_points(self) -> Values:
         """Return |λ_s−b_i|, (N, g, 2g+1)."""
-        _, _, below, above = self.on_cuts
+        below, above = self.on_cuts
         return np.stack([cut.to_branch_points(below[:, s], above[:, s]) for s, cut in enumerate(self.frame.periods.cuts)], axis=1)
 
     @cached_property
     def between(self) -> Values:
         """Return |λ_s−λ_j|, (N, g, g), one for s = j: what is above λ_s on its cut, the stretch between, what is below λ_j."""
-        _, _, below, above = self.on_cuts
+        below, above = self.on_cuts
         g = self.curve.genus
         stretch = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
         forward = above[:, :, None] + stretch + below[:, None, :]
@@ -126,14 +131,6 @@ class _Point:
         result = np.where(lower, forward, np.swapaxes(forward, 1, 2))
         result[:, np.arange(g), np.arange(g)] = self.curve.arithmetic.number(1)
         return result
-
-    @cached_property
-    def own_roots(self) -> Values:
-        """Return the signed root of |λ_s−b_i| at each end b_i, i = 1…2g, of its cut s: along sn or cn, (N, 2g)."""
-        sn, cn, below, above = self.on_cuts
-        waves, distances = (np.stack(pair, axis=2).reshape(sn.shape[0], -1) for pair in ((sn, cn), (below, above)))
-        roots = self.curve.arithmetic.sqrt(distances)
-        return np.asarray(np.where(waves < 0, -roots, roots))
 
 
 def _attitude(frame: Frame, psi: Values) -> Attitude:
@@ -144,7 +141,7 @@ def _attitude(frame: Frame, psi: Values) -> Attitude:
     order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
     normals = np.swapaxes(position, 1, 2) @ velocity[:, :, order]
     lower_ends = frame.periods.curve.branch_points[1 : 2 * g : 2]
-    return Attitude(q, normals, v[:, order], lower_ends + point.on_cuts[2])
+    return Attitude(q, normals, v[:, order], lower_ends + point.on_cuts[0])
 
 
 def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) -> tuple[Values, Values]:

@@ -63,17 +63,23 @@ class Interval:
         xp = self.curve.arithmetic
         return xp.array([xp.pi * (2 * i + 1) / (2 * count) for i in range(count)])
 
-    def distances(self, psi: Values) -> tuple[Values, Values, Values, Values]:
-        """Return sn, cn (signed) and λ−b_1, b_2−λ (each accurate relative to itself) at angles ψ."""
-        before, width, _ = self._widths
+    def roots(self, psi: Values) -> tuple[Values, Values]:
+        """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate relative to itself."""
+        xp, (before, width, _) = self.curve.arithmetic, self._widths
         sn, cn, _ = self.jacobi(psi)
+        root = xp.sqrt(width)
         if before is None:
-            return sn, cn, width * sn * sn, width * cn * cn
+            return root * sn, root * cn
         denominator = before + width * cn * cn
-        return sn, cn, width * (before / denominator) * sn * sn, width * ((width + before) / denominator) * cn * cn
+        return root * xp.sqrt(before / denominator) * sn, root * xp.sqrt((width + before) / denominator) * cn
+
+    def distances(self, psi: Values) -> tuple[Values, Values]:
+        """Return λ−b_1 and b_2−λ at angles ψ."""
+        below, above = self.roots(psi)
+        return below * below, above * above
 
     def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
-        """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``, the inverse of ``distances``."""
+        """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
         before, _, _ = self._widths
         # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
         if before is not None:
@@ -92,6 +98,34 @@ class Interval:
         nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
         roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
         return self.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1), roots[:, 2:-1:2] * roots[:, 3::2]
+
+    @cached_property
+    def strip(self) -> float:
+        """Return πK'/2K, half the width of the strip about the real ψ-axis in which the forms are analytic."""
+        return math.pi * self.jacobi.aspect / 2
+
+    @cached_property
+    def ends_of_strip(self) -> tuple[Any, Any]:
+        """Return b_1−λ and λ−b_2 at the edge of that strip, at ψ = 0 and π.
+
+        There |sn²v| = 1/k, so λ, a Möbius function of sn²v, runs on a circle about the interval that meets the real axis
+        at sn² = −1/k and 1/k, between b_0 and b_1, and between b_2 and b_3.
+        """
+        before, width, _ = self._widths
+        square = 1 / self.curve.arithmetic.sqrt(self.jacobi.k_squared)
+        if before is None:
+            return width * square, width * (square - 1)
+        left = width * before * square / (before + width * (1 + square))
+        return left, width * (width + before) * (square - 1) / (before - width * (square - 1))
+
+    def bound_in_strip(self) -> Values:
+        """Return upper bounds of |du_k/dψ| in the strip, (g,): on that circle |λ−x| lies between its values on the real axis."""
+        left, right = self.ends_of_strip
+        d, j, zeros, last = self.curve.differences, self.left, self.curve.midpoints, 2 * self.curve.genus
+        outside = [d[i, j] - left for i in range(j - 1)] + [d[j + 1, i] - right for i in range(j + 3, last + 1)]
+        factors = [max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l])) for l in range(zeros.shape[1])]
+        common = self.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
+        return np.array([common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)], dtype=object)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
         """Return λ−ζ_l, l = 1…g−1, shape (N, g−1), with ζ_l the midpoint of gap l."""

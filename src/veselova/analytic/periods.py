@@ -52,21 +52,34 @@ class Periods:
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to the working precision.
 
-        Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits.
+        Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
+        bounded, half the strip is given up: the forms are unbounded at its edge.
         """
-        rate = np.pi * interval.jacobi.aspect
-        return int(np.ceil(np.log(1 / self.arithmetic.epsilon) / rate)) + _EXTRA_NODES
+        rate = interval.strip if self.arithmetic.rigorous else 2 * interval.strip
+        return int(np.ceil(self.arithmetic.nats / rate)) + _EXTRA_NODES
 
     def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (g, N): value = Σ_m h_m cos mψ."""
-        count = self.node_count(interval)
-        psi = interval.nodes(count)
-        values = interval.forms(*interval.distances(psi)[2:])
-        xp = self.arithmetic
-        waves = xp.cos(np.outer(psi, xp.array(list(range(count)))))
-        coefficients = values @ waves * 2 / count
-        coefficients[:, 0] = coefficients[:, 0] / 2
-        return np.asarray(coefficients)
+        psi = interval.nodes(self.node_count(interval))
+        coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
+        if self.arithmetic.rigorous:
+            coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._truncation(interval, 2))
+        return coefficients
+
+    def _truncation(self, interval: Interval, times: int) -> Values:
+        """Return 6 M_k e^(−times·Nβ)/(1−e^(−β)), with M_k the bound of form k in a strip of half width β, shape (g,).
+
+        |h_m| ≤ 2M e^(−mβ). Truncation after N coefficients and the aliases in those kept come to at most this with times = 1, at
+        any real ψ; the alias in h_0 alone with times = 2.
+        """
+        xp, count = self.arithmetic, self.node_count(interval)
+        decay = xp.exp(xp.number(-interval.strip))
+        return np.asarray(6 * interval.bound_in_strip() * decay ** (times * count) / (1 - decay))
+
+    @cached_property
+    def series_truncation(self) -> Values:
+        """Return bounds of what the angle series leave out of z_k, and of ∂z_k/∂ψ_s for all s together, shape (g,)."""
+        return np.asarray(sum(np.abs(self.inverse_cycles) @ self._truncation(cut, 1) for cut in self.cuts))
 
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:

@@ -6,11 +6,12 @@ are multiprecision numbers of an mpmath context that belongs to the arithmetic a
 
 from __future__ import annotations
 
+import math
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -22,12 +23,18 @@ __all__ = ["DOUBLE", "Arithmetic", "Double", "Extended", "extended"]
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
 
+#: A sum of waves as a function of angles.
+Sums = Callable[[Values], Values]
+
 
 class Arithmetic(ABC):
     """Elementary functions, constants and small linear algebra at one precision. Functions act entrywise on arrays."""
 
+    #: Whether numbers carry bounds of their own error, and every truncation has to be added to them.
+    rigorous: ClassVar[bool] = False
+
     digits: int
-    epsilon: float
+    epsilon: Any
     pi: Any
     sqrt: Callable[[Any], Any]
     exp: Callable[[Any], Any]
@@ -56,6 +63,44 @@ class Arithmetic(ABC):
     @abstractmethod
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
+
+    @property
+    def nats(self) -> float:
+        """Return the natural logarithm of the precision, 10^digits."""
+        return self.digits * math.log(10)
+
+    def widened(self, values: Any, bound: Any) -> Any:
+        """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
+        return values
+
+    def sine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
+        orders = self.array(list(range(1, coefficients.shape[1] + 1)))
+        flat = coefficients.reshape(-1, coefficients.shape[2])
+        return lambda psi: np.asarray(self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat)
+
+    def cosine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for coefficients (g, M, K)."""
+        orders = self.array(list(range(coefficients.shape[1])))
+
+        def sums(psi: Values) -> Values:
+            waves = self.cos(psi[..., None] * orders)
+            return np.stack([waves[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2)
+
+        return sums
+
+    def cosine_series(self, values: Values) -> Values:
+        """Return the c_km with Σ_m c_km cos mψ = value at the N midpoints ψ = π(2i+1)/2N of (0, π), shape (K, N) as values."""
+        count = values.shape[1]
+        table = self.cos(self.array(list(range(4 * count))) * (self.pi / (2 * count)))
+        waves = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)]
+        coefficients = self.product(values, waves) * 2 / count
+        coefficients[:, 0] = coefficients[:, 0] / 2
+        return np.asarray(coefficients)
+
+    def product(self, a: Values, b: Values) -> Values:
+        """Return the matrix product."""
+        return np.asarray(a @ b)
 
     def agm(self, a: Any, b: Any) -> Any:
         """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically from any ratio."""
@@ -109,7 +154,7 @@ class Extended(Arithmetic):
         self._context = mpmath.MPContext()
         self._context.dps = digits + self._GUARD
         self.digits = digits
-        self.epsilon = float(mpmath.mpf(10) ** -digits) if digits < 300 else 10.0**-300
+        self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
         for name in ("sqrt", "exp", "expm1", "log", "sin", "cos", "floor"):
             setattr(self, name, self._entrywise(getattr(self._context, name), 1))

@@ -9,9 +9,10 @@ for has none, and its motion is the same to all of them (on a separatrix, for as
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,9 @@ class Moving:
     """A start along its m moving directions, sorted by decreasing A; exact, with A in units of its smallest entry.
 
     A (m,) · q_squared, v_squared, qv (m,): q_a², q̇_a², q_aq̇_a; q_a ≥ 0, and q̇_a > 0 where q_a = 0, by choice of the directions
-    directions (n, m) orthonormal columns along the problem's principal axes · axes (m,) the principal axis of each, or the first
-    of its group · unit: the A that counts as 1 · frozen: the A's of the directions that do not move, in the problem's units
+    vectors (m,) orthogonal vectors, of any length, as {principal axis: component} · n the number of principal axes
+    axes (m,) the principal axis of each, or the first of its group · unit: the A that counts as 1
+    frozen: the A's of the directions that do not move, in the problem's units
     turned: whether a group of equal A's has two moving directions
     """
 
@@ -38,11 +40,20 @@ class Moving:
     q_squared: tuple[Fraction, ...]
     v_squared: tuple[Fraction, ...]
     qv: tuple[Fraction, ...]
-    directions: Array
+    vectors: tuple[Mapping[int, Fraction], ...]
+    n: int
     axes: tuple[int, ...]
     unit: Fraction
     frozen: tuple[Fraction, ...]
     turned: bool
+
+    @cached_property
+    def directions(self) -> Array:
+        """Return the orthonormal columns along the vectors, shape (n, m)."""
+        directions = np.zeros((self.n, self.size))
+        for column, vector in zip(directions.T, self.vectors, strict=True):
+            column[list(vector)] = _unit(list(vector.values()))
+        return directions
 
     @property
     def size(self) -> int:
@@ -73,7 +84,7 @@ class Moving:
             q_squared=tuple(self.q_squared[i] for i in keep),
             v_squared=tuple(self.v_squared[i] for i in keep),
             qv=tuple(self.qv[i] for i in keep),
-            directions=self.directions[:, keep],
+            vectors=tuple(self.vectors[i] for i in keep),
             axes=tuple(self.axes[i] for i in keep),
             unit=self.unit * unit,
             frozen=(*self.frozen, self.A[axis] * self.unit),
@@ -81,7 +92,7 @@ class Moving:
 
     def moved(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that."""
-        q_squared, qv, directions = list(self.q_squared), list(self.qv), self.directions
+        q_squared, qv, vectors = list(self.q_squared), list(self.qv), list(self.vectors)
         square, product, v_squared = q_squared[axis], qv[axis], self.v_squared[axis]
         if square >= distance**2 * sum(q_squared, Fraction()):
             q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
@@ -89,9 +100,8 @@ class Moving:
             s = distance / _near_root(sum(self.v_squared, Fraction()))
             q_squared[axis], qv[axis] = square + 2 * s * product + s * s * v_squared, product + s * v_squared
             if (square + s * product if square else s) < 0:  # q_i keeps its sign by the choice of the direction
-                directions = directions.copy()
-                directions[:, axis] = -directions[:, axis]
-        return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), directions=directions)
+                vectors[axis] = {i: -x for i, x in vectors[axis].items()}
+        return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), vectors=tuple(vectors))
 
 
 def moving_part(problem: Veselova) -> Moving:
@@ -100,23 +110,22 @@ def moving_part(problem: Veselova) -> Moving:
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
         groups.setdefault(a, []).append(i)
-    kept: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Array]] = []
+    kept: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]] = []
     frozen: list[Fraction] = []
     for a in sorted(groups, reverse=True):
         axes = groups[a]
         turned = _turned([exact.q[i] for i in axes], [exact.tangent[i] for i in axes])
         frozen += [a] * (len(axes) - len(turned))
         for squares, vector in turned:
-            direction = np.zeros(problem.n)
-            direction[axes] = vector
-            kept.append((a, axes[0], squares, direction))
+            kept.append((a, axes[0], squares, dict(zip(axes, vector, strict=True))))
     unit = kept[-1][0]
     return Moving(
         A=tuple(a / unit for a, _, _, _ in kept),
         q_squared=tuple(squares[0] for _, _, squares, _ in kept),
         v_squared=tuple(squares[1] for _, _, squares, _ in kept),
         qv=tuple(squares[2] for _, _, squares, _ in kept),
-        directions=np.stack([direction for _, _, _, direction in kept], axis=1),
+        vectors=tuple(vector for _, _, _, vector in kept),
+        n=problem.n,
         axes=tuple(axis for _, axis, _, _ in kept),
         unit=unit,
         frozen=tuple(frozen),
@@ -124,15 +133,17 @@ def moving_part(problem: Veselova) -> Moving:
     )
 
 
-def _turned(q: Sequence[Fraction], velocity: Sequence[Fraction]) -> list[tuple[tuple[Fraction, Fraction, Fraction], Array]]:
-    """Return (q², q̇², qq̇) and the unit vector of each moving direction of one group: q first, then q̇ across it."""
+def _turned(
+    q: Sequence[Fraction], velocity: Sequence[Fraction]
+) -> list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]]:
+    """Return (q², q̇², qq̇) and a vector along each moving direction of one group: q first, then q̇ across it."""
     qq, qv, vv = _dot(q, q), _dot(q, velocity), _dot(velocity, velocity)
     zero = Fraction()
     if qq == 0:
-        return [((zero, vv, zero), _unit(velocity))] if vv else []
-    turned = [((qq, qv * qv / qq, qv), _unit(q))]
+        return [((zero, vv, zero), velocity)] if vv else []
+    turned: list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]] = [((qq, qv * qv / qq, qv), q)]
     if vv * qq != qv * qv:
-        turned.append(((zero, vv - qv * qv / qq, zero), _unit([qq * d - qv * x for x, d in zip(q, velocity, strict=True)])))
+        turned.append(((zero, vv - qv * qv / qq, zero), [qq * d - qv * x for x, d in zip(q, velocity, strict=True)]))
     return turned
 
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,23 +113,10 @@ class Solution:
             return "separatrix"
         return "closed-cut" if self.moving.turned or self.moving.frozen else "generic"
 
-    def _mean(self, inversion: AbelJacobi) -> Any:
-        """Return F_0 in the arithmetic of an inversion."""
-        return self._rate(inversion).mean
-
-    def _rate(self, inversion: AbelJacobi) -> ClockRate:
-        """Return dt/dτ₁ = √((q,Aq)/W) = Π√(λ_s/b_{2s}) · scale; the scale follows from the value at the start."""
-        xp = inversion.arithmetic
-        spectrum, curve = self.spectrum, inversion.periods.curve
-        squared: Any = spectrum.arithmetic.number(1)
-        for s, point in enumerate(spectrum.spheroconic):
-            squared = squared * point / spectrum.arithmetic.number(curve.branch_points[2 * s + 2])
-        return ClockRate(inversion, xp.number(1 / (spectrum.clock_rate * spectrum.arithmetic.sqrt(squared))))
-
     @cached_property
     def rate(self) -> ClockRate:
         """Return dt/dτ₁ on the torus, in double precision."""
-        return self._rate(self.inversion)
+        return ClockRate.of(self.spectrum, self.inversion)
 
     def rate_at(self, z: Array) -> Array:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
@@ -172,7 +158,7 @@ class Solution:
     def _guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
         periods = Periods(Curve.of(self.spectrum, extended(_GUARD_DIGITS)))
-        mean = self._mean(AbelJacobi(periods, coarse=self.inversion))
+        mean = ClockRate.of(self.spectrum, AbelJacobi(periods, coarse=self.inversion)).mean
         flows = (LinearFlow.of(self._origin, periods.frequencies), LinearFlow.of(self._origin, periods.frequencies / mean))
         return flows[0], flows[1], float(mean)
 

@@ -18,12 +18,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from veselova.analytic.precision import Extended, Values, extended
+from veselova.analytic.precision import Arithmetic, Extended, Values, extended
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["Resolved", "Spectrum", "resolved", "spectrum"]
+__all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
 
 #: Branch points nearer than this part of the largest count as one: differences are doubles, and their squares roots of them.
 _COINCIDE = -290
@@ -43,7 +43,7 @@ class Spectrum:
     constants (m−1,) c_1 = 0 … c_{m−1} · spheroconic (m−1,) λ's at t = 0 · clock_rate dτ₁/dt at t = 0
     """
 
-    arithmetic: Extended
+    arithmetic: Arithmetic
     inverse: Values
     q: Values
     q_prime: Values
@@ -101,7 +101,7 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> R
             moving = moving.moved(axis, opening if distance is None else distance)
 
 
-def _threshold(arithmetic: Extended) -> Any:
+def _threshold(arithmetic: Arithmetic) -> Any:
     return arithmetic.number(10) ** _COINCIDE
 
 
@@ -132,13 +132,13 @@ def _digits_between(moving: Moving) -> int:
 
 def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
     """Return the spectra at one precision; None where it is too low for iterations to settle, or for c_1 = 0 to come out."""
-    q, v, rate = _tangent(moving, arithmetic)
+    q, v, rate = tangent(moving, arithmetic)
     inverse = arithmetic.array([1 / a for a in moving.A])
     try:
         points = zeros_between_poles(inverse, q * q, 0, arithmetic)
         along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
         spheroconic = arithmetic.array(points)
-        if abs(1 - np.sum(along * along / spheroconic)) > 10.0**-digits:
+        if abs(1 - np.sum(along * along / spheroconic)) > arithmetic.number(10) ** -digits:
             return None
         constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
     except TooFewDigits:
@@ -146,7 +146,7 @@ def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | N
     return Spectrum(arithmetic, inverse, q, v, arithmetic.array([0, *constants]), spheroconic, rate)
 
 
-def _tangent(moving: Moving, arithmetic: Extended) -> tuple[Values, Values, Any]:
+def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/dt.
 
     (dτ₁/dt)² = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(Aq,q), exact until the root is taken.

@@ -21,13 +21,17 @@ class Start:
     signs: Values
 
 
-def start(spectrum: Spectrum, curve: Curve) -> Start:
-    """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum."""
-    ends = [value for value, _, _ in spectrum.branch_points]
+def start(spectrum: Spectrum, curve: Curve, enclosed: Spectrum | None = None) -> Start:
+    """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum.
+
+    ``enclosed`` is the same spectrum in the arithmetic of a curve in balls, which decides nothing.
+    """
+    numbers = spectrum if enclosed is None else enclosed
+    ends = [value for value, _, _ in numbers.branch_points]
     increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
     angles = [
         _angle(Interval(curve, 2 * s + 1), x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
-        for s, x in enumerate(spectrum.spheroconic)
+        for s, x in enumerate(numbers.spheroconic)
     ]
     signs = []
     for i, (position, velocity) in enumerate(zip(spectrum.q, spectrum.q_prime, strict=True)):
@@ -59,6 +63,11 @@ def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
     sn_squared, cn_squared = cut.squares(xp.number(below), xp.number(above))
     jacobi = cut.jacobi
     dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
-    v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
+    # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
+    if sn_squared <= cn_squared:
+        v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
+    else:  # sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn
+        reflected = jacobi.complement / dn_squared
+        v = jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))
     psi = xp.pi * v / jacobi.quarter
     return psi if increasing else 2 * xp.pi - psi

@@ -70,7 +70,7 @@ def _actions(periods: Periods) -> Array:
     places = curve.layout("c").places
     for cut in periods.cuts:
         psi = cut.nodes(periods.node_count(cut))
-        _, _, below, above = cut.distances(psi)
+        below, above = cut.distances(psi)
         to_constants = cut.to_branch_points(below, above)[:, places]
         common, of_gaps = cut.measure(below, above)
         actions.append(np.mean(common * to_constants[:, 0] * np.prod(to_constants[:, 1:] / of_gaps, axis=1)))
@@ -82,7 +82,7 @@ def _monomial_cycles(periods: Periods) -> Array:
     g, columns = periods.genus, []
     for s, cut in enumerate(periods.cuts):
         psi = cut.nodes(periods.node_count(cut))
-        _, _, below, above = cut.distances(psi)
+        below, above = cut.distances(psi)
         point = periods.curve.branch_points[2 * s + 1] + below
         common, of_gaps = cut.measure(below, above)
         density = common / np.prod(of_gaps, axis=1)

@@ -64,14 +64,15 @@ class Veselova:
         position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_q_dot)
         if not normalize:
             _require_on_sphere(position, velocity)
-        given_frame = None if frame is None else to_float(exact_matrix(frame, ("frame",), n))
+        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), n)
+        given_frame = None if exact_frame is None else to_float(exact_frame)
         if axes is not None:
             with np.errstate(over="ignore", invalid="ignore"):  # refused below
                 position, velocity = axes.T @ position, axes.T @ velocity
             given_frame = None if given_frame is None else axes.T @ given_frame
             _require_finite(velocity, exact_q_dot)
             exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
-        exact = ExactState(diagonal, exact_q, exact_q_dot, natural=given_frame is None)
+        exact = ExactState(diagonal, exact_q, exact_q_dot, exact_frame)
         position, velocity = _unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
@@ -179,13 +180,18 @@ class Veselova:
 class ExactState:
     """The data as exact rationals in principal axes, q not yet scaled and q_dot not yet projected.
 
-    ``natural``: the frame was left to us, so the constant rotation ℜ of (orth) is a sign matrix.
+    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the natural one was left to us
     """
 
     A: tuple[Fraction, ...]
     q: tuple[Fraction, ...]
     q_dot: tuple[Fraction, ...]
-    natural: bool
+    frame: tuple[tuple[Fraction, ...], ...] | None
+
+    @property
+    def natural(self) -> bool:
+        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a sign matrix."""
+        return self.frame is None
 
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:

@@ -1,0 +1,210 @@
+"""Ball arithmetic: every number is an interval, midpoint ± radius, that holds the exact value.
+
+The numbers are Arb's, through python-flint, whose precision is one global of the process: this file alone touches it. Work
+in balls goes inside ``with balls(digits):``, which sets the precision, keeps other threads out, and nests.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import flint
+import numpy as np
+
+from veselova.analytic.precision import Arithmetic, Sums, Values
+
+__all__ = ["Balls", "balls"]
+
+#: Guard digits within the working precision.
+_GUARD = 6
+
+#: Digits of quantities that only bound others, and terms beyond those that the decay of a series asks for.
+_COARSE_DIGITS = 20
+_EXTRA_TERMS = 6
+
+#: log10 √2: what a complex product of balls loses.
+_DIGITS_PER_TURN = 0.151
+
+_global = threading.RLock()
+
+
+def _entrywise(method: str) -> Any:
+    return np.frompyfunc(lambda x: getattr(flint.arb(x), method)(), 1, 1)
+
+
+class Balls(Arithmetic):
+    """Real balls with at least the given number of decimal digits; a function of a ball holds all its values there."""
+
+    rigorous: ClassVar[bool] = True
+    exp = staticmethod(_entrywise("exp"))
+    expm1 = staticmethod(_entrywise("expm1"))
+    log = staticmethod(_entrywise("log"))
+    sin = staticmethod(_entrywise("sin"))
+    cos = staticmethod(_entrywise("cos"))
+    #: Radicands are known to be nonnegative; their balls may reach below zero.
+    sqrt = staticmethod(np.frompyfunc(lambda x: flint.arb(x).nonnegative_part().sqrt(), 1, 1))
+    #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
+    floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
+
+    def __init__(self, digits: int) -> None:
+        self.digits = digits
+        self._bits = math.ceil((digits + _GUARD) * math.log2(10))
+        self._before: list[int] = []
+        with self:
+            self.pi = flint.arb.pi()
+            self.epsilon = flint.arb(10) ** -digits
+
+    def __enter__(self) -> Balls:
+        _global.acquire()
+        self._before.append(flint.ctx.prec)
+        flint.ctx.prec = self._bits
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        flint.ctx.prec = self._before.pop()
+        _global.release()
+
+    def number(self, value: Any) -> Any:
+        """Return a ball that holds a rational, float or mpmath number (these two are exact), or the given ball."""
+        if isinstance(value, Fraction):
+            return flint.arb(flint.fmpq(value.numerator, value.denominator))
+        if isinstance(value, np.generic):
+            value = value.item()
+        if hasattr(value, "man_exp") and not isinstance(value, flint.arb):  # an mpf
+            mantissa, exponent = value.man_exp
+            return flint.arb((mantissa, exponent))
+        return flint.arb(value)
+
+    def array(self, values: Any) -> Values:
+        """Return an object array of balls."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.shape, dtype=object)
+        for index, value in np.ndenumerate(given):
+            result[index] = self.number(value)
+        return result
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z)."""
+        return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
+
+    def agm(self, a: Any, b: Any) -> Any:
+        """Return the arithmetic–geometric mean of two positive numbers."""
+        return flint.arb(a).agm(flint.arb(b))
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a singular one."""
+        return self._array(_matrix(matrix).inv())
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+        return _matrix(matrix).det()
+
+    def product(self, a: Values, b: Values) -> Values:
+        """Return the matrix product."""
+        return self._array(_matrix(a) * _matrix(b))
+
+    def widened(self, values: Any, bound: Any) -> Any:
+        """Return the balls with their radii enlarged by |bound|."""
+        return values + _around_zero(bound)
+
+    def at(self, digits: int) -> Balls:
+        """Return the ball arithmetic of other digits."""
+        return balls(digits)
+
+    def around_zero(self, values: Values) -> Values:
+        """Return balls around zero that hold the values."""
+        return np.asarray(_around_zero(values))
+
+    def inside(self, inner: Values, outer: Values) -> bool:
+        """Return whether every ball lies in the interior of its partner."""
+        return all(b.contains_interior(a) for a, b in zip(inner.ravel(), outer.ravel(), strict=True))
+
+    def midpoints(self, values: Values) -> Values:
+        """Return the exact midpoints."""
+        return np.asarray(_midpoint(values))
+
+    def radii(self, values: Values) -> Values:
+        """Return upper bounds of the radii, as floats; what lies below their range becomes the least positive one."""
+        return np.asarray(_radius(values), dtype=np.float64)
+
+    def sine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K)."""
+        zero = np.zeros((coefficients.shape[0], 1, coefficients.shape[2]), dtype=object)
+        series = _Series(self, np.concatenate([zero, coefficients], axis=1))
+        return lambda psi: np.sum(series(psi, "imag"), axis=2)
+
+    def cosine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g)."""
+        series = _Series(self, coefficients)
+        return lambda psi: series(psi, "real")
+
+    @staticmethod
+    def _array(matrix: Any) -> Values:
+        rows = matrix.tolist()
+        result = np.empty((matrix.nrows(), matrix.ncols()), dtype=object)
+        for i, row in enumerate(rows):
+            result[i, :] = row
+        return result
+
+
+class _Series:
+    """The sums Σ_m c_smk e^{imψ_s}, m = 0…M−1, by Horner's rule.
+
+    Complex balls are rectangles, which grow by √2 with every turn: so midpoints alone go through the rule, with digits for
+    that growth, and the radii of ψ and of the coefficients enter by Σ|m c_m| and as they are. At a lower precision than the
+    coefficients', fewer terms are summed.
+    """
+
+    def __init__(self, arithmetic: Balls, coefficients: Values) -> None:
+        genus, self._terms, number = coefficients.shape
+        middle = _midpoint(coefficients)
+        self._arithmetic = arithmetic
+        self._polynomials = [[flint.acb_poly(middle[s, :, k].tolist()) for k in range(number)] for s in range(genus)]
+        with arithmetic.at(_COARSE_DIGITS):
+            size = np.abs(middle + flint.arb(0))
+            self._slack = np.sum(_around_zero(coefficients - middle), axis=1).T
+            self._steepness = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
+            self._beyond = _around_zero(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
+
+    def __call__(self, psi: Values, part: str) -> Values:
+        """Return the real or imaginary parts, shape (N, K, g)."""
+        genus, number = psi.shape[1], len(self._polynomials[0])
+        result = np.empty((psi.shape[0], number, genus), dtype=object)
+        centre = _midpoint(psi)
+        spread = _around_zero(psi - centre)
+        digits = math.ceil(flint.ctx.prec * math.log10(2))
+        terms = math.ceil(self._terms * digits / self._arithmetic.digits) + _EXTRA_TERMS
+        with self._arithmetic.at(digits + math.ceil(min(terms, self._terms) * _DIGITS_PER_TURN)):
+            for s in range(genus):
+                points = [flint.acb(x.cos(), x.sin()) for x in centre[:, s]]
+                for k, whole in enumerate(self._polynomials[s]):
+                    series = whole.truncate(terms) if terms < self._terms else whole
+                    result[:, k, s] = [getattr(series(point), part) for point in points]
+        result = result + self._slack + spread[:, None, :] * self._steepness
+        return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
+
+
+_around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
+_midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
+
+
+def _float_above(x: Any) -> float:
+    radius = float(flint.arb(x).rad().upper())
+    return math.nextafter(radius, math.inf) if radius else (0.0 if flint.arb(x).is_exact() else 5e-324)
+
+
+_radius = np.frompyfunc(_float_above, 1, 1)
+
+
+def _matrix(values: Values) -> Any:
+    return flint.arb_mat(values.shape[0], values.shape[1], values.ravel().tolist())
+
+
+@lru_cache(maxsize=64)
+def balls(digits: int) -> Balls:
+    """Return the ball arithmetic of the given digits; use it as a context manager around all work in it."""
+    return Balls(digits)

@@ -1,0 +1,70 @@
+"""The spectra of a start in balls: each zero shown to lie where it was found, by a change of sign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.balls import Balls, balls
+from veselova.analytic.precision import Values
+from veselova.analytic.spectrum import Resolved, Spectrum, tangent
+from veselova.mechanics.errors import Unsolved
+
+__all__ = ["enclosed"]
+
+#: Digits of the balls beyond those in which the zeros were found.
+_SPARE = 10
+
+#: Digits by which the first reach around a zero exceeds those it was found to; it then grows a thousandfold.
+_FIRST_REACH = 8
+_WIDENINGS = 6
+
+
+def enclosed(found: Resolved) -> Spectrum:
+    """Return the spectrum in balls; raises Unsolved where a zero cannot be enclosed.
+
+    Disjoint balls, as many as there are zeros, each with a change of sign of the secular function: each holds one.
+    """
+    coarse = found.spectrum
+    xp = balls(coarse.arithmetic.digits + _SPARE)
+    with xp:
+        q, v, rate = tangent(found.moving, xp)
+        inverse = xp.array([1 / a for a in found.moving.A])
+        points = _zeros(coarse.spheroconic, coarse.inverse, inverse, q * q, 0, xp)
+        along = [_component(s, coarse, q, v, inverse, points) for s in range(len(points))]
+        constants = _zeros(coarse.constants[1:], coarse.spheroconic, points, xp.array(along) ** 2, 1, xp)
+        zero = xp.array([0])
+        return Spectrum(xp, inverse, q, v, np.concatenate([zero, constants]), points, rate)
+
+
+def _component(s: int, coarse: Spectrum, q: Values, v: Values, inverse: Values, points: Values) -> Any:
+    """Return x_s = (q', m_s), m_s ∝ q_i/(λ_s−I_i), or E_i where λ_s is a pole that q does not feel."""
+    for i, pole in enumerate(coarse.inverse):
+        if coarse.spheroconic[s] == pole:
+            return v[i]
+    live = [i for i in range(len(inverse)) if coarse.q[i] > 0]
+    row = q[live] / (points[s] - inverse[live])
+    return np.sum(row * v[live]) / np.sum(row * row).sqrt()
+
+
+def _zeros(found: Values, coarse_poles: Values, poles: Values, weights: Values, constant: int, xp: Balls) -> Values:
+    """Return balls around the zeros of constant + Σ w_i/(x−p_i), which falls between its poles; a pole of weight zero is one."""
+    at_pole = dict(zip(coarse_poles, poles, strict=True))
+    live = np.array([not weight.is_zero() for weight in weights])
+
+    def secular(x: Any) -> Any:
+        return constant + np.sum(weights[live] / (x - poles[live]))
+
+    balls_found = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
+    return xp.array(balls_found)
+
+
+def _enclosed_zero(falling: Callable[[Any], Any], middle: Any, xp: Balls) -> Any:
+    reach = xp.number(10) ** -(xp.digits - _SPARE - _FIRST_REACH)
+    for _ in range(_WIDENINGS):
+        if falling(middle - reach) > 0 and falling(middle + reach) < 0:
+            return xp.widened(middle, reach)
+        reach = reach * 1000
+    raise Unsolved("not-enclosed", "a constant of motion or a spheroconic coordinate: no change of sign could be shown")
