@@ -18,24 +18,53 @@ if TYPE_CHECKING:
 
 __all__ = ["ENGINES", "compare", "solve", "start_on_torus", "torus"]
 
+#: Digits that can be asked for.
+FEWEST_DIGITS, MOST_DIGITS = 15, 1000
+
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
 
 
-def solve(problem: Veselova, times: Any, engine: str = "analytic", method: str | None = None) -> Trajectory:
+def solve(
+    problem: Veselova,
+    times: Any,
+    engine: str = "analytic",
+    method: str | None = None,
+    *,
+    digits: int = 15,
+    certified: bool = False,
+) -> Trajectory:
     """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration). ``method``: None for the engine's default;
     analytic: ``theta`` or ``angles``; numeric: ``dop853`` or ``taylor`` (extra ``fast``).
+    ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal with that many digits after the
+    point in q and frame, ``trajectory.decimals``. Data are taken at their word: strings exactly, doubles as the dyadic numbers
+    they store. ``certified`` (analytic): the error of every such number is a proven bound.
     Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem, BackendMissing without its library.
     """
     if not isinstance(problem, Veselova):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
     if not isinstance(engine, str) or engine not in ENGINES:
         raise InvalidInput(("engine",), f"one of {', '.join(ENGINES)}", shown(engine))
-    options = {} if method is None else {"method": method}
+    _require_precision(engine, digits, certified)
+    options: dict[str, Any] = {} if method is None else {"method": method}
+    if digits > FEWEST_DIGITS or certified:
+        options |= {"digits": digits, "certified": certified}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
     return answer
+
+
+def _require_precision(engine: str, digits: Any, certified: Any) -> None:
+    """Raise InvalidInput unless the engine has these digits, and bounds where they are asked for."""
+    if isinstance(digits, bool) or not isinstance(digits, int) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
+        raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", shown(digits))
+    if not isinstance(certified, bool):
+        raise InvalidInput(("certified",), "true or false", shown(certified))
+    if engine != "analytic" and digits > FEWEST_DIGITS:
+        raise InvalidInput(("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits))
+    if engine != "analytic" and certified:
+        raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
 def compare(problem: Veselova, times: Any, method: str | None = None) -> Comparison:

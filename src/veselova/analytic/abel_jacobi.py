@@ -68,7 +68,7 @@ class AbelJacobi:
 
     def _complete(self, sums: Values) -> Values:
         """Return sums of series, last axis k, with what they leave out."""
-        return self.arithmetic.widened(sums, self.periods.series_truncation) if self.arithmetic.rigorous else sums
+        return self.arithmetic.widened(sums, self.periods.series_truncation) if self.arithmetic.has_radii else sums
 
     def invert(self, z: Values) -> Values:
         """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
@@ -81,7 +81,7 @@ class AbelJacobi:
         if self.coarse is None:
             psi = self._newton(reduced)
         else:
-            psi = self._enclose(reduced, self.coarse) if xp.rigorous else self._refine(reduced, self.coarse)
+            psi = self._enclose(reduced, self.coarse) if xp.has_radii else self._refine(reduced, self.coarse)
         return np.asarray(psi + 2 * xp.pi * cycles)
 
     def _newton(self, z: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -39,7 +40,7 @@ def _entrywise(method: str) -> Any:
 class Balls(Arithmetic):
     """Real balls with at least the given number of decimal digits; a function of a ball holds all its values there."""
 
-    rigorous: ClassVar[bool] = True
+    has_radii: ClassVar[bool] = True
     exp = staticmethod(_entrywise("exp"))
     expm1 = staticmethod(_entrywise("expm1"))
     log = staticmethod(_entrywise("log"))
@@ -50,8 +51,8 @@ class Balls(Arithmetic):
     #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
     floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
 
-    def __init__(self, digits: int) -> None:
-        self.digits = digits
+    def __init__(self, digits: int, certified: bool) -> None:
+        self.digits, self.certified = digits, certified
         self._bits = math.ceil((digits + _GUARD) * math.log2(10))
         self._before: list[int] = []
         with self:
@@ -87,6 +88,9 @@ class Balls(Arithmetic):
             result[index] = self.number(value)
         return result
 
+    #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
+    atan2 = staticmethod(np.frompyfunc(lambda y, x: flint.arb.atan2(y, x), 2, 1))
+
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z)."""
         return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
@@ -113,7 +117,7 @@ class Balls(Arithmetic):
 
     def at(self, digits: int) -> Balls:
         """Return the ball arithmetic of other digits."""
-        return balls(digits)
+        return balls(digits, self.certified)
 
     def around_zero(self, values: Values) -> Values:
         """Return balls around zero that hold the values."""
@@ -127,9 +131,10 @@ class Balls(Arithmetic):
         """Return the exact midpoints."""
         return np.asarray(_midpoint(values))
 
-    def radii(self, values: Values) -> Values:
-        """Return upper bounds of the radii, as floats; what lies below their range becomes the least positive one."""
-        return np.asarray(_radius(values), dtype=np.float64)
+    def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
+        """Return (midpoints rounded to so many significant digits, radii that cover the rounding), arrays of Decimal."""
+        pairs = np.frompyfunc(lambda x: _decimal(flint.arb(x), digits), 1, 2)(values)
+        return np.asarray(pairs[0], dtype=object), np.asarray(pairs[1], dtype=object)
 
     def sine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K)."""
@@ -192,12 +197,13 @@ _around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upp
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
-def _float_above(x: Any) -> float:
-    radius = float(flint.arb(x).rad().upper())
-    return math.nextafter(radius, math.inf) if radius else (0.0 if flint.arb(x).is_exact() else 5e-324)
-
-
-_radius = np.frompyfunc(_float_above, 1, 1)
+def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
+    middle = x.mid()
+    rounded = Decimal(middle.str(digits, radius=False))
+    rounding = abs(middle - flint.arb(flint.fmpq(*rounded.as_integer_ratio())))
+    radius = (x.rad() + rounding).abs_upper()
+    # Six digits of a number printed to nearest, and one in the last of them on top.
+    return rounded, Decimal(radius.str(6, radius=False)) * Decimal("1.00001") if radius else Decimal(0)
 
 
 def _matrix(values: Values) -> Any:
@@ -205,6 +211,9 @@ def _matrix(values: Values) -> Any:
 
 
 @lru_cache(maxsize=64)
-def balls(digits: int) -> Balls:
-    """Return the ball arithmetic of the given digits; use it as a context manager around all work in it."""
-    return Balls(digits)
+def balls(digits: int, certified: bool = True) -> Balls:
+    """Return the ball arithmetic of the given digits; use it as a context manager around all work in it.
+
+    ``certified``: truncations are bounded, otherwise estimated from the last terms of each series, which takes half of them.
+    """
+    return Balls(digits, certified)

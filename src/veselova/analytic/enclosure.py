@@ -14,12 +14,15 @@ from veselova.mechanics.errors import Unsolved
 
 __all__ = ["enclosed"]
 
-#: Digits of the balls beyond those in which the zeros were found.
-_SPARE = 10
+#: Digits of the balls against those in which the zeros were found: differences of nearby zeros and poles enter what follows.
+_FINER = 2
 
-#: Digits by which the first reach around a zero exceeds those it was found to; it then grows a thousandfold.
-_FIRST_REACH = 8
-_WIDENINGS = 6
+#: Newton's steps from the zeros found to those digits.
+_STEPS = 2
+
+#: A zero is looked for within this many times what its value leaves open, then a thousandfold, so often.
+_FIRST_REACH = 4
+_WIDENINGS = 5
 
 
 def enclosed(found: Resolved) -> Spectrum:
@@ -28,7 +31,7 @@ def enclosed(found: Resolved) -> Spectrum:
     Disjoint balls, as many as there are zeros, each with a change of sign of the secular function: each holds one.
     """
     coarse = found.spectrum
-    xp = balls(coarse.arithmetic.digits + _SPARE)
+    xp = balls(_FINER * coarse.arithmetic.digits)
     with xp:
         q, v, rate = tangent(found.moving, xp)
         inverse = xp.array([1 / a for a in found.moving.A])
@@ -54,17 +57,22 @@ def _zeros(found: Values, coarse_poles: Values, poles: Values, weights: Values, 
     at_pole = dict(zip(coarse_poles, poles, strict=True))
     live = np.array([not weight.is_zero() for weight in weights])
 
-    def secular(x: Any) -> Any:
-        return constant + np.sum(weights[live] / (x - poles[live]))
+    def secular(x: Any) -> tuple[Any, Any]:
+        terms = weights[live] / (x - poles[live])
+        return constant + np.sum(terms), -np.sum(terms / (x - poles[live]))
 
     balls_found = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
     return xp.array(balls_found)
 
 
-def _enclosed_zero(falling: Callable[[Any], Any], middle: Any, xp: Balls) -> Any:
-    reach = xp.number(10) ** -(xp.digits - _SPARE - _FIRST_REACH)
+def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: Balls) -> Any:
+    for _ in range(_STEPS):
+        value, slope = falling(middle)
+        middle = (middle - value / slope).mid()
+    value, slope = falling(middle)
+    reach = _FIRST_REACH * (value / slope.mid()).abs_upper() + xp.epsilon
     for _ in range(_WIDENINGS):
-        if falling(middle - reach) > 0 and falling(middle + reach) < 0:
+        if falling(middle - reach)[0] > 0 and falling(middle + reach)[0] < 0:
             return xp.widened(middle, reach)
         reach = reach * 1000
     raise Unsolved("not-enclosed", "a constant of motion or a spheroconic coordinate: no change of sign could be shown")

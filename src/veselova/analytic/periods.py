@@ -22,6 +22,9 @@ __all__ = ["Periods"]
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
+#: Last coefficients of a series, whose sum times this is taken for what it leaves out where that is not bounded.
+_LAST, _TAIL = 3, 4
+
 
 @dataclass(frozen=True)
 class Periods:
@@ -55,18 +58,18 @@ class Periods:
         Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
-        rate = interval.strip if self.arithmetic.rigorous else 2 * interval.strip
+        rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return int(np.ceil(self.arithmetic.nats / rate)) + _EXTRA_NODES
 
     def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (g, N): value = Σ_m h_m cos mψ."""
         psi = interval.nodes(self.node_count(interval))
         coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
-        if self.arithmetic.rigorous:
-            coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._truncation(interval, 2))
+        if self.arithmetic.certified:
+            coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))
         return coefficients
 
-    def _truncation(self, interval: Interval, times: int) -> Values:
+    def _bound(self, interval: Interval, times: int) -> Values:
         """Return 6 M_k e^(−times·Nβ)/(1−e^(−β)), with M_k the bound of form k in a strip of half width β, shape (g,).
 
         |h_m| ≤ 2M e^(−mβ). Truncation after N coefficients and the aliases in those kept come to at most this with times = 1, at
@@ -78,8 +81,14 @@ class Periods:
 
     @cached_property
     def series_truncation(self) -> Values:
-        """Return bounds of what the angle series leave out of z_k, and of ∂z_k/∂ψ_s for all s together, shape (g,)."""
-        return np.asarray(sum(np.abs(self.inverse_cycles) @ self._truncation(cut, 1) for cut in self.cuts))
+        """Return what the angle series leave out of z_k, and of ∂z_k/∂ψ_s for all s together, at most, shape (g,).
+
+        A bound where the arithmetic is certified; otherwise a multiple of the last terms.
+        """
+        if self.arithmetic.certified:
+            return np.asarray(sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts))
+        last = sum(np.sum(np.abs(series[:, -_LAST:]), axis=1) for series in self.cut_series)
+        return np.asarray(_TAIL * (np.abs(self.inverse_cycles) @ last))
 
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:

@@ -30,8 +30,9 @@ Sums = Callable[[Values], Values]
 class Arithmetic(ABC):
     """Elementary functions, constants and small linear algebra at one precision. Functions act entrywise on arrays."""
 
-    #: Whether numbers carry bounds of their own error, and every truncation has to be added to them.
-    rigorous: ClassVar[bool] = False
+    #: Whether numbers carry their own error, so that every truncation has to be added to it; whether that has to be a bound.
+    has_radii: ClassVar[bool] = False
+    certified: bool = False
 
     digits: int
     epsilon: Any

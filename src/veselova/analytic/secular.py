@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from veselova.analytic.precision import Extended, Values
@@ -16,6 +17,11 @@ _LEAST_PART = 1e-30
 
 #: A bracket over more than this is not one in which Newton's method converges quadratically.
 _WIDE_BRACKET = 1e3
+
+
+#: Iterations settle at this relative change, or at so many roundings; from there every plain Newton step doubles the digits.
+_SETTLED, _SETTLED_DIGITS = 1e-300, 300
+_ROUNDINGS = 4
 
 
 class TooFewDigits(Exception):
@@ -79,6 +85,9 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
         if slow or not (least <= new <= most and new > 0):
             new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
         change, own = abs(new - own), new
-        if change <= 4 * arithmetic.epsilon * own:
+        if change <= _ROUNDINGS * max(arithmetic.epsilon, _SETTLED) * own:
+            for _ in range(math.ceil(math.log2(max(1.0, arithmetic.digits / _SETTLED_DIGITS)))):
+                value, derivative = _scaled(near, far, constant, width, own)
+                own = own - value / derivative
             return own
     raise TooFewDigits

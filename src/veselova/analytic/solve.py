@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
+from veselova.analytic.enclosed_motion import EnclosedMotion
 from veselova.analytic.error import estimated_error
+from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.spheroconic import to_spheroconic
@@ -32,13 +34,22 @@ _DATA_ROUNDING = Fraction(1, 2**50)
 _NO_DIGIT = 0.1
 
 
-def solve(problem: Veselova, times: Any, *, method: str | None = None, clock: str | None = None) -> Trajectory:
+def solve(
+    problem: Veselova,
+    times: Any,
+    *,
+    method: str | None = None,
+    clock: str | None = None,
+    digits: int = DOUBLE.digits,
+    certified: bool = False,
+) -> Trajectory:
     """Return the motion at the given times in closed form.
 
     ``method``: ``theta`` (every entry of the attitude a theta quotient) or ``angles`` (Abel–Jacobi inversion, then the
     algebraic frame); None takes the cheaper. ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the
     same with the Fourier clock. Every start is served: equal A's, frozen directions, coinciding constants, rest. On a
     separatrix the error is that of starts a rounding away, and grows like e^(rate·t).
+    ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer.
     Accuracy: see the trajectory's ``error``; about 1e-14 at t of order 10².
     """
@@ -46,7 +57,12 @@ def solve(problem: Veselova, times: Any, *, method: str | None = None, clock: st
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
-    return _Motion(problem, method, clock)(grid)
+    if digits == DOUBLE.digits and not certified:
+        return _Motion(problem, method, clock)(grid)
+    for field, value, only in (("method", method, "angles"), ("clock", clock, "panels")):
+        if value not in (None, only):
+            raise InvalidInput((field,), f"{only}, where digits > {DOUBLE.digits} or errors are certified", shown(value))
+    return EnclosedMotion(problem, digits, certified)(times)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_vector, to_float
 
-__all__ = ["MOST_TIMES", "uniform_times", "validated_times"]
+__all__ = ["MOST_TIMES", "exact_times", "uniform_times", "validated_times"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,13 @@ def validated_times(times: Any) -> Array:
             ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))
         )
     return array
+
+
+def exact_times(times: Any) -> tuple[tuple[Fraction, ...], Array]:
+    """Return the times as exact rationals, and as validated doubles; raises InvalidInput as above."""
+    grid = validated_times(times)
+    given = times if isinstance(times, (list, tuple)) else grid.tolist()
+    return exact_vector(given, ("times",)), grid
 
 
 def uniform_times(start: float, stop: float, count: int) -> Array:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import BackendMissing, Unsolved
 from veselova.mechanics.veselova import Veselova
 
@@ -56,6 +57,7 @@ class Trajectory:
     times (N,) · error (N,) a bound on every component of q and frame at each time, in absolute value
     tau1 (N,) Neumann time, zero at t = 0 · q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i
     omega (N, n, n) = q∧q̇, body angular velocity · spheroconic (N, n−1), increasing
+    decimals: the same series to more digits, or with certified errors, where that was asked for
     """
 
     problem: Veselova
@@ -68,6 +70,7 @@ class Trajectory:
     spheroconic: Array
     provenance: Provenance
     dense: Callable[[Any], Trajectory] | None = field(default=None, repr=False)
+    decimals: Decimals | None = None
 
     def __post_init__(self) -> None:
         for array in (self.times, self.error, self.tau1, self.q, self.q_dot, self.frame, self.spheroconic):

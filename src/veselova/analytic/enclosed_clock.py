@@ -1,0 +1,188 @@
+"""The clock in balls: Chebyshev series of dt/dτ₁ on panels along the orbit, to any number of digits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.precision import Values
+from veselova.analytic.strip import Orbit
+from veselova.mechanics.errors import Unsolved
+
+__all__ = ["EnclosedClock"]
+
+#: Half length of a panel in half widths of the strip: longer ones take hardly fewer nodes for a length.
+_PANEL_IN_STRIPS = 3.0
+
+#: Half length of a panel in cycles of the fastest phase, where truncation is judged by the coefficients themselves.
+_PANEL_IN_CYCLES = 1.0
+
+#: Nodes that a clock is willing to evaluate: minutes.
+_MOST_NODES = 100_000
+
+#: Nodes per panel in double precision that show how fast series fall, and the digits down to which they do.
+_SAMPLE, _SAMPLE_DIGITS = 64, 11
+
+#: Coefficients at the end of a series that must be small, how much larger than the precision they may be (they are rounding
+#: there), and how many more nodes are taken where they are not.
+_LAST, _NEARLY, _MORE = 3, 1e3, 1.25
+
+#: What is left out of a falling series, in units of the last coefficients.
+_TAIL = 4
+
+#: Newton's steps double the digits from those of a double.
+_FIRST_DIGITS = 10
+
+#: Part of the slope at the approximate root that is certain next to it.
+_SLOPE = 0.5
+
+#: Panels end a little beyond the last time.
+_BEYOND = 1 + 1e-9
+
+
+class EnclosedClock:
+    """τ₁ at given times on one orbit, in balls.
+
+    ``certified``: what series leave out follows from the strip of analyticity; otherwise from their last coefficients, which
+    takes a third of the nodes. Raises Unsolved where the times are too far for panels.
+    """
+
+    def __init__(self, orbit: Orbit, approximate: NDArray[np.float64], certified: bool) -> None:
+        self._orbit, self._certified = orbit, certified
+        self._xp: Any = orbit.rate.inversion.arithmetic
+        self._forward = self._panels(max(0.0, float(np.max(approximate))), 1)
+        self._backward = self._panels(max(0.0, -float(np.min(approximate))), -1)
+
+    @property
+    def size(self) -> int:
+        """Return the number of nodes."""
+        return sum(side.rates.size for side in (self._forward, self._backward) if side is not None)
+
+    def tau1(self, times: Values, approximate: NDArray[np.float64]) -> Values:
+        """Return τ₁ at times (N,), given exactly, from approximate values."""
+        result = self._xp.array(np.zeros(times.shape))
+        for side, sign in ((self._forward, 1), (self._backward, -1)):
+            chosen = np.flatnonzero(sign * approximate > 0)
+            if side is not None and chosen.size:
+                result[chosen] = sign * side.roots(sign * times[chosen], sign * approximate[chosen])
+        return np.asarray(result)
+
+    def _panels(self, reach: float, direction: int) -> _Panels | None:
+        if reach == 0:
+            return None
+        reach *= _BEYOND
+        if self._certified:
+            width, largest = self._orbit.strip
+            count = math.ceil(reach / (2 * _PANEL_IN_STRIPS * width))
+            ratio = 2 * count * width / reach
+            decay = self._xp.number(1 / (ratio + math.sqrt(1 + ratio * ratio))) * (1 + 1e-12)
+            nodes = math.ceil(self._xp.nats / -math.log(float(decay)))
+            truncation = _from_strip(largest, decay, nodes)
+            panels = self._evaluated(reach, direction, count, nodes)
+            return replace(panels, truncation=self._xp.array([truncation] * count), steepest=largest / width)
+        fastest = max(abs(float(f)) for f in self._orbit.frequencies)
+        count = math.ceil(reach * fastest / (2 * _PANEL_IN_CYCLES))
+        nodes = self._expected_nodes(reach, direction, count)
+        while True:
+            panels = self._evaluated(reach, direction, count, nodes)
+            last = np.sum(np.abs(self._xp.midpoints(panels.rates[:, -_LAST:])), axis=1)
+            if np.all(last <= _NEARLY * self._xp.epsilon * panels.rates[:, 0]):
+                return replace(panels, truncation=_TAIL * last)
+            nodes = math.ceil(_MORE * nodes)
+
+    def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
+        """Return the nodes per panel that the decay of the series in double precision asks for."""
+        coarse = self._orbit.rate.coarse()
+        half = reach / (2 * count)
+        theta = np.pi * (2 * np.arange(_SAMPLE) + 1) / (2 * _SAMPLE)
+        tau1 = direction * ((2 * np.arange(count)[:, None] + 1) * half - half * np.cos(theta)).ravel()
+        start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
+        values = coarse.at(coarse.inversion.invert(start + tau1[:, None] * frequencies)).reshape(count, _SAMPLE)
+        series = np.abs(coarse.inversion.arithmetic.cosine_series(values)) / np.abs(values[:, :1])
+        # The largest coefficient from each on: a falling bound, read off where it still is above rounding.
+        falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
+        seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))
+        per_digit = seen / max(1.0, -math.log10(falling[min(seen, _SAMPLE - 1)]))
+        return math.ceil(per_digit * float(self._xp.digits)) + _LAST
+
+    def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
+        if count * nodes > _MOST_NODES:
+            raise Unsolved("too-far", f"a clock of {self._xp.digits} digits would take {count * nodes} evaluations at that time")
+        xp = self._xp
+        half = xp.number(reach) / (2 * count)
+        centres = xp.array([half * (2 * p + 1) for p in range(count)])
+        waves = xp.cos(xp.array([xp.pi * (2 * i + 1) / (2 * nodes) for i in range(nodes)]))
+        values = self._orbit.rates(direction * (centres[:, None] - half * waves).ravel())
+        return _Panels(xp, half, centres, xp.cosine_series(values.reshape(count, nodes)), xp.array([0] * count), None)
+
+
+def _from_strip(largest: Any, decay: Any, nodes: int) -> Any:
+    """Return 6 M ρ^(−N)/(1−1/ρ): |c_m| ≤ 2Mρ^(−m) on an ellipse of half axes with sum ρ, truncation and aliases together."""
+    return 6 * largest * decay**nodes / (1 - decay)
+
+
+@dataclass(frozen=True)
+class _Panels:
+    """Series in cos mθ of dt/dx on panels x = centre − half·cos θ from 0 on, x = |τ₁|.
+
+    rates (P, N) · truncation (P,) what they leave out · steepest: a bound of |d²t/dx²|, None where there is none
+    """
+
+    arithmetic: Any
+    half: Any
+    centres: Values
+    rates: Values
+    truncation: Values
+    steepest: Any
+
+    @cached_property
+    def _waves(self) -> Values:
+        """Return the d_k, k = 1…N, of t = Σ_{k≥0} d_k cos kθ: d_k = −half (c_{k−1} − c_{k+1})/2k with c_0 counted twice."""
+        count, nodes = self.rates.shape
+        padded = np.concatenate([self.rates, self.arithmetic.array(np.zeros((count, 2)))], axis=1)
+        padded[:, 0] = 2 * padded[:, 0]
+        return np.asarray(-self.half * (padded[:, :nodes] - padded[:, 2:]) / (2 * np.arange(1, nodes + 1)))
+
+    @cached_property
+    def _ends(self) -> Values:
+        """Return t at the ends of the panels, (P+1,)."""
+        spans = self.arithmetic.widened(-2 * np.sum(self._waves[:, ::2], axis=1), 2 * self.half * self.truncation)
+        return np.concatenate([self.arithmetic.array([0]), np.cumsum(spans)])
+
+    def roots(self, times: Values, approximate: NDArray[np.float64]) -> Values:
+        """Return x with t(x) = times, from approximate values."""
+        places = np.searchsorted(self._ends[1:].astype(float), times.astype(float))
+        result = np.empty(times.shape, dtype=object)
+        for p in np.unique(places):
+            rows, panel = np.flatnonzero(places == p), min(int(p), len(self.centres) - 1)
+            result[rows] = self._roots_on(panel, times[rows], approximate[rows])
+        return result
+
+    def _roots_on(self, p: int, times: Values, approximate: NDArray[np.float64]) -> Values:
+        """Newton's method on midpoints, then the residual over the least slope."""
+        xp, left, right = self.arithmetic, self.centres[p] - self.half, self.centres[p] + self.half
+        constant = self._ends[p] - np.sum(self._waves[p])
+        primitive, rates = np.concatenate([[constant], self._waves[p]]), np.concatenate([self.rates[p], xp.array([0])])
+        series = xp.cosine_sums(np.stack([primitive, rates], axis=1)[None])
+
+        def clock(x: Values) -> tuple[Values, Values]:
+            theta = 2 * xp.atan2(xp.sqrt(x - left), xp.sqrt(right - x))
+            value, rate = series(theta[:, None])[:, :, 0].T
+            return xp.widened(value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
+
+        lowest, highest = xp.midpoints(xp.array([left, right]))
+        x = xp.array(np.clip(approximate, float(lowest), float(highest)))
+        for _ in range(1 + math.ceil(math.log2(xp.digits / _FIRST_DIGITS))):
+            value, rate = clock(x)
+            x = xp.midpoints(x - (value - times) / rate)
+            x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
+        value, rate = clock(x)
+        reach = xp.around_zero((value - times) / (_SLOPE * rate))
+        if self.steepest is not None and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * rate)):
+            raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
+        return np.asarray(x + reach)

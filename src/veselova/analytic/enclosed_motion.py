@@ -1,0 +1,88 @@
+"""Motions to more digits than a double has, or with certified errors: digits are added until the answer has those asked for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.enclosed_solution import EnclosedSolution
+from veselova.analytic.precision import Values
+from veselova.analytic.solution import Solution
+from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.errors import InvalidInput, Unsolved
+from veselova.mechanics.times import exact_times
+from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.veselova import Veselova
+from veselova.version import __version__
+
+__all__ = ["EnclosedMotion"]
+
+#: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
+_SPARE = 8
+
+#: Digits added beyond those that were missing, and attempts.
+_MORE = 4
+_ATTEMPTS = 6
+
+#: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
+_SHOWN = 3
+
+#: Rounding of a decimal of size one to a double.
+_DOUBLE_ROUNDING = float(np.finfo(float).eps) / 2
+
+
+@dataclass(frozen=True)
+class EnclosedMotion:
+    """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
+
+    problem: Veselova
+    digits: int
+    certified: bool
+
+    def __post_init__(self) -> None:
+        if self.problem.axes is not None:
+            field = "certified" if self.digits <= 15 else "digits"
+            raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
+        began, (exact, grid) = time.perf_counter(), exact_times(times)
+        if not self.problem.moves:
+            raise Unsolved("at-rest", "q_dot = 0: the body rests, and there is nothing to compute to more digits")
+        solution = Solution(self.problem)
+        approximate = solution.clock(grid).tau1(grid)[0]
+        working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
+        for _ in range(_ATTEMPTS):
+            decimals, details = self._attempt(working, exact, approximate)
+            missing = self.digits + math.ceil(decimals.error.max().log10())
+            if missing <= 0:
+                details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
+                provenance = Provenance("analytic", "angles", self.digits, __version__, time.perf_counter() - began, details)
+                return _trajectory(self.problem, grid, decimals, provenance, self)
+            working += missing + _MORE
+        raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+
+    def _attempt(self, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]) -> tuple[Decimals, Any]:
+        solution = EnclosedSolution(self.problem, working, self.certified)
+        with solution.arithmetic as xp:
+            series, clock = solution.series(xp.array(exact), approximate)
+            pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
+        midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
+        return Decimals(self.digits, self.certified, midpoints, radii), {"clock": "panels", "clock_size": clock.size}
+
+
+def _trajectory(
+    problem: Veselova, grid: NDArray[np.float64], decimals: Decimals, provenance: Provenance, dense: EnclosedMotion
+) -> Trajectory:
+    """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
+    arrays: Mapping[str, Values] = {name: values.astype(np.float64) for name, values in decimals.midpoints.items()}
+    error = np.array([math.nextafter(float(x), math.inf) for x in decimals.error]) + _DOUBLE_ROUNDING
+    states = {name: arrays[name] for name in ("tau1", "q", "q_dot", "frame", "spheroconic")}
+    return Trajectory(problem, grid, error, **states, provenance=provenance, dense=dense, decimals=decimals)

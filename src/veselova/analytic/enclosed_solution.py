@@ -1,0 +1,135 @@
+"""The closed-form motion of one problem in balls: every number of the chain with its error, to any number of digits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.balls import balls
+from veselova.analytic.clock import ClockRate
+from veselova.analytic.curve import Curve
+from veselova.analytic.enclosed_clock import EnclosedClock
+from veselova.analytic.enclosure import enclosed
+from veselova.analytic.frame import Frame
+from veselova.analytic.periods import Periods
+from veselova.analytic.precision import DOUBLE, Values
+from veselova.analytic.reduction import moving_part
+from veselova.analytic.spectrum import resolved
+from veselova.analytic.start import start
+from veselova.analytic.strip import Orbit
+from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.veselova import Veselova
+
+__all__ = ["EnclosedSolution"]
+
+
+class EnclosedSolution:
+    """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
+
+    ``certified``: all truncations are bounded; else estimated. ``distance`` as in Solution. Raises Unsolved (``not-enclosed``)
+    where a bound cannot be closed.
+    """
+
+    def __init__(self, problem: Veselova, digits: int, certified: bool, distance: Fraction | None = None) -> None:
+        found = resolved(moving_part(problem), digits, distance)
+        if certified and (found.separatrices or found.moving.turned):
+            what = "a separatrix" if found.separatrices else "equal A's with two moving directions"
+            raise Unsolved("not-enclosed", f"{what}: the start is moved by far less than any digit, which is no bound")
+        self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
+        self.arithmetic: Any = balls(digits, certified)
+        self.spectrum = enclosed(found)
+        fine: Any = self.spectrum.arithmetic
+        with fine:
+            curve = Curve.of(self.spectrum, self.arithmetic)
+        with self.arithmetic:
+            coarse = AbelJacobi(Periods(Curve.of(found.spectrum, DOUBLE)))
+            inversion = AbelJacobi(Periods(curve), coarse)
+            begin = start(found.spectrum, curve, self.spectrum)
+            self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
+            rate = ClockRate.of(self.spectrum, inversion)
+            self.orbit = Orbit(self.spectrum, rate, inversion.map(self._angles)[0], inversion.periods.frequencies)
+
+    def series(self, times: Values, approximate: NDArray[np.float64]) -> tuple[Mapping[str, Values], EnclosedClock]:
+        """Return the series of a trajectory along the principal axes, by name, and the clock that was used.
+
+        times (N,) exact · approximate (N,) the τ₁ there in double precision, in units where the largest I is 1.
+        """
+        xp, moving, n = self.arithmetic, self.moving, self.problem.n
+        clock = EnclosedClock(self.orbit, approximate, xp.certified)
+        tau1 = clock.tau1(times, approximate)
+        psi = self.orbit.rate.inversion.invert(self.orbit.phases(tau1))
+        attitude = self.frame.at(psi)
+        q_dot = (attitude.q_prime / self.orbit.rate.at(psi)[:, None]) @ self._directions.T
+        frame = np.empty((len(times), n, n), dtype=object)
+        frame[:, :, 0] = attitude.q @ self._directions.T
+        frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part
+        unit = xp.number(moving.unit)
+        frozen = np.tile(xp.array([1 / a for a in moving.frozen]), (len(times), 1))
+        spheroconic = np.concatenate([attitude.spheroconic / unit, frozen], axis=1)
+        order = np.argsort(spheroconic.astype(float), axis=1, kind="stable")
+        product = frame[:, :, :1] * q_dot[:, None, :]
+        series = {
+            "q": frame[:, :, 0],
+            "q_dot": q_dot,
+            "frame": frame,
+            "omega": product - np.swapaxes(product, 1, 2),
+            "spheroconic": np.take_along_axis(spheroconic, order, axis=1),
+            "tau1": tau1 * xp.sqrt(unit),
+        }
+        return series, clock
+
+    @cached_property
+    def _directions(self) -> Values:
+        """Return the orthonormal directions that move, shape (n, m)."""
+        xp, moving = self.arithmetic, self.moving
+        directions = xp.array(np.zeros((moving.n, moving.size)))
+        for column, vector in zip(directions.T, moving.vectors, strict=True):
+            length = xp.sqrt(xp.number(sum((x * x for x in vector.values()), Fraction())))
+            column[list(vector)] = xp.array(list(vector.values())) / length
+        return np.asarray(directions)
+
+    @cached_property
+    def _start_frame(self) -> Values:
+        """Return e_2 … e_n at t = 0: the given ones, made exactly orthonormal."""
+        xp, exact = self.arithmetic, self.problem.exact
+        rows = exact.frame if exact.frame is not None else self.problem.frame
+        q = self._directions @ self.spectrum.q
+        normals = xp.array(rows)[:, 1:]
+        return orthonormal(np.column_stack([q, normals - np.outer(q, q @ normals)]), xp)[:, 1:]
+
+    @cached_property
+    def _rotation(self) -> Values:
+        """Return the constant ℜ of (orth); a matrix of signs for the natural frame, where nothing rests."""
+        xp = self.arithmetic
+        normals = self.frame.at(self._angles).normals[0]
+        if self.problem.exact.natural and not self.moving.frozen:
+            raw = normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:]
+            return np.asarray(xp.array(np.rint(raw)))
+        return np.asarray(normals.T @ self._directions.T @ self._start_frame)
+
+    @cached_property
+    def _frozen_part(self) -> Any:
+        """Return what stays of e_2 … e_n: their components along the directions that do not move."""
+        if not self.moving.frozen:
+            return 0
+        return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
+
+
+def orthonormal(frame: Values, arithmetic: Any) -> Values:
+    """Return the polar factor P of a nearly orthogonal X = PS, by Newton–Schulz steps E(3 − EᵀE)/2.
+
+    For the E found, |E − P| ≤ |EᵀE − 1| + 2|EᵀX − XᵀE|, both zero for P itself (entries summed, S within a half of 1).
+    """
+    one = np.eye(frame.shape[0], dtype=int)
+    nearly = arithmetic.midpoints(frame)
+    for _ in range(3 + arithmetic.digits.bit_length()):
+        nearly = arithmetic.midpoints(nearly @ (3 * one - nearly.T @ nearly) / 2)
+    product = nearly.T @ frame
+    bound = np.sum(np.abs(nearly.T @ nearly - one)) + 2 * np.sum(np.abs(product - product.T))
+    return np.asarray(arithmetic.widened(nearly, bound))

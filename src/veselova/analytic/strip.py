@@ -1,0 +1,61 @@
+"""Where dt/dτ₁ is analytic along an orbit, and how large it is there: a bound that no gap or cut enters.
+
+Along an orbit q'' = −A⁻¹q + βq with β = 2(A⁻¹q,q) − E and E = (q',q') + (A⁻¹q,q) constant (Theorem LR→Nn), I_1 ≤ A⁻¹ ≤ 1 in
+units of the largest I. At complex times a distance y from a real one let |q − q(real)| ≤ d. There
+
+    |q''| ≤ (κ + 4d + 2d²)(1 + d),   κ = max |β − I_i| over real times,   so   d ≤ |q'|y + ½ max|q''| y²,
+    |(q,Aq)/(q,Aq)_real − 1| ≤ 2ad + a²d²,   a² = A_1/min (q,Aq),
+
+which is below one while ad < √2−1. As long as it is, dt/dτ₁ = √((q,Aq)/W) is analytic and at most √2 times its real maximum.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.clock import ClockRate
+from veselova.analytic.precision import Values
+from veselova.analytic.spectrum import Spectrum
+
+__all__ = ["Orbit"]
+
+#: √2−1, rounded down with what makes up for the rounding of the half width to a double.
+_LARGEST_TURN = 0.4142
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls."""
+
+    spectrum: Spectrum
+    rate: ClockRate
+    start: Values
+    frequencies: Values
+
+    def phases(self, tau1: Values) -> Values:
+        """Return z at Neumann times (N,), shape (N, g)."""
+        return np.asarray(self.start + tau1[:, None] * self.frequencies)
+
+    def rates(self, tau1: Values) -> Values:
+        """Return dt/dτ₁ at Neumann times (N,)."""
+        return self.rate.at(self.rate.inversion.invert(self.phases(tau1)))
+
+    @cached_property
+    def strip(self) -> tuple[float, Any]:
+        """Return (y, M) with |dt/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on its torus."""
+        inverse, points = self.spectrum.inverse, self.rate.inversion.periods.curve.branch_points
+        lowest = inverse[0]
+        level = float((np.sum(self.spectrum.q_prime**2) + np.sum(inverse * self.spectrum.q**2)).upper())
+        # (q,Aq) = Π λ_s/Π I_i, and I_1 = 1/A_1: the least of a⁻².
+        share = float((lowest * math.prod(points[1::2]) / math.prod(inverse)).lower())
+        lowest = float(lowest.lower())
+        d = _LARGEST_TURN * math.sqrt(share)
+        kappa = max(abs(2 - level - lowest), abs(2 * lowest - level - 1))
+        bend = (kappa + 4 * d + 2 * d * d) * (1 + d)
+        speed = math.sqrt(level - lowest)
+        return 2 * d / (speed + math.sqrt(speed * speed + 2 * bend * d)), math.sqrt(2) * self.rate.scale
