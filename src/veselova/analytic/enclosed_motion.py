@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.enclosed_solution import EnclosedSolution
-from veselova.analytic.precision import Values
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import InvalidInput, Unsolved
@@ -33,9 +31,6 @@ _ATTEMPTS = 6
 
 #: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
 _SHOWN = 3
-
-#: Rounding of a decimal of size one to a double.
-_DOUBLE_ROUNDING = float(np.finfo(float).eps) / 2
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ class EnclosedMotion:
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
                 provenance = Provenance("analytic", "angles", self.digits, __version__, time.perf_counter() - began, details)
-                return _trajectory(self.problem, grid, decimals, provenance, self)
+                return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
 
@@ -76,13 +71,3 @@ class EnclosedMotion:
             pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
         midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
         return Decimals(self.digits, self.certified, midpoints, radii), {"clock": "panels", "clock_size": clock.size}
-
-
-def _trajectory(
-    problem: Veselova, grid: NDArray[np.float64], decimals: Decimals, provenance: Provenance, dense: EnclosedMotion
-) -> Trajectory:
-    """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
-    arrays: Mapping[str, Values] = {name: values.astype(np.float64) for name, values in decimals.midpoints.items()}
-    error = np.array([math.nextafter(float(x), math.inf) for x in decimals.error]) + _DOUBLE_ROUNDING
-    states = {name: arrays[name] for name in ("tau1", "q", "q_dot", "frame", "spheroconic")}
-    return Trajectory(problem, grid, error, **states, provenance=provenance, dense=dense, decimals=decimals)

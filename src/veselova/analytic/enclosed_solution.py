@@ -28,6 +28,10 @@ from veselova.mechanics.veselova import Veselova
 
 __all__ = ["EnclosedSolution"]
 
+#: A rotation this near to a matrix of signs is one: beyond, constants of motion are so close together that the natural frame of
+#: the problem, in double precision, is taken for a given one.
+_NEARLY_NATURAL = 1e-9
+
 
 class EnclosedSolution:
     """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
@@ -110,7 +114,9 @@ class EnclosedSolution:
         normals = self.frame.at(self._angles).normals[0]
         if self.problem.exact.natural and not self.moving.frozen:
             raw = normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:]
-            return np.asarray(xp.array(np.rint(raw)))
+            signs = np.rint(raw)
+            if np.max(np.abs(raw - signs)) < _NEARLY_NATURAL:
+                return np.asarray(xp.array(signs))
         return np.asarray(normals.T @ self._directions.T @ self._start_frame)
 
     @cached_property

@@ -64,7 +64,7 @@ _PANEL_CYCLES = 5e4
 
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
-_SIGN_ROUNDING = 8 * DOUBLE.epsilon
+_SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
 #: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
 _SAMPLES = 48

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
-from veselova.analytic.enclosed_motion import EnclosedMotion
 from veselova.analytic.error import estimated_error
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
@@ -62,6 +61,8 @@ def solve(
     for field, value, only in (("method", method, "angles"), ("clock", clock, "panels")):
         if value not in (None, only):
             raise InvalidInput((field,), f"{only}, where digits > {DOUBLE.digits} or errors are certified", shown(value))
+    from veselova.analytic.enclosed_motion import EnclosedMotion
+
     return EnclosedMotion(problem, digits, certified)(times)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import localcontext
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from veselova.mechanics.errors import BackendMissing
 __all__ = ["Decimals"]
 
 Objects = NDArray[np.object_]
+
+#: Digits in which products are formed beyond those kept: what is rounded there is far below their radii.
+_SPARE_DIGITS = 30
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,6 +33,19 @@ class Decimals:
     certified: bool
     midpoints: Mapping[str, Objects]
     radii: Mapping[str, Objects]
+
+    @classmethod
+    def with_derived(
+        cls, digits: int, certified: bool, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects]
+    ) -> Decimals:
+        """Return the decimals with what follows from q_dot and frame: q = e_1, and ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊."""
+        q, q_dot = midpoints["frame"][:, :, 0], midpoints["q_dot"]
+        r, r_dot = radii["frame"][:, :, 0], radii["q_dot"]
+        with localcontext(prec=digits + _SPARE_DIGITS):
+            product = q[:, :, None] * q_dot[:, None, :]
+            spread = np.abs(q)[:, :, None] * r_dot[:, None, :] + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
+            omega, omega_radius = product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
+        return cls(digits, certified, {**midpoints, "q": q, "omega": omega}, {**radii, "q": r, "omega": omega_radius})
 
     @property
     def error(self) -> Objects:

@@ -91,6 +91,21 @@ class Trajectory:
         frame, q_dot = problem.to_body_axes(frame), problem.to_body_axes(q_dot)
         return cls(problem, times, error, tau1, frame[:, :, 0], q_dot, frame, spheroconic, provenance, dense)
 
+    @classmethod
+    def of_decimals(
+        cls,
+        problem: Veselova,
+        times: Array,
+        decimals: Decimals,
+        provenance: Provenance,
+        dense: Callable[[Any], Trajectory] | None = None,
+    ) -> Trajectory:
+        """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
+        names = ("tau1", "q", "q_dot", "frame", "spheroconic")
+        arrays = {name: decimals.midpoints[name].astype(np.float64) for name in names}
+        error = np.nextafter(decimals.error.astype(np.float64), np.inf) + np.finfo(float).eps / 2
+        return cls(problem, times, error, **arrays, provenance=provenance, dense=dense, decimals=decimals)
+
     @cached_property
     def integrals(self) -> Mapping[str, Array]:
         """Return the integrals of motion at each time, by name (see ``Veselova.integrals``)."""
@@ -130,21 +145,37 @@ class Trajectory:
                 table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
         return table
 
+    def _decimal_columns(self, decimals: Decimals) -> dict[str, Any]:
+        table: dict[str, Any] = dict(self.columns())
+        table["error"] = decimals.error
+        for name in OUTPUTS:
+            values = decimals.midpoints[name]
+            for index in np.ndindex(values.shape[1:]):
+                table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
+        return table
+
     def to_npz(self, path: str | Path) -> None:
-        """Write all series, the integrals and the provenance to a NumPy archive."""
+        """Write all series, the integrals and the provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
         arrays = {name: self.series(name) for name in OUTPUTS}
+        if self.decimals is not None:
+            for suffix, values in (("decimal", self.decimals.midpoints), ("radius", self.decimals.radii)):
+                arrays |= {f"{name}_{suffix}": values[name].astype(str) for name in OUTPUTS}
         integrals = {f"integral_{name}": values for name, values in self.integrals.items()}
         provenance = json.dumps(self.provenance.as_dict())
         with Path(path).open("wb") as file:  # an open file keeps savez from appending its own suffix to the name
             np.savez_compressed(file, times=self.times, error=self.error, provenance=provenance, **arrays, **integrals)  # type: ignore[arg-type]
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the flat table as comma-separated values, 17 digits, one row per time."""
+        """Write the flat table as comma-separated values, 17 digits or all of the decimals, one row per time."""
         table = self.columns()
+        if self.decimals is not None:
+            rows = np.column_stack([values.astype(str) for values in self._decimal_columns(self.decimals).values()])
+            np.savetxt(path, rows, fmt="%s", delimiter=",", header=",".join(table), comments="")
+            return
         np.savetxt(path, np.column_stack(list(table.values())), fmt="%.17g", delimiter=",", header=",".join(table), comments="")
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write the flat table as Parquet; raises BackendMissing without pyarrow."""
+        """Write the flat table as Parquet, doubles only; raises BackendMissing without pyarrow."""
         try:
             from pyarrow import parquet, table
         except ImportError:
@@ -152,7 +183,7 @@ class Trajectory:
         parquet.write_table(table(self.columns()), str(path))
 
     def to_xarray(self) -> Any:
-        """Return an xarray Dataset with the time as its coordinate; raises BackendMissing without xarray."""
+        """Return an xarray Dataset of doubles with the time as its coordinate; raises BackendMissing without xarray."""
         try:
             from xarray import Dataset
         except ImportError:

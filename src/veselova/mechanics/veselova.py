@@ -15,7 +15,7 @@ from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plain, to_float
 from veselova.mechanics.flow import ReducedFlow
-from veselova.mechanics.natural_frame import natural_frame, orthonormalized
+from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
 from veselova.mechanics.spheroconic import to_spheroconic
 
 __all__ = ["Veselova"]
@@ -77,7 +77,7 @@ class Veselova:
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
-            start_frame = natural_frame(A_float, position, velocity)
+            start_frame = refined(natural_frame(A_float, position, velocity), exact.A, exact.q, exact.tangent)
         else:
             start_frame = _admissible_frame(given_frame, position)
         self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes)

@@ -226,7 +226,7 @@ def _print_json(document: Any) -> None:
 
 
 #: Fields of a motion's request that say nothing of its torus.
-_OF_MOTIONS = ("times", "engine", "method", "outputs", "digits")
+_OF_MOTIONS = ("times", "engine", "method", "outputs", "digits", "certified")
 
 _WRITERS = (".npz", ".csv", ".parquet", ".json")
 _PICTURES = (".png", ".pdf", ".svg")

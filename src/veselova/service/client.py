@@ -90,11 +90,13 @@ def _trajectory_call(
     engine: str = "analytic",
     method: str | None = None,
     *,
+    digits: int = 15,
+    certified: bool = False,
     budget_s: float = 10.0,
 ) -> _Call[Trajectory]:
     """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
     asked = _problem(problem)
-    body = {"engine": engine, **_motion(asked, times, method, budget_s)}
+    body = {"engine": engine, "digits": digits, "certified": certified, **_motion(asked, times, method, budget_s)}
     return _Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
 
 

@@ -42,9 +42,10 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     n = trajectory.problem.n
     shown = min(n, 6)
     table = _table("t", "τ₁", *(f"q_{i + 1}" for i in range(shown)), *(["…"] if n > shown else []), "error")
+    error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     for i in np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int)):
         components = [f"{x: .9f}" for x in trajectory.q[i, :shown]] + (["…"] if n > shown else [])
-        table.add_row(f"{trajectory.times[i]:g}", f"{trajectory.tau1[i]:.6f}", *components, f"{trajectory.error[i]:.1e}")
+        table.add_row(f"{trajectory.times[i]:g}", f"{trajectory.tau1[i]:.6f}", *components, f"{error[i]:.1e}")
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
 

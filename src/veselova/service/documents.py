@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
 import orjson
 
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import InternalContradiction
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import OUTPUTS, Provenance, Trajectory
@@ -29,20 +31,33 @@ NEEDED_OUTPUTS = ("q_dot", "frame", "spheroconic", "tau1")
 
 
 def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:
-    """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's start and drift."""
-    drift = trajectory.drift
+    """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's start and drift.
+
+    Decimals are strings, and each series has one of radii beside it.
+    """
+    drift, decimals, names = trajectory.drift, trajectory.decimals, tuple(outputs)
+    extended: dict[str, Any] = {}
+    if decimals is not None:
+        extended = {
+            "series": {name: decimals.strings(name) for name in names},
+            "radii": {name: decimals.strings(name, radii=True) for name in names},
+            "error": [str(error) for error in decimals.error],
+        }
     return {
         "engine": trajectory.provenance.engine,
         "times": trajectory.times,
-        "series": {name: trajectory.series(name) for name in outputs},
+        "series": {name: trajectory.series(name) for name in names if decimals is None},
         "integrals": {name: {"initial": values[0], "drift": drift[name]} for name, values in trajectory.integrals.items()},
         "error": trajectory.error,
         "provenance": trajectory.provenance.as_dict(),
+        **extended,
     }
 
 
 def trajectory_of(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
-    """Return the trajectory of a document that has NEEDED_OUTPUTS; numbers come back to the last bit."""
+    """Return the trajectory of a document that has NEEDED_OUTPUTS; numbers come back to the last bit or digit."""
+    if "radii" in document:
+        return _with_decimals(problem, document)
     series = {name: np.array(document["series"][name], dtype=np.float64) for name in NEEDED_OUTPUTS}
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
     return Trajectory(
@@ -56,6 +71,18 @@ def trajectory_of(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
         series["spheroconic"],
         Provenance(**document["provenance"]),
     )
+
+
+def _with_decimals(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
+    midpoints, radii = ({name: _decimals(document[kind][name]) for name in NEEDED_OUTPUTS} for kind in ("series", "radii"))
+    provenance = Provenance(**document["provenance"])
+    certified = bool(provenance.details["certified"])
+    decimals = Decimals.with_derived(provenance.digits, certified, midpoints, radii)
+    return Trajectory.of_decimals(problem, np.array(document["times"], dtype=np.float64), decimals, provenance)
+
+
+def _decimals(strings: Any) -> Any:
+    return np.vectorize(Decimal, otypes=[object])(np.array(strings, dtype=object))
 
 
 def comparison_document(comparison: Comparison, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:

@@ -19,10 +19,20 @@ __all__ = ["openapi_document"]
 
 _NUMBERS: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _NUMBERS}
-_SERIES = {
-    name: {"type": "array", "items": {0: {"type": "number"}, 1: _NUMBERS, 2: _MATRIX}[len(axes)]}
-    for name, axes in OUTPUTS.items()
-}
+
+
+def _series(number: dict[str, Any]) -> dict[str, Any]:
+    """Return the schemas of all outputs, by the schema of their numbers."""
+    schemas: dict[str, Any] = {}
+    for name, axes in OUTPUTS.items():
+        schemas[name] = number
+        for _ in range(len(axes) + 1):
+            schemas[name] = {"type": "array", "items": schemas[name]}
+    return schemas
+
+
+_DECIMAL = {"type": "string", "pattern": r"^-?\d", "description": "a decimal"}
+_NUMBER_OR_DECIMAL = {"anyOf": [{"type": "number"}, _DECIMAL]}
 _BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 
 
@@ -47,16 +57,25 @@ _ANSWERS: dict[str, dict[str, Any]] = {
         {
             "engine": {"type": "string"},
             "times": _NUMBERS,
-            "series": _object(_SERIES, required=[]),
+            "series": {
+                **_object(_series(_NUMBER_OR_DECIMAL), required=[]),
+                "description": "decimals where more than 15 digits, or certified errors, were asked for",
+            },
+            "radii": {**_object(_series(_DECIMAL), required=[]), "description": "the error of every decimal"},
             "integrals": {
                 "type": "object",
                 "additionalProperties": _object(
                     {"initial": {"anyOf": [{"type": "number"}, _NUMBERS]}, "drift": {"type": "number"}}
                 ),
             },
-            "error": {**_NUMBERS, "description": "a bound on every component of q and frame at each time"},
+            "error": {
+                "type": "array",
+                "items": _NUMBER_OR_DECIMAL,
+                "description": "a bound on every component of q and frame at each time",
+            },
             "provenance": _PROVENANCE,
-        }
+        },
+        required=["engine", "times", "series", "integrals", "error", "provenance"],
     ),
     "Comparison": _object(
         {

@@ -90,12 +90,13 @@ class ComparisonRequest(TorusRequest):
     times: Annotated[_Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
     method: Annotated[str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")] = None
     outputs: Annotated[list[Output], Field(min_length=1, max_length=len(OUTPUTS))] = list(OUTPUTS)  # type: ignore[arg-type]
-    digits: Annotated[int, Field(ge=15, le=15, description="decimal digits of the computation")] = 15
+    digits: Annotated[int, Field(ge=15, le=15, description="15: a comparison has the digits of the numeric engine")] = 15
 
     def time_grid(self) -> Any:
-        """Return the times asked for as an array; raises InvalidInput located at ``times``."""
+        """Return the times asked for, an array or the list given; raises InvalidInput located at ``times``."""
         if not isinstance(self.times, dict):
-            return validated_times(self.times)
+            grid = validated_times(self.times)
+            return self.times if self._exact else grid
         unknown = [key for key in self.times if key not in ("start", "stop", "count")]
         if unknown or len(self.times) < 3:
             given = f"the fields {', '.join(self.times) or 'none'}"
@@ -103,8 +104,18 @@ class ComparisonRequest(TorusRequest):
         count = self.times["count"]
         if isinstance(count, bool) or not isinstance(count, int):
             raise InvalidInput(("times", "count"), "a whole number", shown(count))
-        start, stop = to_float([exact_number(self.times[key], ("times", key)) for key in ("start", "stop")]).tolist()
-        return uniform_times(start, stop, count)
+        exact = [exact_number(self.times[key], ("times", key)) for key in ("start", "stop")]
+        start, stop = to_float(exact).tolist()
+        grid = uniform_times(start, stop, count)
+        if not self._exact:
+            return grid
+        step = (exact[1] - exact[0]) / max(count - 1, 1)
+        return [exact[0] + i * step for i in range(count)]
+
+    @property
+    def _exact(self) -> bool:
+        """Return whether times are needed to more digits than a double has."""
+        return False
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""
@@ -118,6 +129,12 @@ class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
     engine: Literal["analytic", "numeric"] = "analytic"
+    digits: Annotated[int, Field(ge=15, le=1000, description="decimal digits; beyond 15, answers are decimal strings")] = 15
+    certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
+
+    @property
+    def _exact(self) -> bool:
+        return self.digits > 15 or self.certified
 
 
 _Model = TypeVar("_Model", bound=_Request)
@@ -173,7 +190,7 @@ def _fault(item: Any) -> InvalidInput:
         "finite_number": "a finite number",
         "list_type": "a list",
         "string_type": "a string",
-        "greater_than_equal": "15 (more digits are not offered yet)",
-        "less_than_equal": "15 (more digits are not offered yet)",
+        "greater_than_equal": f"a whole number of at least {item.get('ctx', {}).get('ge')}",
+        "less_than_equal": f"a whole number of at most {item.get('ctx', {}).get('le')}",
     }.get(kind, item["msg"][:1].lower() + item["msg"][1:])
     return InvalidInput(path, required, given)

@@ -18,7 +18,8 @@ __all__ = ["TASKS", "answer", "requested_comparison", "requested_torus", "reques
 
 def requested_trajectory(request: TrajectoryRequest) -> Trajectory:
     """Return the motion that a request asks of one engine."""
-    return solve(request.problem.problem(), request.time_grid(), request.engine, request.method)
+    problem, times = request.problem.problem(), request.time_grid()
+    return solve(problem, times, request.engine, request.method, digits=request.digits, certified=request.certified)
 
 
 def requested_comparison(request: ComparisonRequest) -> Comparison:
