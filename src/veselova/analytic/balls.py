@@ -147,6 +147,23 @@ class Balls(Arithmetic):
         series = _Series(self, coefficients)
         return lambda psi: series(psi, "real")
 
+    def turns(self, z: Values) -> Values:
+        """Return e^{2πiz}, complex balls."""
+        return np.asarray(_turn(2 * z))
+
+    def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
+        """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
+
+        Powers are squared and multiplied once for each coordinate; 2 log₂|m| products each lose a third of a bit.
+        """
+        result: Any = 1
+        for k in range(modes.shape[1]):
+            orders, places = np.unique(np.abs(modes[:, k]), return_inverse=True)
+            powers = np.stack([turns[:, k] ** int(order) for order in orders])
+            column = np.where((modes[:, k] < 0)[:, None], _conjugate(powers[places]), powers[places])
+            result = result * column
+        return np.asarray(_real(result)), np.asarray(_imaginary(result))
+
     @staticmethod
     def _array(matrix: Any) -> Values:
         rows = matrix.tolist()
@@ -193,6 +210,10 @@ class _Series:
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 
+_turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
+_conjugate = np.frompyfunc(lambda w: w.conjugate(), 1, 1)
+_real = np.frompyfunc(lambda w: w.real, 1, 1)
+_imaginary = np.frompyfunc(lambda w: w.imag, 1, 1)
 _around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 

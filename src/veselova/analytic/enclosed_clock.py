@@ -14,13 +14,16 @@ from veselova.analytic.precision import Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["EnclosedClock"]
+__all__ = ["EnclosedClock", "expected_nodes"]
 
 #: Half length of a panel in half widths of the strip: longer ones take hardly fewer nodes for a length.
 _PANEL_IN_STRIPS = 3.0
 
 #: Half length of a panel in cycles of the fastest phase, where truncation is judged by the coefficients themselves.
 _PANEL_IN_CYCLES = 1.0
+
+#: Nodes per cycle and digit.
+_NODES_PER_DIGIT = 2.6
 
 #: Nodes that a clock is willing to evaluate: minutes.
 _MOST_NODES = 100_000
@@ -51,6 +54,8 @@ class EnclosedClock:
     ``certified``: what series leave out follows from the strip of analyticity; otherwise from their last coefficients, which
     takes a third of the nodes. Raises Unsolved where the times are too far for panels.
     """
+
+    name = "panels"
 
     def __init__(self, orbit: Orbit, approximate: NDArray[np.float64], certified: bool) -> None:
         self._orbit, self._certified = orbit, certified
@@ -119,6 +124,12 @@ class EnclosedClock:
         waves = xp.cos(xp.array([xp.pi * (2 * i + 1) / (2 * nodes) for i in range(nodes)]))
         values = self._orbit.rates(direction * (centres[:, None] - half * waves).ravel())
         return _Panels(xp, half, centres, xp.cosine_series(values.reshape(count, nodes)), xp.array([0] * count), None)
+
+
+def expected_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
+    """Return about how many nodes panels to the farthest time take, truncation judged by coefficients."""
+    cycles = float(np.max(np.abs(approximate))) * max(abs(float(f)) for f in orbit.frequencies)
+    return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
 
 
 def _from_strip(largest: Any, decay: Any, nodes: int) -> Any:

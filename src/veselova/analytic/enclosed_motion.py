@@ -70,4 +70,4 @@ class EnclosedMotion:
             series, clock = solution.series(xp.array(exact), approximate)
             pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
         midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
-        return Decimals(self.digits, self.certified, midpoints, radii), {"clock": "panels", "clock_size": clock.size}
+        return Decimals(self.digits, self.certified, midpoints, radii), {"clock": clock.name, "clock_size": clock.size}

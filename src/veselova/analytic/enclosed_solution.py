@@ -14,7 +14,8 @@ from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import ClockRate
 from veselova.analytic.curve import Curve
-from veselova.analytic.enclosed_clock import EnclosedClock
+from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
+from veselova.analytic.enclosed_fourier import EnclosedFourier, expected_modes
 from veselova.analytic.enclosure import enclosed
 from veselova.analytic.frame import Frame
 from veselova.analytic.periods import Periods
@@ -59,13 +60,15 @@ class EnclosedSolution:
             rate = ClockRate.of(self.spectrum, inversion)
             self.orbit = Orbit(self.spectrum, rate, inversion.map(self._angles)[0], inversion.periods.frequencies)
 
-    def series(self, times: Values, approximate: NDArray[np.float64]) -> tuple[Mapping[str, Values], EnclosedClock]:
+    def series(
+        self, times: Values, approximate: NDArray[np.float64]
+    ) -> tuple[Mapping[str, Values], EnclosedClock | EnclosedFourier]:
         """Return the series of a trajectory along the principal axes, by name, and the clock that was used.
 
         times (N,) exact · approximate (N,) the τ₁ there in double precision, in units where the largest I is 1.
         """
         xp, moving, n = self.arithmetic, self.moving, self.problem.n
-        clock = EnclosedClock(self.orbit, approximate, xp.certified)
+        clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         psi = self.orbit.rate.inversion.invert(self.orbit.phases(tau1))
         attitude = self.frame.at(psi)
@@ -87,6 +90,13 @@ class EnclosedSolution:
             "tau1": tau1 * xp.sqrt(unit),
         }
         return series, clock
+
+    def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
+        """Return the clock with fewer evaluations; only that of panels is bounded."""
+        nodes = expected_nodes(self.orbit, approximate)
+        if self.arithmetic.certified or nodes < expected_modes(self.moving.size - 1, self.arithmetic.digits):
+            return EnclosedClock(self.orbit, approximate, self.arithmetic.certified)
+        return EnclosedFourier(self.orbit)
 
     @cached_property
     def _directions(self) -> Values:

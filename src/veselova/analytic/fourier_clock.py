@@ -7,7 +7,8 @@ Any t costs the same; the number of modes grows with the genus (n = 3: hundreds,
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["FourierClock"]
+__all__ = ["FourierClock", "grown"]
 
 Array = NDArray[np.float64]
 
@@ -111,27 +112,40 @@ class FourierClock(Clock):
 
 
 def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m.
-
-    The coefficients fall off like the support function of a convex body, so the set is convex up to its edge: it is grown
-    from zero through neighbours, in whichever directions it reaches far.
-    """
-    genus = rate.inversion.periods.genus
+    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
     longest = max(series.shape[1] for series in rate.inversion.periods.cut_series)
+    threshold = _SMALLEST_MODE * float(rate.mean)
+    count, columns = 0, []
+
+    def determinants(modes: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
+        nonlocal count, columns
+        needed = 2 * longest + 2 * int(np.max(np.abs(modes)))
+        if needed > count:  # nodes enough for e^{−2πi m·G_s}, with room for the next layers
+            count = needed + 32
+            columns = rate.columns(count)
+        matrices = np.stack([np.cos(2 * np.pi * (modes @ G.T)) @ weights.T for weights, G in columns], axis=2)
+        values = float(rate.scale) * np.linalg.det(matrices)
+        return values, np.abs(values) > threshold
+
+    modes, values = grown(rate.inversion.periods.genus, determinants)
+    return modes.astype(np.float64), values.astype(np.float64)
+
+
+def grown(
+    genus: int, coefficients: Callable[[NDArray[np.int64]], tuple[Any, NDArray[np.bool_]]]
+) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, and these.
+
+    ``coefficients`` gives those of modes (M, g), and whether each is large enough. They fall off like the support function of a
+    convex body, so the set is convex up to its edge: it is grown from zero through neighbours, in whichever directions it
+    reaches far. Raises Unsolved beyond _MOST_MODES.
+    """
     steps = np.concatenate([np.eye(genus, dtype=np.int64), -np.eye(genus, dtype=np.int64)])
     seen: set[bytes] = {np.zeros(genus, dtype=np.int64).tobytes()}
     frontier = np.zeros((1, genus), dtype=np.int64)
     kept_modes, kept_values = [], []
-    threshold = _SMALLEST_MODE * float(rate.mean)
-    count, columns = 0, []
     while frontier.size:
-        needed = 2 * longest + 2 * int(np.max(np.abs(frontier)))
-        if needed > count:  # nodes enough for e^{−2πi m·G_s}, with room for the next layers
-            count = needed + 32
-            columns = rate.columns(count)
-        matrices = np.stack([np.cos(2 * np.pi * (frontier @ G.T)) @ weights.T for weights, G in columns], axis=2)
-        values = float(rate.scale) * np.linalg.det(matrices)
-        large = np.abs(values) > threshold
+        values, large = coefficients(frontier)
         kept_modes.append(frontier[large])
         kept_values.append(values[large])
         neighbours = (frontier[large][:, None, :] + steps).reshape(-1, genus)
@@ -140,7 +154,7 @@ def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
             raise Unsolved("too-far", f"the clock has more than {_MOST_MODES} Fourier modes, and the time is too far for panels")
     modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
     moving = np.any(modes != 0, axis=1)
-    return modes[moving].astype(np.float64), values[moving]
+    return modes[moving], values[moving]
 
 
 def _half_space(modes: NDArray[np.int64]) -> NDArray[np.int64]:
