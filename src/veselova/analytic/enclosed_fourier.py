@@ -84,6 +84,9 @@ class EnclosedFourier:
 
     def _periodic(self, z: Values) -> tuple[Values, Values]:
         """Return Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰) and its derivative in τ₁ at z (N, g)."""
+        if not self.size:  # a circle: the rate is constant
+            zero = self._xp.array(np.zeros(len(z)))
+            return zero, zero
         cosines, sines = self._xp.waves(self._modes, self._xp.turns(np.concatenate([z, self._orbit.start[None, :]])))
         columns = np.stack([self._amplitudes, self._slopes], axis=1)
         values, slopes = self._xp.product(sines.T, columns), self._xp.product(cosines.T, columns)

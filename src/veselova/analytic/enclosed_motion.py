@@ -25,6 +25,9 @@ __all__ = ["EnclosedMotion"]
 #: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
 _SPARE = 8
 
+#: The change by a move of the start, in units of half the change by that and the opposite one.
+_MOVED = 2
+
 #: Digits added beyond those that were missing, and attempts.
 _MORE = 4
 _ATTEMPTS = 6
@@ -68,6 +71,10 @@ class EnclosedMotion:
         solution = EnclosedSolution(self.problem, working, self.certified)
         with solution.arithmetic as xp:
             series, clock = solution.series(xp.array(exact), approximate)
+            if solution.separatrices:  # the start was moved; what another move would change stands for what this one did
+                neighbour = EnclosedSolution(self.problem, working, self.certified, -solution.distance)
+                other, _ = neighbour.series(xp.array(exact), approximate)
+                series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
             pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
         midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
         return Decimals(self.digits, self.certified, midpoints, radii), {"clock": clock.name, "clock_size": clock.size}

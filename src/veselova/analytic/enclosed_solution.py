@@ -42,7 +42,9 @@ class EnclosedSolution:
     """
 
     def __init__(self, problem: Veselova, digits: int, certified: bool, distance: Fraction | None = None) -> None:
-        found = resolved(moving_part(problem), digits, distance)
+        #: How far a start on a separatrix is moved.
+        self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
+        found = resolved(moving_part(problem), digits, self.distance)
         if certified and (found.separatrices or found.moving.turned):
             what = "a separatrix" if found.separatrices else "equal A's with two moving directions"
             raise Unsolved("not-enclosed", f"{what}: the start is moved by far less than any digit, which is no bound")

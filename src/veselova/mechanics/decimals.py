@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import localcontext
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -67,12 +69,16 @@ class Decimals:
     def flint(self, name: str) -> Objects:
         """Return a series as python-flint balls; raises BackendMissing without python-flint."""
         try:
-            from flint import arb, fmpq
+            from flint import arb
         except ImportError:
             raise BackendMissing("python-flint", "balls", "pip install python-flint") from None
 
+        bits = math.ceil((self.digits + _SPARE_DIGITS) * math.log2(10))
+
         def ball(middle: Any, radius: Any) -> Any:
-            return arb(fmpq(*middle.as_integer_ratio()), fmpq(*radius.as_integer_ratio()))
+            # From integers, exactly: arb's own rounding follows the precision that the caller happens to have set.
+            near, beyond = math.floor(Fraction(middle) * 2**bits), math.ceil(Fraction(radius) * 2**bits) + 1
+            return arb((near, -bits), arb((beyond, -bits)))
 
         return np.asarray(np.vectorize(ball, otypes=[object])(self.midpoints[name], self.radii[name]))
 
