@@ -24,6 +24,7 @@ from veselova.analytic.enclosed_solution import EnclosedSolution, orthonormal
 from veselova.analytic.enclosure import enclosed
 from veselova.analytic.interval import Interval
 from veselova.analytic.reduction import moving_part
+from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.mechanics.decimals import Decimals
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
@@ -92,7 +93,7 @@ def test_thirty_digits_at_a_million_million() -> None:
 
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
-    solution = EnclosedSolution(body3(), 45, False)
+    solution = EnclosedSolution(Solution(body3()), 45, False, "angles")
     near = vs.solve(body3(), [20]).tau1 / float(solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit)))
     from veselova.analytic.enclosed_clock import EnclosedClock
     from veselova.analytic.enclosed_fourier import EnclosedFourier
@@ -182,7 +183,7 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
 def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -> None:
     """Taylor coefficients of dt/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
     for n in (3, 5):
-        solution = EnclosedSolution(random_problem(rng, n), 50, True)
+        solution = EnclosedSolution(Solution(random_problem(rng, n)), 50, True, "angles")
         with solution.arithmetic as xp:
             width, largest = solution.orbit.strip
             step = xp.number(width) / 40
@@ -194,7 +195,7 @@ def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -
 
 
 def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generator) -> None:
-    solution = EnclosedSolution(random_problem(rng, 5), 40, True)
+    solution = EnclosedSolution(Solution(random_problem(rng, 5)), 40, True, "angles")
     inversion: AbelJacobi = solution.orbit.rate.inversion
     with solution.arithmetic as xp:
         psi = xp.array(rng.uniform(0, 6, (6, 4)))
@@ -223,7 +224,7 @@ def test_decimals_turn_into_numbers_of_both_libraries() -> None:
         ({"digits": 20, "engine": "numeric"}, "digits"),
         ({"certified": 1}, "certified"),
         ({"certified": True, "engine": "numeric"}, "certified"),
-        ({"digits": 20, "method": "theta"}, "method"),
+        ({"certified": True, "method": "theta"}, "method"),
     ],
 )
 def test_precision_that_an_engine_has_not_is_refused_by_name(options: dict[str, Any], field: str) -> None:

@@ -123,6 +123,10 @@ class Balls(Arithmetic):
         """Return balls around zero that hold the values."""
         return np.asarray(_around_zero(values))
 
+    def at_most(self, values: Values) -> Values:
+        """Return exact upper bounds of |values|."""
+        return np.asarray(_upper(values))
+
     def inside(self, inner: Values, outer: Values) -> bool:
         """Return whether every ball lies in the interior of its partner."""
         return all(b.contains_interior(a) for a, b in zip(inner.ravel(), outer.ravel(), strict=True))
@@ -130,6 +134,11 @@ class Balls(Arithmetic):
     def midpoints(self, values: Values) -> Values:
         """Return the exact midpoints."""
         return np.asarray(_midpoint(values))
+
+    def rational(self, value: Any) -> Fraction:
+        """Return the midpoint, exactly."""
+        mantissa, exponent = value.mid().man_exp()
+        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
         """Return (midpoints rounded to so many significant digits, radii that cover the rounding), arrays of Decimal."""
@@ -150,6 +159,14 @@ class Balls(Arithmetic):
     def turns(self, z: Values) -> Values:
         """Return e^{2πiz}, complex balls."""
         return np.asarray(_turn(2 * z))
+
+    def powers(self, exponents: Values, bases: Values) -> Values:
+        """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
+        result: Any = 1
+        for k in range(exponents.shape[1]):
+            orders, places = np.unique(exponents[:, k], return_inverse=True)
+            result = result * np.stack([bases[:, k] ** int(order) for order in orders])[places]
+        return np.asarray(result)
 
     def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
         """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
@@ -210,6 +227,7 @@ class _Series:
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 
+_upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
 _turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
 _conjugate = np.frompyfunc(lambda w: w.conjugate(), 1, 1)
 _real = np.frompyfunc(lambda w: w.real, 1, 1)

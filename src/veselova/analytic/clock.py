@@ -39,10 +39,6 @@ class ClockRate:
             squared = squared * point / fine.number(curve.branch_points[2 * s + 2])
         return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * fine.sqrt(squared))))
 
-    def coarse(self) -> ClockRate:
-        """Return the same rate in the double precision from which its inversion starts."""
-        return self if self.inversion.coarse is None else ClockRate(self.inversion.coarse, float(self.scale))
-
     def at(self, psi: Values) -> Values:
         """Return dt/dτ₁ at angles of shape (N, g)."""
         rate = 0 * psi[:, 0] + self.scale

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.precision import Values
+from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
 
@@ -19,8 +19,10 @@ __all__ = ["EnclosedClock", "expected_nodes"]
 #: Half length of a panel in half widths of the strip: longer ones take hardly fewer nodes for a length.
 _PANEL_IN_STRIPS = 3.0
 
-#: Half length of a panel in cycles of the fastest phase, where truncation is judged by the coefficients themselves.
+#: Half length of a panel in cycles of the fastest phase, where truncation is judged by the coefficients themselves; at most so
+#: many half widths of the strip.
 _PANEL_IN_CYCLES = 1.0
+_LONGEST_IN_STRIPS = 8.0
 
 #: Nodes per cycle and digit.
 _NODES_PER_DIGIT = 2.6
@@ -91,24 +93,26 @@ class EnclosedClock:
             panels = self._evaluated(reach, direction, count, nodes)
             return replace(panels, truncation=self._xp.array([truncation] * count), steepest=largest / width)
         fastest = max(abs(float(f)) for f in self._orbit.frequencies)
-        count = math.ceil(reach * fastest / (2 * _PANEL_IN_CYCLES))
+        # Near a separatrix dt/dτ₁ varies much faster than any phase.
+        count = math.ceil(reach / (2 * min(_PANEL_IN_CYCLES / fastest, _LONGEST_IN_STRIPS * self._orbit.strip[0])))
         nodes = self._expected_nodes(reach, direction, count)
         while True:
             panels = self._evaluated(reach, direction, count, nodes)
-            last = np.sum(np.abs(self._xp.midpoints(panels.rates[:, -_LAST:])), axis=1)
-            if np.all(last <= _NEARLY * self._xp.epsilon * panels.rates[:, 0]):
-                return replace(panels, truncation=_TAIL * last)
+            last = panels.rates[:, -_LAST:]
+            middle = self._xp.midpoints(last)
+            size, noise = (np.sum(self._xp.at_most(x), axis=1) for x in (middle, last - middle))
+            if np.all(size <= _NEARLY * (noise + self._xp.epsilon * panels.rates[:, 0])):
+                return replace(panels, truncation=_TAIL * (size + noise))
             nodes = math.ceil(_MORE * nodes)
 
     def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
-        coarse = self._orbit.rate.coarse()
         half = reach / (2 * count)
         theta = np.pi * (2 * np.arange(_SAMPLE) + 1) / (2 * _SAMPLE)
         tau1 = direction * ((2 * np.arange(count)[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
-        values = coarse.at(coarse.inversion.invert(start + tau1[:, None] * frequencies)).reshape(count, _SAMPLE)
-        series = np.abs(coarse.inversion.arithmetic.cosine_series(values)) / np.abs(values[:, :1])
+        values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(count, _SAMPLE)
+        series = np.abs(DOUBLE.cosine_series(values)) / np.abs(values[:, :1])
         # The largest coefficient from each on: a falling bound, read off where it still is above rounding.
         falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
         seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))

@@ -20,6 +20,9 @@ __all__ = ["EnclosedFourier", "expected_modes"]
 _MODES = {1: 12, 2: 200, 3: 1500, 4: 10_000}
 _OF_DIGITS = 15
 
+#: Modes looked at before giving up: minutes.
+_MOST_MODES = 200_000
+
 #: Modes that bring the inverse clock near its answer in double precision, where Newton's method settles at this step (in cycles).
 _FIRST_MODES = 4000
 _SETTLED = 1e-7
@@ -78,7 +81,7 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        modes, values = grown(rate.inversion.periods.genus, determinants)
+        modes, values = grown(rate.inversion.periods.genus, determinants, _MOST_MODES)
         order = np.argsort([-abs(float(value)) for value in values], kind="stable")
         return modes[order], values[order]
 

@@ -43,6 +43,7 @@ class EnclosedMotion:
     problem: Veselova
     digits: int
     certified: bool
+    method: str | None
 
     def __post_init__(self) -> None:
         if self.problem.axes is not None:
@@ -56,23 +57,26 @@ class EnclosedMotion:
             raise Unsolved("at-rest", "q_dot = 0: the body rests, and there is nothing to compute to more digits")
         solution = Solution(self.problem)
         approximate = solution.clock(grid).tau1(grid)[0]
+        method = self.method or ("theta" if solution.near_separatrix and not self.certified else "angles")
         working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
         for _ in range(_ATTEMPTS):
-            decimals, details = self._attempt(working, exact, approximate)
+            decimals, details = self._attempt(solution, method, working, exact, approximate)
             missing = self.digits + math.ceil(decimals.error.max().log10())
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
-                provenance = Provenance("analytic", "angles", self.digits, __version__, time.perf_counter() - began, details)
+                provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
                 return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
 
-    def _attempt(self, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]) -> tuple[Decimals, Any]:
-        solution = EnclosedSolution(self.problem, working, self.certified)
+    def _attempt(
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]
+    ) -> tuple[Decimals, Any]:
+        solution = EnclosedSolution(coarse, working, self.certified, method)
         with solution.arithmetic as xp:
             series, clock = solution.series(xp.array(exact), approximate)
             if solution.separatrices:  # the start was moved; what another move would change stands for what this one did
-                neighbour = EnclosedSolution(self.problem, working, self.certified, -solution.distance)
+                neighbour = EnclosedSolution(coarse, working, self.certified, method, -solution.distance)
                 other, _ = neighbour.series(xp.array(exact), approximate)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
             pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -16,16 +17,18 @@ from veselova.analytic.clock import ClockRate
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import EnclosedFourier, expected_modes
-from veselova.analytic.enclosure import enclosed
-from veselova.analytic.frame import Frame
+from veselova.analytic.enclosed_theta import EnclosedTheta
+from veselova.analytic.enclosure import enclosed, spheroconic
+from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Values
+from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
+from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import start
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.veselova import Veselova
 
 __all__ = ["EnclosedSolution"]
 
@@ -37,11 +40,13 @@ _NEARLY_NATURAL = 1e-9
 class EnclosedSolution:
     """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
 
-    ``certified``: all truncations are bounded; else estimated. ``distance`` as in Solution. Raises Unsolved (``not-enclosed``)
-    where a bound cannot be closed.
+    ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only angles can be); else estimated.
+    ``method``: ``theta`` or ``angles``. ``distance`` as in Solution. Raises Unsolved (``not-enclosed``) where a bound cannot be
+    closed.
     """
 
-    def __init__(self, problem: Veselova, digits: int, certified: bool, distance: Fraction | None = None) -> None:
+    def __init__(self, coarse: Solution, digits: int, certified: bool, method: str, distance: Fraction | None = None) -> None:
+        problem = coarse.problem
         #: How far a start on a separatrix is moved.
         self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
         found = resolved(moving_part(problem), digits, self.distance)
@@ -55,12 +60,18 @@ class EnclosedSolution:
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
-            coarse = AbelJacobi(Periods(Curve.of(found.spectrum, DOUBLE)))
-            inversion = AbelJacobi(Periods(curve), coarse)
+            inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(Curve.of(found.spectrum, DOUBLE))))
             begin = start(found.spectrum, curve, self.spectrum)
             self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
             rate = ClockRate.of(self.spectrum, inversion)
-            self.orbit = Orbit(self.spectrum, rate, inversion.map(self._angles)[0], inversion.periods.frequencies)
+            origin, frequencies = inversion.map(self._angles)[0], inversion.periods.frequencies
+            self._quotients: ThetaQuotients | None = None
+            if method == "theta":
+                theta = EnclosedTheta(inversion.periods.riemann_matrix, self.arithmetic)
+                self._quotients = ThetaQuotients(theta, self.frame)
+            position = None if self._quotients is None else self._quotients.position
+            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse.rate_at)
+        self._panels_only = coarse.near_separatrix
 
     def series(
         self, times: Values, approximate: NDArray[np.float64]
@@ -72,31 +83,36 @@ class EnclosedSolution:
         xp, moving, n = self.arithmetic, self.moving, self.problem.n
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
-        psi = self.orbit.rate.inversion.invert(self.orbit.phases(tau1))
-        attitude = self.frame.at(psi)
-        q_dot = (attitude.q_prime / self.orbit.rate.at(psi)[:, None]) @ self._directions.T
+        attitude = self._attitude(self.orbit.phases(tau1))
+        q_dot = (attitude.q_prime * self.orbit.clock_rates(attitude.q)[:, None]) @ self._directions.T
         frame = np.empty((len(times), n, n), dtype=object)
         frame[:, :, 0] = attitude.q @ self._directions.T
         frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part
         unit = xp.number(moving.unit)
         frozen = np.tile(xp.array([1 / a for a in moving.frozen]), (len(times), 1))
-        spheroconic = np.concatenate([attitude.spheroconic / unit, frozen], axis=1)
-        order = np.argsort(spheroconic.astype(float), axis=1, kind="stable")
+        coordinates = np.concatenate([attitude.spheroconic / unit, frozen], axis=1)
+        order = np.argsort(coordinates.astype(float), axis=1, kind="stable")
         product = frame[:, :, :1] * q_dot[:, None, :]
         series = {
             "q": frame[:, :, 0],
             "q_dot": q_dot,
             "frame": frame,
             "omega": product - np.swapaxes(product, 1, 2),
-            "spheroconic": np.take_along_axis(spheroconic, order, axis=1),
+            "spheroconic": np.take_along_axis(coordinates, order, axis=1),
             "tau1": tau1 * xp.sqrt(unit),
         }
         return series, clock
 
+    def _attitude(self, z: Values) -> Attitude:
+        if self._quotients is None:
+            return self.frame.at(self.orbit.rate.inversion.invert(z))
+        attitude = self._quotients.at(z)
+        return replace(attitude, spheroconic=spheroconic(attitude.q, self.spectrum.inverse, self.arithmetic))
+
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
         """Return the clock with fewer evaluations; only that of panels is bounded."""
         nodes = expected_nodes(self.orbit, approximate)
-        if self.arithmetic.certified or nodes < expected_modes(self.moving.size - 1, self.arithmetic.digits):
+        if self.arithmetic.certified or self._panels_only or nodes < expected_modes(self.moving.size - 1, self.arithmetic.digits):
             return EnclosedClock(self.orbit, approximate, self.arithmetic.certified)
         return EnclosedFourier(self.orbit)
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from veselova.analytic.balls import Balls, balls
-from veselova.analytic.precision import Values
+from veselova.analytic.precision import Values, extended
+from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.analytic.spectrum import Resolved, Spectrum, tangent
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["enclosed"]
+__all__ = ["enclosed", "spheroconic"]
 
 #: Digits of the balls against those in which the zeros were found: differences of nearby zeros and poles enter what follows.
 _FINER = 2
@@ -37,9 +39,25 @@ def enclosed(found: Resolved) -> Spectrum:
         inverse = xp.array([1 / a for a in found.moving.A])
         points = _zeros(coarse.spheroconic, coarse.inverse, inverse, q * q, 0, xp)
         along = [_component(s, coarse, q, v, inverse, points) for s in range(len(points))]
-        constants = _zeros(coarse.constants[1:], coarse.spheroconic, points, xp.array(along) ** 2, 1, xp)
+        constants = _zeros(coarse.constants[1:], coarse.spheroconic, points, xp.array(along) * xp.array(along), 1, xp)
         zero = xp.array([0])
         return Spectrum(xp, inverse, q, v, np.concatenate([zero, constants]), points, rate)
+
+
+def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
+    """Return the λ's of positions q (N, m), shape (N, m−1): eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹."""
+    poles = [xp.rational(x) for x in inverse]
+    middles = [_zeros_of_position(poles, [xp.rational(x) ** 2 for x in row], _FINER * xp.digits) for row in q]
+    radius = 4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon
+    return np.asarray(xp.widened(xp.array(middles).reshape(len(q), -1), (radius * inverse[-1])[:, None]))
+
+
+def _zeros_of_position(poles: list[Fraction], weights: list[Fraction], digits: int) -> list[Any]:
+    arithmetic = extended(digits)
+    try:
+        return zeros_between_poles(arithmetic.array(poles), arithmetic.array(weights), 0, arithmetic)
+    except TooFewDigits:
+        return _zeros_of_position(poles, weights, _FINER * digits)
 
 
 def _component(s: int, coarse: Spectrum, q: Values, v: Values, inverse: Values, points: Values) -> Any:

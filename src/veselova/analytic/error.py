@@ -37,7 +37,9 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
-    phase = _PHASE * _EPSILON + rounding * elapsed[:, None] * frequencies
+    # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
+    start = solution.start_rounding if method == "theta" else 0.0
+    phase = _PHASE * _EPSILON + start + rounding * elapsed[:, None] * frequencies
     along_flow = rounding * elapsed + clock.error(tau1)
     evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
     error = evaluation * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow

@@ -132,13 +132,13 @@ def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
 
 
 def grown(
-    genus: int, coefficients: Callable[[NDArray[np.int64]], tuple[Any, NDArray[np.bool_]]]
+    genus: int, coefficients: Callable[[NDArray[np.int64]], tuple[Any, NDArray[np.bool_]]], most: int = _MOST_MODES
 ) -> tuple[NDArray[np.int64], NDArray[Any]]:
     """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, and these.
 
     ``coefficients`` gives those of modes (M, g), and whether each is large enough. They fall off like the support function of a
     convex body, so the set is convex up to its edge: it is grown from zero through neighbours, in whichever directions it
-    reaches far. Raises Unsolved beyond _MOST_MODES.
+    reaches far. Raises Unsolved where more than ``most`` have been looked at.
     """
     steps = np.concatenate([np.eye(genus, dtype=np.int64), -np.eye(genus, dtype=np.int64)])
     seen: set[bytes] = {np.zeros(genus, dtype=np.int64).tobytes()}
@@ -150,8 +150,8 @@ def grown(
         kept_values.append(values[large])
         neighbours = (frontier[large][:, None, :] + steps).reshape(-1, genus)
         frontier = _unseen(_half_space(neighbours), seen)
-        if len(seen) > _MOST_MODES:
-            raise Unsolved("too-far", f"the clock has more than {_MOST_MODES} Fourier modes, and the time is too far for panels")
+        if len(seen) > most:
+            raise Unsolved("too-far", f"the clock has more than {most} Fourier modes, and the time is too far for panels")
     modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
     moving = np.any(modes != 0, axis=1)
     return modes[moving], values[moving]

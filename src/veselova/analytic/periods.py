@@ -106,6 +106,11 @@ class Periods:
         return self.arithmetic.inverse(self.cycles)
 
     @cached_property
+    def cancellation(self) -> Values:
+        """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's over many orders cancel."""
+        return np.asarray(sum(np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=1) for series in self.cut_series))
+
+    @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.frame import Attitude, Frame, slopes
 from veselova.analytic.theta import Theta
 
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 class ThetaQuotients:
     """The theta route to the attitude of one torus; agrees with Frame after Abel–Jacobi inversion, and shares only κ with it."""
 
-    theta: Theta
+    theta: Theta | EnclosedTheta
     frame: Frame
 
     @cached_property
@@ -54,11 +55,12 @@ class ThetaQuotients:
     def constants(self) -> Array:
         """Return the κ's in the order of the functions."""
         g = self.theta.genus
-        half_periods = np.array(np.meshgrid(*[[0.0, 1.0]] * g, indexing="ij")).reshape(g, -1).T
-        attitude = self.frame.at(np.pi * half_periods)
+        xp = self.frame.periods.arithmetic
+        half_periods = xp.array(np.array(np.meshgrid(*[[0.0, 1.0]] * g, indexing="ij")).reshape(g, -1).T)
+        attitude = self.frame.at(xp.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
         raw = self._raw(half_periods / 2)
-        best = np.argmax(np.abs(raw), axis=0)
+        best = np.argmax(np.abs(raw.astype(float)), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
 

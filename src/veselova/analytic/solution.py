@@ -42,6 +42,9 @@ _THETA_GENUS = 3
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
 
+#: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
+_LARGE_CANCELLATION = 10.0
+
 #: Above genus three a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still
 #: give 1e-12, at a cost that grows as the gap closes, and theta sums are cheap up to genus three only.
 _NARROW_GAP_HIGH_GENUS = 1e-12
@@ -145,6 +148,12 @@ class Solution:
         return float(self.rate.mean)
 
     @cached_property
+    def start_rounding(self) -> Array:
+        """Return what rounding of the start's angles, and of the map from them, makes of its phases, shape (g,)."""
+        slopes = np.abs(self.inversion.jacobian(self.start.angles[None, :])[0])
+        return np.asarray((slopes @ np.abs(self.start.angles) + self.periods.cancellation) * DOUBLE.epsilon)
+
+    @cached_property
     def in_tau1(self) -> LinearFlow:
         """Return z(τ₁) = z⁰ + fτ₁ in double precision."""
         return LinearFlow.of(self._origin, self.periods.frequencies)
@@ -227,10 +236,11 @@ class Solution:
         return float(np.max(np.abs(self.periods.riemann_matrix)))
 
     def default_method(self) -> str:
-        """Return theta near a separatrix, angles for a narrow cut, and otherwise the cheaper route."""
+        """Return theta near a separatrix, angles for a narrow cut or wide A's, and otherwise the cheaper route."""
         if self.near_separatrix:
             return "theta"
-        return "theta" if self.curve.genus <= _THETA_GENUS and self.largest_period < _LARGE_PERIOD else "angles"
+        harmless = self.largest_period < _LARGE_PERIOD and np.max(self.periods.cancellation) < _LARGE_CANCELLATION
+        return "theta" if self.curve.genus <= _THETA_GENUS and harmless else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""

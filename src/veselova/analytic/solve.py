@@ -58,12 +58,13 @@ def solve(
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
     if digits == DOUBLE.digits and not certified:
         return _Motion(problem, method, clock)(grid)
-    for field, value, only in (("method", method, "angles"), ("clock", clock, "panels")):
-        if value not in (None, only):
-            raise InvalidInput((field,), f"{only}, where digits > {DOUBLE.digits} or errors are certified", shown(value))
+    if certified and method == "theta":
+        raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
+    if clock is not None:
+        raise InvalidInput(("clock",), f"none, where digits > {DOUBLE.digits} or errors are certified", shown(clock))
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
-    return EnclosedMotion(problem, digits, certified)(times)
+    return EnclosedMotion(problem, digits, certified, method)(times)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,10 @@ __all__ = ["Start", "start"]
 
 @dataclass(frozen=True)
 class Start:
-    """angles (g,) in [0, 2π) · signs (n,) of the q_i along sorted axes, against the roots of analytic.frame."""
+    """Where a motion begins: angles (g,) in (−π, π], small ones to their own last bit, and the constant signs (n,) of the q_i.
+
+    The signs go along sorted axes and stand against the roots of analytic.frame.
+    """
 
     angles: Values
     signs: Values
@@ -40,8 +43,8 @@ def start(spectrum: Spectrum, curve: Curve, enclosed: Spectrum | None = None) ->
         if position == 0 or spectrum.spheroconic[s] == spectrum.inverse[i]:
             # The root passes zero with ψ: upwards along sn at ψ = 0, downwards along cn at ψ = π.
             signs.append((1 if velocity > 0 else -1) * (1 if lower_end else -1))
-        else:  # along cn it is positive on the way up, which ψ rounded to π no longer tells
-            root_positive = lower_end or increasing[s]
+        else:  # for ψ in (−π, π) sn has its sign and cn is positive, which ψ rounded to π no longer tells
+            root_positive = increasing[s] or not lower_end
             signs.append((1 if position > 0 else -1) * (1 if root_positive else -1))
     return Start(curve.arithmetic.array(angles), curve.arithmetic.array(signs))
 
@@ -57,7 +60,7 @@ def _direction(spectrum: Spectrum, point: Any) -> bool:
 
 
 def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
-    """Return ψ in [0, 2π): v = F(am v, k) = sn·R_F(cn², dn², 1), and 2K−v on the way back."""
+    """Return ψ in (−π, π]: v = F(am v, k) = sn·R_F(cn², dn², 1), and −v on the way back."""
     xp = cut.curve.arithmetic
     below, above = max(below, 0), max(above, 0)
     sn_squared, cn_squared = cut.squares(xp.number(below), xp.number(above))
@@ -70,4 +73,4 @@ def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
         reflected = jacobi.complement / dn_squared
         v = jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))
     psi = xp.pi * v / jacobi.quarter
-    return psi if increasing else 2 * xp.pi - psi
+    return psi if increasing else -psi

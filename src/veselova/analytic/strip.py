@@ -12,11 +12,13 @@ which is below one while ad < √2−1. As long as it is, dt/dτ₁ = √((q,Aq)
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.clock import ClockRate
 from veselova.analytic.precision import Values
@@ -30,12 +32,17 @@ _LARGEST_TURN = 0.4142
 
 @dataclass(frozen=True)
 class Orbit:
-    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls."""
+    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls.
+
+    position: q at phases, by theta functions, where angles are not to be asked · coarse_rates: dt/dτ₁ at phases in doubles
+    """
 
     spectrum: Spectrum
     rate: ClockRate
     start: Values
     frequencies: Values
+    position: Callable[[Values], Values] | None
+    coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
     def phases(self, tau1: Values) -> Values:
         """Return z at Neumann times (N,), shape (N, g)."""
@@ -43,14 +50,23 @@ class Orbit:
 
     def rates(self, tau1: Values) -> Values:
         """Return dt/dτ₁ at Neumann times (N,)."""
-        return self.rate.at(self.rate.inversion.invert(self.phases(tau1)))
+        z = self.phases(tau1)
+        return self.rate.at(self.rate.inversion.invert(z)) if self.position is None else 1 / self.clock_rates(self.position(z))
+
+    def clock_rates(self, q: Values) -> Values:
+        """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, (N, m); W follows from the start."""
+        spectrum, xp = self.spectrum, self.rate.inversion.arithmetic
+        start = np.sum(spectrum.q * spectrum.q / spectrum.inverse)
+        return np.asarray(spectrum.clock_rate * xp.sqrt(start / np.sum(q * q / spectrum.inverse, axis=1)))
 
     @cached_property
     def strip(self) -> tuple[float, Any]:
         """Return (y, M) with |dt/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on its torus."""
         inverse, points = self.spectrum.inverse, self.rate.inversion.periods.curve.branch_points
         lowest = inverse[0]
-        level = float((np.sum(self.spectrum.q_prime**2) + np.sum(inverse * self.spectrum.q**2)).upper())
+        level = float(
+            (np.sum(self.spectrum.q_prime * self.spectrum.q_prime) + np.sum(inverse * self.spectrum.q * self.spectrum.q)).upper()
+        )
         # (q,Aq) = Π λ_s/Π I_i, and I_1 = 1/A_1: the least of a⁻².
         share = float((lowest * math.prod(points[1::2]) / math.prod(inverse)).lower())
         lowest = float(lowest.lower())

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 
-__all__ = ["Theta", "lattice_points"]
+__all__ = ["Theta", "cheapest_waves", "largest_corner", "lattice_points", "small_norm"]
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Theta:
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
         everything = range(self.genus)
-        chosen = self.waves if self.waves is not None else _cheapest_waves(self.T)
+        chosen = self.waves if self.waves is not None else cheapest_waves(self.T)
         return list(chosen), [i for i in everything if i not in chosen]
 
     @cached_property
@@ -69,7 +69,7 @@ class Theta:
     def _gaussian_lattice(self) -> Array:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
         _, _, inverse, _ = self._parts
-        corner = float(np.sqrt(_largest_corner(inverse)))
+        corner = float(np.sqrt(largest_corner(inverse)))
         return lattice_points(inverse, np.sqrt(_EXPONENT / np.pi) + corner, np.zeros(inverse.shape[0]))
 
     @cached_property
@@ -81,7 +81,7 @@ class Theta:
         """Return the x with a term above e^−39 of the largest: where T is large (a narrow cut) ε = ½ makes all of them small."""
         S = self._parts[0]
         shift = np.array([epsilon[i] / 2 for i in self._split[0]])
-        return lattice_points(S, np.sqrt(_EXPONENT / np.pi + _small_norm(S, shift)), shift)
+        return lattice_points(S, np.sqrt(_EXPONENT / np.pi + small_norm(S, shift)), shift)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
@@ -138,7 +138,7 @@ def _schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array, f
     return (S + S.T) / 2, C, (inverse + inverse.T) / 2, float(np.sqrt(np.linalg.det(inverse))) if G else 1.0
 
 
-def _largest_corner(form: Array) -> float:
+def largest_corner(form: Array) -> float:
     """Return max rᵀ form r over the cell |r_i| ≤ ½, a convex function: the maximum over its corners."""
     size = form.shape[0]
     if size == 0:
@@ -147,7 +147,7 @@ def _largest_corner(form: Array) -> float:
     return float(np.max(np.sum((corners @ form) * corners, axis=1)))
 
 
-def _cheapest_waves(T: Array) -> tuple[int, ...]:
+def cheapest_waves(T: Array) -> tuple[int, ...]:
     """Return the set F with the fewest terms, by volume, among those whose S stays above the floor."""
     genus = T.shape[0]
     best: tuple[int, ...] = ()
@@ -159,7 +159,7 @@ def _cheapest_waves(T: Array) -> tuple[int, ...]:
             if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
                 continue
             radius = np.sqrt(_EXPONENT / np.pi)
-            spread = radius + np.sqrt(_largest_corner(inverse))
+            spread = radius + np.sqrt(largest_corner(inverse))
             volume = np.sqrt((np.linalg.det(S) if F else 1.0) * (np.linalg.det(inverse) if G else 1.0))
             count = radius ** len(F) * spread ** len(G) / volume * (_WAVE_COST if F else 1.0)
             if count < best_count:
@@ -167,7 +167,7 @@ def _cheapest_waves(T: Array) -> tuple[int, ...]:
     return best
 
 
-def _small_norm(form: Array, shift: Array) -> float:
+def small_norm(form: Array, shift: Array) -> float:
     """Return xᵀ form x for a short x of Z^d + shift: rounding from the last coordinate on (Babai's nearest plane)."""
     upper = np.linalg.cholesky(form).T
     x, norm = np.zeros(shift.size), 0.0

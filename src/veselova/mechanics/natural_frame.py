@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 #: which it converges: constants nearer than 1e-14 of the largest leave their normals as they are.
 _BITS = 320
 _STEPS, _ENOUGH = 5, 35
+
+#: Constants within 2^−_NEAREST of each other count as equal: their difference may be rounding.
+_NEAREST = 100
 _LARGEST_TURN = 0.05
 
 #: Dimension beyond which refinement, n³ products of integers, would take longer than a second.
@@ -75,13 +78,17 @@ def refined(frame: Array, A: Sequence[Fraction], q: Sequence[Fraction], tangent:
         N = _product(N, 3 * one - _product(N.T, N)) >> 1
         H = _product(N.T, _product(M, N))
         distance = np.diag(H)[None, :] - np.diag(H)[:, None] + one
-        turn = np.where(one != 0, 0, (H << _BITS) // np.where(distance == 0, 1, distance))
+        if np.min(np.abs(distance)) < 1 << (_BITS - _NEAREST):
+            return frame
+        turn = np.where(one != 0, 0, (H << _BITS) // distance)
         largest_turn = np.max(np.abs(turn))
         if largest_turn > int(_LARGEST_TURN * 2**_BITS):
             return frame
         N = N + _product(N, turn)
         if largest_turn < 1 << (_BITS - _ENOUGH):
             break
+    else:
+        return frame
     return np.column_stack([frame[:, 0], (N / (1 << _BITS)).astype(np.float64)])
 
 
