@@ -1,0 +1,48 @@
+"""What digits cost: the closed form in ball arithmetic, plain and certified, against the same with more digits.
+
+    python benchmarks/digits.py [most digits]        default 100
+
+Prints, per dimension and number of digits, the seconds of a whole call (set-up included), the working digits, the clock and its
+evaluations, the largest error reported, and the largest difference of the frame from a run with ten digits more (decimals are
+rounded to three digits beyond those asked for).
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+import veselova as vs
+
+
+def problem(n: int) -> vs.Veselova:
+    rng = np.random.default_rng(n)
+    A, q, q_dot = ([f"{x:.3f}" for x in values] for values in (rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n)))
+    return vs.Veselova(A, q, q_dot, normalize=True)
+
+
+def main(most: int) -> None:
+    print("n   times               digits   certified   seconds   working   clock      evaluations   reported   difference")
+    near, many, far = np.linspace(0, 10, 10), np.linspace(0, 100, 100), np.array([1e6, 1e12])
+    table = [(n, times, 15, True) for n in (2, 3, 4, 6) for times in (near,)]
+    table += [(3, near, d, False) for d in (30, 100, 300, 1000) if d <= most]
+    table += [(n, many, 50, False) for n in (3, 4)] + [(3, far, 30, False), (2, far, 50, False)]
+    for n, times, digits, certified in table:
+        body = problem(n)
+        began = time.perf_counter()
+        found = vs.solve(body, times, digits=digits, certified=certified)
+        seconds = time.perf_counter() - began
+        finer = vs.solve(body, times, digits=digits + 10)
+        assert found.decimals is not None
+        assert finer.decimals is not None
+        difference = np.max(np.abs(found.decimals.midpoints["frame"] - finer.decimals.midpoints["frame"]))
+        details, span = found.provenance.details, f"{times.size} to {times[-1]:g}"
+        figures = f"{seconds:7.2f}   {details['working_digits']:7d}   {details['clock']:8s}   {details['clock_size']:11d}"
+        errors = f"{max(found.decimals.error):8.1e}   {difference:8.1e}"
+        print(f"{n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
