@@ -28,11 +28,12 @@ def blocks(text: str, language: str) -> list[str]:
 def test_the_python_of_the_readme_runs(server: Server) -> None:
     scope: dict[str, Any] = {}
     sources = blocks(README, "python")
-    assert len(sources) == 2
+    assert len(sources) == 3
     for source in sources:
         exec(source.replace("http://127.0.0.1:8000", server.url), scope)
     assert scope["comparison"].agrees
     assert scope["torus"].n == 4
+    assert scope["certified"].certified
 
 
 def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:

@@ -84,4 +84,4 @@ class Decimals:
 
     def __repr__(self) -> str:
         kind = "certified" if self.certified else "estimated"
-        return f"<Decimals: {self.digits} digits, {kind} error ≤ {float(max(self.error)):.2g}>"
+        return f"<Decimals: {self.digits} digits, {kind} error ≤ {max(self.error):.2g}>"
