@@ -91,6 +91,33 @@ def test_thirty_digits_at_a_million_million() -> None:
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-30
 
 
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_theta_functions_and_angles_agree_in_balls(n: int, rng: np.random.Generator) -> None:
+    problem = random_problem(rng, n)
+    by_theta, by_angles = (vs.solve(problem, [-1, 3], digits=30, method=method).decimals for method in ("theta", "angles"))
+    assert by_theta is not None
+    assert by_angles is not None
+    for name in ("frame", "q_dot", "spheroconic", "tau1"):
+        assert deviation(by_theta, by_angles, name) < 1e-29, name
+
+
+def test_a_separatrix_has_all_digits_of_exact_data() -> None:
+    """A great circle about the middle axis, and the umbilic motion that leaves it: c_2 = I_2 exactly."""
+    umbilic = vs.Veselova(["3", "2", "1"], ["0.6", "0", "0.8"], ["0.8", "0.5", "-0.6"], normalize=True)
+    near = vs.Veselova(["3", "2", "1"], ["0", "1", "0"], ["0.6", "1e-30", "0.8"], normalize=True)
+    for problem in (umbilic, near, vs.Veselova(["3", "2", "1"], ["0", "1", "0"], ["0.6", "0", "0.8"])):
+        found, finer = (vs.solve(problem, [-2, 5], digits=digits).decimals for digits in (20, 30))
+        assert found is not None
+        assert finer is not None
+        assert deviation(found, finer, "frame") < 1e-20
+
+
+def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
+    with pytest.raises(vs.Unsolved) as caught:
+        vs.solve(vs.Veselova([5, 4, 3, 2, 1], [1] * 5, [1, -2, 3, -4, 2], normalize=True), [1e6], digits=30)
+    assert caught.value.outcome == "too-far"
+
+
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
     solution = EnclosedSolution(Solution(body3()), 45, False, "angles")

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.trajectory import Trajectory
@@ -50,14 +52,14 @@ def solve(
     _require_precision(engine, digits, certified)
     options: dict[str, Any] = {} if method is None else {"method": method}
     if digits > FEWEST_DIGITS or certified:
-        options |= {"digits": digits, "certified": certified}
+        options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
     return answer
 
 
 def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     """Raise InvalidInput unless the engine has these digits, and bounds where they are asked for."""
-    if isinstance(digits, bool) or not isinstance(digits, int) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
+    if isinstance(digits, bool) or not isinstance(digits, (int, np.integer)) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
         raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", shown(digits))
     if not isinstance(certified, bool):
         raise InvalidInput(("certified",), "true or false", shown(certified))

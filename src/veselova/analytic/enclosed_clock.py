@@ -33,6 +33,9 @@ _MOST_NODES = 100_000
 #: Nodes per panel in double precision that show how fast series fall, and the digits down to which they do.
 _SAMPLE, _SAMPLE_DIGITS = 64, 11
 
+#: Panels looked at for that.
+_SAMPLED_PANELS = 200
+
 #: Coefficients at the end of a series that must be small, how much larger than the precision they may be (they are rounding
 #: there), and how many more nodes are taken where they are not.
 _LAST, _NEARLY, _MORE = 3, 1e3, 1.25
@@ -109,9 +112,10 @@ class EnclosedClock:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
         half = reach / (2 * count)
         theta = np.pi * (2 * np.arange(_SAMPLE) + 1) / (2 * _SAMPLE)
-        tau1 = direction * ((2 * np.arange(count)[:, None] + 1) * half - half * np.cos(theta)).ravel()
+        panels = np.unique(np.linspace(0, count - 1, _SAMPLED_PANELS).astype(np.int64))
+        tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
-        values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(count, _SAMPLE)
+        values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), _SAMPLE)
         series = np.abs(DOUBLE.cosine_series(values)) / np.abs(values[:, :1])
         # The largest coefficient from each on: a falling bound, read off where it still is above rounding.
         falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]

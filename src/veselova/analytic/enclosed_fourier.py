@@ -14,14 +14,14 @@ from veselova.analytic.increasing import increasing_root
 from veselova.analytic.precision import Values
 from veselova.analytic.strip import Orbit
 
-__all__ = ["EnclosedFourier", "expected_modes"]
+__all__ = ["MOST_MODES", "EnclosedFourier", "expected_modes"]
 
 #: Modes that a clock of 15 digits has, by genus; they grow with the genus-th power of the digits.
 _MODES = {1: 12, 2: 200, 3: 1500, 4: 10_000}
 _OF_DIGITS = 15
 
 #: Modes looked at before giving up: minutes.
-_MOST_MODES = 200_000
+MOST_MODES = 200_000
 
 #: Modes that bring the inverse clock near its answer in double precision, where Newton's method settles at this step (in cycles).
 _FIRST_MODES = 4000
@@ -81,7 +81,7 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        modes, values = grown(rate.inversion.periods.genus, determinants, _MOST_MODES)
+        modes, values = grown(rate.inversion.periods.genus, determinants, MOST_MODES)
         order = np.argsort([-abs(float(value)) for value in values], kind="stable")
         return modes[order], values[order]
 

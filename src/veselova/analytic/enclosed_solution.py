@@ -16,7 +16,7 @@ from veselova.analytic.balls import balls
 from veselova.analytic.clock import ClockRate
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
-from veselova.analytic.enclosed_fourier import EnclosedFourier, expected_modes
+from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosure import enclosed, spheroconic
 from veselova.analytic.frame import Attitude, Frame
@@ -112,7 +112,8 @@ class EnclosedSolution:
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
         """Return the clock with fewer evaluations; only that of panels is bounded."""
         nodes = expected_nodes(self.orbit, approximate)
-        if self.arithmetic.certified or self._panels_only or nodes < expected_modes(self.moving.size - 1, self.arithmetic.digits):
+        modes = expected_modes(self.moving.size - 1, self.arithmetic.digits)
+        if self.arithmetic.certified or self._panels_only or nodes < modes or modes > MOST_MODES:
             return EnclosedClock(self.orbit, approximate, self.arithmetic.certified)
         return EnclosedFourier(self.orbit)
 
