@@ -237,6 +237,8 @@ _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
 def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
+    if not x.is_finite():
+        return Decimal(0), Decimal("Infinity")
     middle = x.mid()
     rounded = Decimal(middle.str(digits, radius=False))
     rounding = abs(middle - flint.arb(flint.fmpq(*rounded.as_integer_ratio())))

@@ -60,14 +60,25 @@ class EnclosedMotion:
         method = self.method or ("theta" if solution.near_separatrix and not self.certified else "angles")
         working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
         for _ in range(_ATTEMPTS):
-            decimals, details = self._attempt(solution, method, working, exact, approximate)
-            missing = self.digits + math.ceil(decimals.error.max().log10())
+            try:
+                decimals, details = self._attempt(solution, method, working, exact, approximate)
+            except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
+                working *= 2
+                continue
+            missing = self._missing(decimals, working)
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
                 provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
                 return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+
+    def _missing(self, decimals: Decimals, working: int) -> int:
+        """Return how many digits the largest error is above the one asked for."""
+        largest = max(decimals.error)
+        if not largest.is_finite():
+            return working
+        return self.digits + math.ceil(largest.log10()) if largest else 0
 
     def _attempt(
         self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]
