@@ -38,12 +38,12 @@ def main() -> None:
             single.append(time.perf_counter() - began)
         one = statistics.median(single)
 
-        integrator = Taylor(problem.flow, Taylor.tolerances[0])
-        integrator.advance(problem.flow.initial, 0.0, 10.0, np.empty(0))
+        integrator = Taylor(problem.flow(), Taylor.tolerances[0])
+        integrator.advance(problem.flow().initial, 0.0, 10.0, np.empty(0))
         began = time.perf_counter()
-        state = problem.flow.initial
+        state = problem.flow().initial
         for k in range(100):
-            state = problem.flow.project(integrator.advance(state, 10.0 * k, 10.0 * (k + 1), np.empty(0))[1])
+            state = problem.flow().project(integrator.advance(state, 10.0 * k, 10.0 * (k + 1), np.empty(0))[1])
         integrating = (time.perf_counter() - began) * FAR / 1000
 
         solution = Solution(problem)

@@ -17,7 +17,6 @@ import pytest
 from conftest import Server, running_server
 from hostile import GOOD, INVALID, MALFORMED, changed
 from veselova import Veselova, compare, solve, torus
-from veselova.mechanics.trajectory import OUTPUTS
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
 
 JSON = {"content-type": "application/json"}
@@ -49,8 +48,8 @@ def test_a_trajectory_is_the_one_of_the_library(server: Server, engine: str) -> 
     document, expected = response.json(), solve(PROBLEM, [0, 1], engine)
     assert document["engine"] == engine
     assert document["times"] == [0, 1]
-    assert set(document["series"]) == set(OUTPUTS)
-    for name in OUTPUTS:
+    assert set(document["series"]) == set(PROBLEM.outputs)
+    for name in PROBLEM.outputs:
         assert np.array_equal(np.array(document["series"][name]), expected.series(name))
     assert document["error"] == expected.error.tolist()
     assert document["integrals"]["energy"]["drift"] < 1e-11
@@ -68,7 +67,7 @@ def test_a_comparison_has_both_engines_and_their_differences(server: Server) -> 
     document = post(server, "/v1/comparisons", {**GOOD, "outputs": ["q"]}).json()
     expected = compare(PROBLEM, [0, 1])
     assert document["deviation"]["q"] == expected.deviation["q"]
-    assert set(document["deviation"]) == set(OUTPUTS)
+    assert set(document["deviation"]) == set(PROBLEM.outputs)
     assert document["agrees"] is True
     assert set(document["seconds"]) == {"analytic", "numeric"}
     assert list(document["analytic"]["series"]) == ["q"]
@@ -107,7 +106,7 @@ def test_the_openapi_document_describes_and_exemplifies_every_resource(server: S
 def test_systems_health_and_readiness(server: Server) -> None:
     systems = httpx2.get(f"{server.url}/v1/systems").json()
     assert systems["systems"][0]["system"] == "veselova"
-    assert systems["systems"][0]["outputs"] == list(OUTPUTS)
+    assert systems["systems"][0]["outputs"] == list(PROBLEM.outputs)
     assert systems["limits"]["max_times"] == 100_000
     assert httpx2.get(f"{server.url}/healthz").json()["status"] == "ok"
     assert httpx2.get(f"{server.url}/readyz").json() == {"status": "ready"}

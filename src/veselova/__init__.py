@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.errors import ServiceUnreachable as ServiceUnreachable
     from veselova.mechanics.errors import Unsolved as Unsolved
     from veselova.mechanics.errors import VeselovaError as VeselovaError
+    from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
     from veselova.mechanics.torus import Torus as Torus
     from veselova.mechanics.trajectory import Provenance as Provenance
     from veselova.mechanics.trajectory import Trajectory as Trajectory
@@ -45,6 +46,7 @@ _HOMES = {
     "InternalContradiction": "veselova.mechanics.errors",
     "InvalidInput": "veselova.mechanics.errors",
     "InvalidRequest": "veselova.mechanics.errors",
+    "NeumannSystem": "veselova.mechanics.neumann",
     "ProblemResponse": "veselova.mechanics.errors",
     "Provenance": "veselova.mechanics.trajectory",
     "ServiceError": "veselova.mechanics.errors",

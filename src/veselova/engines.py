@@ -10,6 +10,7 @@ import numpy as np
 
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova import Veselova
 
@@ -28,29 +29,35 @@ ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": 
 
 
 def solve(
-    problem: Veselova,
+    problem: Problem,
     times: Any,
-    engine: str = "analytic",
+    engine: str | None = None,
     method: str | None = None,
     *,
     digits: int = 15,
     certified: bool = False,
+    formulation: str | None = None,
 ) -> Trajectory:
     """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
 
-    ``engine``: ``analytic`` (closed form) or ``numeric`` (integration). ``method``: None for the engine's default;
+    ``engine``: ``analytic`` (closed form) or ``numeric`` (integration); None takes the closed form where the system has one, see
+    ``problem.engines``. ``formulation``: which of ``problem.formulations`` is integrated. ``method``: None for the engine's default;
     analytic: ``theta`` or ``angles``; numeric: ``dop853`` or ``taylor`` (extra ``fast``).
     ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal with that many digits after the
     point in q and frame, ``trajectory.decimals``. Data are taken at their word: strings exactly, doubles as the dyadic numbers
     they store. ``certified`` (analytic): the error of every such number is a proven bound.
     Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem, BackendMissing without its library.
     """
-    if not isinstance(problem, Veselova):
+    if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    if not isinstance(engine, str) or engine not in ENGINES:
-        raise InvalidInput(("engine",), f"one of {', '.join(ENGINES)}", shown(engine))
+    engine = next(iter(problem.engines)) if engine is None else engine
+    if not isinstance(engine, str) or engine not in problem.engines:
+        raise InvalidInput(("engine",), f"one of {', '.join(problem.engines)} for system {problem.system}", shown(engine))
     _require_precision(engine, digits, certified)
-    options: dict[str, Any] = {} if method is None else {"method": method}
+    named = {"method": method, "formulation": formulation}
+    options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
+    if engine == "analytic" and formulation is not None:
+        raise InvalidInput(("formulation",), "none (the closed form has one)", shown(formulation))
     if digits > FEWEST_DIGITS or certified:
         options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
@@ -69,7 +76,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
-def compare(problem: Veselova, times: Any, method: str | None = None) -> Comparison:
+def compare(problem: Problem, times: Any, method: str | None = None) -> Comparison:
     """Return both engines' answers and their differences; ``method`` is the numerical one (``dop853`` or ``taylor``)."""
     return Comparison(solve(problem, times, "analytic"), solve(problem, times, "numeric", method))
 
@@ -79,7 +86,7 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
     return import_module("veselova.analytic.from_torus").start_on_torus(A, energy, constants, phases, signs)  # type: ignore[no-any-return]
 
 
-def torus(problem: Veselova) -> Torus:
+def torus(problem: Problem) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the analytic engine does."""
     if not isinstance(problem, Veselova):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))

@@ -16,7 +16,6 @@ from veselova.analytic.error import estimated_error
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
-from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
@@ -28,6 +27,9 @@ Array = NDArray[np.float64]
 
 #: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
+
+#: The series that states are, along the principal axes.
+_SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 
 #: An error above this leaves no digit of the attitude.
 _NO_DIGIT = 0.1
@@ -114,14 +116,13 @@ class _Motion:
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
         provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
-        return Trajectory.of_principal(self.problem, grid, (tau1, *states), error, provenance, dense=self)
+        series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
+        return Trajectory(self.problem, grid, error, series, provenance, dense=self)
 
     def _resting(self, grid: Array, began: float) -> Trajectory:
-        n, frame = self.problem.n, np.tile(self.problem.frame, (grid.size, 1, 1))
-        states = np.zeros((grid.size, n)), frame, to_spheroconic(self.problem.A, frame[:, :, 0])
+        series = {name: np.repeat(values, grid.size, axis=0) for name, values in self.problem.start.items()}
         provenance = Provenance("analytic", "rest", 15, __version__, time.perf_counter() - began, {"regime": "rest"})
-        error = np.full(grid.size, np.finfo(float).eps)
-        return Trajectory.of_principal(self.problem, grid, (np.zeros(grid.size), *states), error, provenance, dense=self)
+        return Trajectory(self.problem, grid, np.full(grid.size, DOUBLE.epsilon), series, provenance, dense=self)
 
 
 def _evaluated(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:

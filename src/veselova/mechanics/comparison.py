@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.trajectory import OUTPUTS, Trajectory
+from veselova.mechanics.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,7 @@ class Comparison:
     @cached_property
     def deviation(self) -> dict[str, float]:
         """Return the largest difference of each output over all times and components."""
-        return {name: float(np.max(self.difference(name))) for name in OUTPUTS}
+        return {name: float(np.max(self.difference(name))) for name in self.analytic.problem.outputs}
 
     @cached_property
     def conditioning_floor(self) -> Array:
@@ -47,9 +47,9 @@ class Comparison:
 
     @cached_property
     def agrees(self) -> bool:
-        """Return whether q and frame differ, at every time, by no more than the two error estimates together."""
+        """Return whether the bounded outputs differ, at every time, by no more than the two error estimates together."""
         allowed = self.analytic.error + self.numeric.error
-        return bool(np.all(np.maximum(self.difference("q"), self.difference("frame")) <= allowed))
+        return bool(all(np.all(self.difference(name) <= allowed) for name in self.analytic.problem.bounded))
 
     @property
     def seconds(self) -> dict[str, float]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
 
-__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "plain", "to_float"]
+__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "plain", "read_only", "to_float"]
 
 Number = int | float | str | Fraction | Decimal
 
@@ -139,5 +139,10 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
         array = np.array([float(x) for x in values])  # type: ignore[arg-type]
     if not all(math.isfinite(x) for x in array.flat):
         raise OverflowError("a validated number left the float range")
+    return read_only(array)
+
+
+def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the array, no longer writable."""
     array.setflags(write=False)
     return array

@@ -1,111 +1,68 @@
-"""The reduced flow on T*Sⁿ⁻¹ with the frame carried along: vector field, projection, and its units.
-
-Momenta are measured in units of 1/det A (so det A never appears), lengths of A in units of 2^k near its geometric mean,
-and time in units of 1/|q̇(0)|: the field is then of order one whatever the scales of the input.
-"""
+"""What the numerical engine integrates: an autonomous vector field on a manifold, in units in which both are of order one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.integrals import sliding_velocity, unit_scale
-from veselova.mechanics.natural_frame import orthonormalized
-
-__all__ = ["ReducedFlow"]
+__all__ = ["FLOATS", "Flow", "Operations"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ReducedFlow:
-    """The extended system (extended) with ė_k = −ω e_k and dτ₁/dt, for one body and one energy.
+class Operations:
+    """What a field may do besides + − × ÷, in floating point or with the symbols of a Taylor integrator.
 
-    A state is the flat array (p, E, τ₁) of length n + n² + 1: momentum, frame matrix (row-major, columns e_k, e_1 = q), and
-    Neumann time. ``twice_energy`` is W = (p,A⁻¹p)/(q,Aq), the conserved 2h det A in these units.
+    dot: the matrix product ``a @ b`` of arrays of one or two dimensions
     """
 
-    A: Array
-    inverse: Array
-    twice_energy: float
-    time_unit: float
-    tau1_unit: float
+    sqrt: Callable[[Any], Any]
+    dot: Callable[[Any, Any], Any]
+
+
+FLOATS = Operations(np.sqrt, np.matmul)
+
+
+class Flow(ABC):
+    """A vector field with a start. States are flat arrays; redundant coordinates are put back on the manifold by ``project``.
+
+    initial     the start, (m,) · parameters  the numbers that the field depends on, (k,)
+    time_unit   one unit of scaled time, in units of the problem's time
+    size        what the bounded outputs are measured in, in the problem's units
+    """
+
     initial: Array
+    parameters: Array
+    time_unit: float
+    size: float = 1.0
 
-    @classmethod
-    def of(cls, A: Array, q: Array, q_dot: Array, frame: Array) -> ReducedFlow:
-        """Return the flow of a moving body (q̇ ≠ 0) that starts at t = 0 in the given state."""
-        scaled, k = unit_scale(A)
-        speed = float(np.max(np.abs(q_dot)))
-        speed *= float(np.linalg.norm(q_dot / speed))
-        p = cls._momentum(scaled, q, q_dot / speed)
-        twice_energy = float(p @ (p / scaled) / (q @ (scaled * q)))
-        initial = np.concatenate([p, frame.ravel(), [0.0]])
-        # dτ₁/dt = √(W/(q,Aq)) is homogeneous of degree ½ in A and 1 in q̇.
-        return cls(scaled, 1 / scaled, twice_energy, 1 / speed, float(np.sqrt(np.ldexp(1.0, k))), initial)
-
-    @staticmethod
-    def _momentum(A: Array, q: Array, q_dot: Array) -> Array:
-        w = sliding_velocity(A, q, q_dot)
-        return np.asarray(A * w * (q @ (A * q)), dtype=np.float64)
-
-    def neighbour(self, distance: float) -> ReducedFlow:
-        """Return the flow of a start moved by about ``distance`` on the manifold, energy included: how data rounding acts."""
-        n = self.n
-        direction = np.random.default_rng(n).normal(size=self.initial.size) / np.sqrt(n)
-        p, E = self.initial[:n], self.initial[n:-1].reshape(n, n)
-        q = E[:, 0] + distance * direction[:n]
-        q /= np.linalg.norm(q)
-        E = orthonormalized(np.column_stack([q, E[:, 1:]]))
-        p = p + distance * float(np.linalg.norm(p)) * direction[n : 2 * n]
-        p = p - (p @ E[:, 0]) * E[:, 0]
-        twice_energy = float(p @ (self.inverse * p) / (E[:, 0] @ (self.A * E[:, 0])))
-        return replace(self, twice_energy=twice_energy, initial=np.concatenate([p, E.ravel(), [0.0]]))
+    @abstractmethod
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return the derivative of a state in scaled time, (m,); arrays hold floats or symbols, so ``ops`` has the functions."""
 
     @property
-    def n(self) -> int:
-        """Return the dimension of the body."""
-        return self.A.size
+    def structure(self) -> Hashable | None:
+        """Return what determines the field besides its parameters, so that compiled fields can be kept; None has no symbols."""
+        return type(self), self.initial.size, self.parameters.size
+
+    @abstractmethod
+    def project(self, state: Array) -> Array:
+        """Return a state that left the manifold by rounding and truncation, back on it."""
+
+    @abstractmethod
+    def neighbour(self, distance: float) -> Flow:
+        """Return the flow of a start moved by about ``distance`` on the manifold: how rounding of the data acts."""
+
+    @abstractmethod
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return series by name, in the problem's units, from states (N, m)."""
 
     def vector_field(self, _time: float, state: Array) -> Array:
-        """Return the derivative of a state: (extended) for q and p, (Po) for the frame, (4.6) for τ₁."""
-        n = self.n
-        p, E = state[:n], state[n:-1].reshape(n, n)
-        q = E[:, 0]
-        Aq, p_inverse = self.A * q, self.inverse * p
-        qAq, qq = q @ Aq, q @ q
-        q_dot = (p_inverse - (p_inverse @ q / qq) * q) / qAq
-        p_dot = (-((p @ p_inverse) * qq - (p @ q) * (p_inverse @ q)) / (qAq * qq * qq)) * q
-        derivative = np.empty_like(state)
-        derivative[:n] = p_dot
-        # −(q∧q̇)E = q̇(qᵀE) − q(q̇ᵀE); its first column is q̇(q,q) − q(q̇,q) = q̇ since (extended) keeps (q̇,q) = 0.
-        derivative[n:-1] = (np.outer(q_dot, q @ E) - np.outer(q, q_dot @ E)).ravel()
-        derivative[-1] = np.sqrt(self.twice_energy / qAq)
-        return derivative
-
-    def project(self, state: Array) -> Array:
-        """Return the state back on the manifold: frame orthonormal, (q,p) = 0, p rescaled to the energy.
-
-        Without it a start that is one rounding off the manifold makes the energy drift quadratically in time.
-        """
-        n = self.n
-        E = orthonormalized(state[n:-1].reshape(n, n))
-        q = E[:, 0]
-        p = state[:n] - (state[:n] @ q) * q
-        p = p * np.sqrt(self.twice_energy * (q @ (self.A * q)) / (p @ (self.inverse * p)))
-        return np.concatenate([p, E.ravel(), state[-1:]])
-
-    def unpack(self, states: Array) -> tuple[Array, Array, Array]:
-        """Return (frame, q̇, τ₁) in the user's units from states of shape (N, n + n² + 1).
-
-        Frames are made orthonormal and p orthogonal to q; the energy is left as integrated, so that its drift can be seen.
-        """
-        n = self.n
-        p, E = states[:, :n], orthonormalized(states[:, n:-1].reshape(-1, n, n))
-        q = E[:, :, 0]
-        p_inverse = self.inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
-        qAq = np.sum(q * self.A * q, axis=1, keepdims=True)
-        q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / qAq
-        return E, q_dot / self.time_unit, states[:, -1] * self.tau1_unit
+        """Return the derivative of a state in floating point."""
+        return np.asarray(self.field(state, self.parameters, FLOATS), dtype=np.float64)

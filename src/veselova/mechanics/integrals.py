@@ -1,4 +1,4 @@
-"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5).
+"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5), and of Neumann's.
 
 Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works along the leading axes.
 I_i = 1/A_i throughout.
@@ -17,12 +17,14 @@ __all__ = [
     "energy",
     "linear_integrals",
     "momentum",
+    "moser_eigenvalues",
     "neumann_integrals",
     "neumann_polynomial",
     "neumann_velocity",
     "norm",
     "sliding_velocity",
     "tangent_basis",
+    "uhlenbeck_integrals",
     "unit_scale",
 ]
 
@@ -93,14 +95,18 @@ def linear_integrals(p: Array, frame: Array) -> Array:
 
 
 def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
+    """Return F_i of the Neumann motion that a Veselova motion is in τ₁, shape (..., n): ``uhlenbeck_integrals`` with q'."""
+    A, _ = unit_scale(A)  # F_i has no units, and squares of I_i may leave the float range
+    return uhlenbeck_integrals(A, q, neumann_velocity(A, q, q_dot))
+
+
+def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
     """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1), P = q∧q', shape (..., n).
 
     Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
     """
-    A, _ = unit_scale(A)  # F_i has no units, and squares of I_i may leave the float range
     inverse = 1 / A
-    v = neumann_velocity(A, q, q_dot)
-    P = q[..., :, None] * v[..., None, :] - q[..., None, :] * v[..., :, None]
+    P = q[..., :, None] * q_prime[..., None, :] - q[..., None, :] * q_prime[..., :, None]
     gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])  # I_i − I_j without cancellation
     same = np.abs(gap) <= _COINCIDENT * np.maximum(inverse[:, None], inverse[None, :])
     F = q * q + np.sum(np.divide(P * P, gap, out=np.zeros_like(P), where=~same), axis=-1)
@@ -144,12 +150,18 @@ def tangent_basis(q: Array) -> Array:
 def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
     """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of N(λ), shape (..., n−2); c_1 = 0 is left out.
 
-    They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
-    a symmetric eigenproblem with absolute error of a few ε·max I_i, whatever coincides.
+    Accuracy: see ``moser_eigenvalues``.
     """
     A, k = unit_scale(A)
+    return np.asarray(np.ldexp(moser_eigenvalues(A, q, neumann_velocity(A, q, q_dot))[..., 1:], -k), dtype=np.float64)
+
+
+def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
+    """Return c_1 ≤ … ≤ c_{n−1}, the roots of Φ𝓕 of (family1), shape (..., n−1).
+
+    They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
+    a symmetric eigenproblem with absolute error of a few ε·max(I_i, |q'|²), whatever coincides.
+    """
     basis = tangent_basis(q)
-    v = neumann_velocity(A, q, q_dot)
-    form = np.diag(1 / A) - v[..., :, None] * v[..., None, :]
-    restricted = np.swapaxes(basis, -1, -2) @ form @ basis
-    return np.asarray(np.ldexp(np.linalg.eigvalsh(restricted)[..., 1:], -k), dtype=np.float64)
+    form = np.diag(1 / A) - q_prime[..., :, None] * q_prime[..., None, :]
+    return np.asarray(np.linalg.eigvalsh(np.swapaxes(basis, -1, -2) @ form @ basis), dtype=np.float64)

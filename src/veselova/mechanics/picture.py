@@ -27,31 +27,44 @@ _LEAST_DRAWN = 1e-17
 def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Figure:
     """Return the picture of a motion.
 
-    n = 3: the curve q(t) on the sphere with the frame axes at a few times, and λ(t). Any other n: the components of q and
-    the spheroconic coordinates. With a comparison: the difference of the engines, their error estimates and the
-    conditioning floor on a logarithmic axis.
+    First the series that the problem calls its portrait: a curve on the sphere with the frame axes at a few times where it has
+    three components, else the components. Then the spheroconic coordinates, or where there are none the drift of the integrals.
+    With a comparison: the difference of the engines, their error estimates and the conditioning floor on a logarithmic axis.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    rows = 2 if comparison is None else 3
+    rows, problem, provenance = 2 if comparison is None else 3, trajectory.problem, trajectory.provenance
     figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
-    if trajectory.problem.n == 3:
+    portrait = trajectory.series(problem.portrait).reshape(trajectory.times.size, -1)
+    if portrait.shape[1] == 3:
         grid = figure.add_gridspec(rows, 1, height_ratios=[2] + [1] * (rows - 1))
         _draw_sphere(figure.add_subplot(grid[0], projection="3d"), trajectory)
         axes = [figure.add_subplot(grid[row]) for row in range(1, rows)]
     else:
         axes = list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
-        _draw_lines(axes[0], trajectory.times, trajectory.q, "q", "components of $q$")
+        _draw_lines(axes[0], trajectory.times, portrait, problem.portrait, f"components of {problem.portrait}")
         axes = axes[1:]
-    _draw_lines(axes[0], trajectory.times, trajectory.spheroconic, r"\lambda", "spheroconic coordinates")
+    if "spheroconic" in problem.outputs:
+        _draw_lines(axes[0], trajectory.times, trajectory.spheroconic, r"\lambda", "spheroconic coordinates")
+    else:
+        _draw_drift(axes[0], trajectory)
     if comparison is not None:
         _draw_difference(axes[1], comparison)
-    axes[-1].set_xlabel("time $t$")
-    problem, provenance = trajectory.problem, trajectory.provenance
-    figure.suptitle(f"Veselova motion, n = {problem.n}, h = {problem.energy:.4g} ({provenance.engine}, {provenance.method})")
+    axes[-1].set_xlabel(f"time {problem.time}")
+    figure.suptitle(f"{problem.title} ({provenance.engine}, {provenance.method})")
     return figure
+
+
+def _draw_drift(axes: Axes, trajectory: Trajectory) -> None:
+    for i, (name, values) in enumerate(trajectory.integrals.items()):
+        change = np.max(np.abs(values - values[:1]).reshape(values.shape[0], -1), axis=1, initial=0.0)
+        axes.semilogy(
+            trajectory.times, np.maximum(change, _LEAST_DRAWN), color=_COLOURS[i % len(_COLOURS)], linewidth=1, label=name
+        )
+    axes.set_ylabel("change of the integrals")
+    axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)
 
 
 def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) -> None:
@@ -62,24 +75,30 @@ def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) ->
 
 
 def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
-    """Draw q(t) on the unit sphere and, at six times, the frame vectors e_2, e_3 standing on it."""
+    """Draw the curve on its sphere and, where there is a frame, its vectors at six times, standing on the curve."""
     latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
+    name = trajectory.problem.portrait
+    curve = trajectory.series(name)
+    radius = float(np.max(np.linalg.norm(curve, axis=1)))
     x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)
-    axes.plot_wireframe(x, y, z, color="0.85", linewidth=0.4)
-    axes.plot(*trajectory.q.T, color=_COLOURS[0], linewidth=1.2)
-    for i in np.unique(np.linspace(0, trajectory.times.size - 1, 6).astype(int)):
-        for k, colour in ((0, _COLOURS[0]), (1, _COLOURS[1]), (2, _COLOURS[2])):
-            axes.quiver(*trajectory.q[i], *(0.3 * trajectory.frame[i, :, k]), color=colour, linewidth=1.4)
+    axes.plot_wireframe(radius * x, radius * y, radius * z, color="0.85", linewidth=0.4)
+    axes.plot(*curve.T, color=_COLOURS[0], linewidth=1.2)
+    title = f"{name}({trajectory.problem.time})"
+    if "frame" in trajectory.problem.outputs:
+        title += ", with $e_1$ (blue), $e_2$ (red), $e_3$ (green) at six times"
+        for i in np.unique(np.linspace(0, trajectory.times.size - 1, 6).astype(int)):
+            for k, colour in enumerate(_COLOURS[i] for i in (0, 1, 2)):
+                axes.quiver(*curve[i], *(0.3 * trajectory.frame[i, :, k]), color=colour, linewidth=1.4)
     axes.set_box_aspect((1, 1, 1))
-    axes.set_xlabel("$q_1$")
-    axes.set_ylabel("$q_2$")
-    axes.set_zlabel("$q_3$")
-    axes.set_title("$q(t)$ on the sphere, with $e_1$ (blue), $e_2$ (red), $e_3$ (green) at six times", fontsize="medium")
+    axes.set_xlabel(f"{name}_1")
+    axes.set_ylabel(f"{name}_2")
+    axes.set_zlabel(f"{name}_3")
+    axes.set_title(title, fontsize="medium")
 
 
 def _draw_difference(axes: Axes, comparison: Comparison) -> None:
     times = comparison.analytic.times
-    for name, colour in (("q", _COLOURS[0]), ("frame", _COLOURS[1]), ("omega", _COLOURS[2])):
+    for name, colour in zip(comparison.analytic.problem.outputs, _COLOURS, strict=False):
         axes.semilogy(
             times, np.maximum(comparison.difference(name), _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|"
         )

@@ -14,24 +14,14 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import BackendMissing, Unsolved
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.problem import Problem, Series
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["OUTPUTS", "Provenance", "Trajectory"]
+__all__ = ["Provenance", "Trajectory"]
 
 Array = NDArray[np.float64]
-
-#: The series of a trajectory, with the axes that follow the time axis; the order of every listing and file.
-OUTPUTS: Mapping[str, tuple[str, ...]] = {
-    "q": ("axis",),
-    "q_dot": ("axis",),
-    "frame": ("axis", "vector"),
-    "omega": ("axis", "axis_2"),
-    "spheroconic": ("coordinate",),
-    "tau1": (),
-}
 
 
 @dataclass(frozen=True)
@@ -52,77 +42,70 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
-    """A motion at given times, in the body axes of the problem.
+    """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as ``trajectory.q``.
 
-    times (N,) · error (N,) a bound on every component of q and frame at each time, in absolute value
-    tau1 (N,) Neumann time, zero at t = 0 · q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i
-    omega (N, n, n) = q∧q̇, body angular velocity · spheroconic (N, n−1), increasing
+    times (N,) · error (N,) a bound on every component of the problem's ``bounded`` series at each time, in absolute value
+    arrays: the series that do not follow from others, by name, first axis the times
     decimals: the same series to more digits, or with certified errors, where that was asked for
+
+    System veselova: q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i, along the body axes of the problem · omega (N, n, n)
+    = q∧q̇, equation (44.3) · spheroconic (N, n−1), increasing · tau1 (N,) Neumann time, zero at t = 0
     """
 
-    problem: Veselova
+    problem: Problem
     times: Array
     error: Array
-    tau1: Array
-    q: Array
-    q_dot: Array
-    frame: Array
-    spheroconic: Array
+    arrays: Series
     provenance: Provenance
     dense: Callable[[Any], Trajectory] | None = field(default=None, repr=False)
     decimals: Decimals | None = None
 
     def __post_init__(self) -> None:
-        for array in (self.times, self.error, self.tau1, self.q, self.q_dot, self.frame, self.spheroconic):
+        object.__setattr__(self, "arrays", dict(self.arrays))
+        for array in (self.times, self.error, *self.arrays.values()):
             array.setflags(write=False)
-
-    @classmethod
-    def of_principal(
-        cls,
-        problem: Veselova,
-        times: Array,
-        states: tuple[Array, Array, Array, Array],
-        error: Array,
-        provenance: Provenance,
-        dense: Callable[[Any], Trajectory] | None = None,
-    ) -> Trajectory:
-        """Return the trajectory of states (τ₁, q̇, frame, λ) along the principal axes of the problem."""
-        tau1, q_dot, frame, spheroconic = states
-        frame, q_dot = problem.to_body_axes(frame), problem.to_body_axes(q_dot)
-        return cls(problem, times, error, tau1, frame[:, :, 0], q_dot, frame, spheroconic, provenance, dense)
 
     @classmethod
     def of_decimals(
         cls,
-        problem: Veselova,
+        problem: Problem,
         times: Array,
         decimals: Decimals,
         provenance: Provenance,
         dense: Callable[[Any], Trajectory] | None = None,
     ) -> Trajectory:
         """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
-        names = ("tau1", "q", "q_dot", "frame", "spheroconic")
+        names = (name for name in problem.outputs if name not in problem.derived)
         arrays = {name: decimals.midpoints[name].astype(np.float64) for name in names}
         error = np.nextafter(decimals.error.astype(np.float64), np.inf) + np.finfo(float).eps / 2
-        return cls(problem, times, error, **arrays, provenance=provenance, dense=dense, decimals=decimals)
+        return cls(problem, times, error, arrays, provenance, dense, decimals)
+
+    def series(self, name: str) -> Array:
+        """Return one of the problem's outputs by name."""
+        if name not in self.arrays:
+            values = self.problem.derive(name, self.arrays)
+            values.setflags(write=False)
+            self.arrays[name] = values  # type: ignore[index]
+        return self.arrays[name]
+
+    def __getattr__(self, name: str) -> Array:
+        problem: Problem | None = self.__dict__.get("problem")
+        if problem is None or name not in problem.outputs:  # no problem yet: while a pickle is read
+            raise AttributeError(f"a trajectory{f' of system {problem.system}' if problem else ''} has no {name!r}")
+        return self.series(name)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.problem.outputs]
 
     @cached_property
     def integrals(self) -> Mapping[str, Array]:
-        """Return the integrals of motion at each time, by name (see ``Veselova.integrals``)."""
-        return self.problem.integrals(self.q_dot, self.frame)
-
-    @cached_property
-    def omega(self) -> Array:
-        """Return the body angular velocity ω = q∧q̇, equation (44.3), shape (N, n, n)."""
-        product = self.q[:, :, None] * self.q_dot[:, None, :]
-        omega = product - np.swapaxes(product, 1, 2)
-        omega.setflags(write=False)
-        return omega
+        """Return the integrals of motion at each time, by name (see the problem's ``integrals``)."""
+        return self.problem.integrals(self.arrays)
 
     @property
     def drift(self) -> dict[str, float]:
-        """Return, per integral of motion, its largest change against the first time, relative to its size there ((q,p) to 1)."""
-        return {name: _drift(values, vanishes=name == "q_p") for name, values in self.integrals.items()}
+        """Return, per integral of motion, its largest change against the first time, relative to its size there (or to 1)."""
+        return {name: _drift(values, vanishes=name in self.problem.vanishing) for name, values in self.integrals.items()}
 
     def at(self, times: Any) -> Trajectory:
         """Return the same motion at other times; raises Unsolved where the engine left no dense answer."""
@@ -132,14 +115,10 @@ class Trajectory:
             )
         return self.dense(times)
 
-    def series(self, name: str) -> Array:
-        """Return one of the OUTPUTS by name."""
-        return np.asarray(getattr(self, name), dtype=np.float64)
-
     def columns(self) -> dict[str, Array]:
         """Return the flat table of the trajectory: time, error and every component, named like ``frame_1_2`` (from 1)."""
-        table = {"t": self.times, "error": self.error}
-        for name in OUTPUTS:
+        table = {self.problem.time: self.times, "error": self.error}
+        for name in self.problem.outputs:
             values = self.series(name)
             for index in np.ndindex(values.shape[1:]):
                 table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
@@ -148,7 +127,7 @@ class Trajectory:
     def _decimal_columns(self, decimals: Decimals) -> dict[str, Any]:
         table: dict[str, Any] = dict(self.columns())
         table["error"] = decimals.error
-        for name in OUTPUTS:
+        for name in self.problem.outputs:
             values = decimals.midpoints[name]
             for index in np.ndindex(values.shape[1:]):
                 table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
@@ -156,10 +135,10 @@ class Trajectory:
 
     def to_npz(self, path: str | Path) -> None:
         """Write all series, the integrals and the provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
-        arrays = {name: self.series(name) for name in OUTPUTS}
+        arrays = {name: self.series(name) for name in self.problem.outputs}
         if self.decimals is not None:
             for suffix, values in (("decimal", self.decimals.midpoints), ("radius", self.decimals.radii)):
-                arrays |= {f"{name}_{suffix}": values[name].astype(str) for name in OUTPUTS}
+                arrays |= {f"{name}_{suffix}": values[name].astype(str) for name in self.problem.outputs}
         integrals = {f"integral_{name}": values for name, values in self.integrals.items()}
         provenance = json.dumps(self.provenance.as_dict())
         with Path(path).open("wb") as file:  # an open file keeps savez from appending its own suffix to the name
@@ -188,7 +167,7 @@ class Trajectory:
             from xarray import Dataset
         except ImportError:
             raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
-        variables: dict[str, Any] = {name: (("time", *axes), self.series(name)) for name, axes in OUTPUTS.items()}
+        variables: dict[str, Any] = {name: (("time", *axes), self.series(name)) for name, axes in self.problem.outputs.items()}
         variables["error"] = (("time",), self.error)
         return Dataset(variables, coords={"time": self.times}, attrs=self.provenance.as_dict())
 
@@ -201,11 +180,11 @@ class Trajectory:
     def __repr__(self) -> str:
         span = f"{self.times.size} times from {self.times[0]:g} to {self.times[-1]:g}"
         how = f"{self.provenance.engine} ({self.provenance.method})"
-        return f"<Trajectory: {self.problem.system}, n = {self.problem.n}, {span}, {how}, error ≤ {np.max(self.error):.2g}>"
+        return f"<Trajectory: {self.problem.title}, {span}, {how}, error ≤ {np.max(self.error):.2g}>"
 
     def _repr_html_(self) -> str:
         rows = {
-            "system": f"{self.problem.system}, n = {self.problem.n}",
+            "system": self.problem.title,
             "engine": f"{self.provenance.engine} ({self.provenance.method})",
             "times": f"{self.times.size} from {self.times[0]:g} to {self.times[-1]:g}",
             "largest error": f"{np.max(self.error):.2g}",

@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plain, to_float
-from veselova.mechanics.flow import ReducedFlow
+from veselova.mechanics.exact import exact_matrix, exact_vector, plain, read_only, to_float
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
+from veselova.mechanics.principal_inertia import principal_inertia
+from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.reduced_flow import ReducedFlow
+from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, require_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 
 __all__ = ["Veselova"]
 
 Array = NDArray[np.float64]
 
-#: How far from unit length, tangency and orthogonality an input may be: ten-digit data pass, typing errors do not.
-INPUT_TOLERANCE = 1e-9
-
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Veselova:
+class Veselova(Problem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the constraint (44), n ≥ 2.
 
     A        n positive numbers, or a symmetric positive definite n × n matrix, which is diagonalised: the body axes then
@@ -50,11 +50,24 @@ class Veselova:
     given: Mapping[str, Any]
 
     system: ClassVar[str] = "veselova"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "q": ("axis",),
+        "q_dot": ("axis",),
+        "frame": ("axis", "vector"),
+        "omega": ("axis", "axis_2"),
+        "spheroconic": ("coordinate",),
+        "tau1": (),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("q", "omega")
+    bounded: ClassVar[tuple[str, ...]] = ("frame",)
+    portrait: ClassVar[str] = "q"
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"analytic": ("theta", "angles"), "numeric": ("dop853", "taylor")}
+    formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False) -> None:
         if not isinstance(normalize, bool):
             raise InvalidInput(("normalize",), "true or false", shown(normalize))
-        diagonal, axes = _principal_inertia(A)
+        diagonal, axes = principal_inertia(A)
         n = len(diagonal)
         exact_q = exact_vector(q, ("q",), n)
         exact_q_dot = exact_vector(q_dot, ("q_dot",), n)
@@ -63,7 +76,7 @@ class Veselova:
         largest = max(abs(x) for x in exact_q)
         position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_q_dot)
         if not normalize:
-            _require_on_sphere(position, velocity)
+            require_on_sphere(position, velocity)
         exact_frame = None if frame is None else exact_matrix(frame, ("frame",), n)
         given_frame = None if exact_frame is None else to_float(exact_frame)
         if axes is not None:
@@ -73,7 +86,7 @@ class Veselova:
             _require_finite(velocity, exact_q_dot)
             exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
         exact = ExactState(diagonal, exact_q, exact_q_dot, exact_frame)
-        position, velocity = _unit(position), _rounded(exact.tangent)
+        position, velocity = unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
@@ -130,23 +143,60 @@ class Veselova:
     @cached_property
     def constants(self) -> Array:
         """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of the invariant polynomial N(λ), shape (n−2,)."""
-        return _read_only(integrals.constants_of_motion(self.A, self.q, self.q_dot))
+        return read_only(integrals.constants_of_motion(self.A, self.q, self.q_dot))
 
     @cached_property
     def spheroconic(self) -> Array:
         """Return the spheroconic coordinates λ_1 ≤ … ≤ λ_{n−1} at t = 0, shape (n−1,)."""
-        return _read_only(to_spheroconic(self.A, self.q))
+        return read_only(to_spheroconic(self.A, self.q))
 
-    @cached_property
-    def flow(self) -> ReducedFlow:
+    @property
+    def title(self) -> str:
+        """Return the system and its dimension."""
+        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+
+    @property
+    def turning(self) -> float:
+        """Return |q̇|."""
+        return float(np.linalg.norm(self.q_dot))
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        series = {"tau1": np.zeros(1), "q_dot": self.q_dot[None], "frame": self.frame[None]}
+        return self.completed({**series, "spheroconic": self.spheroconic[None]})
+
+    def flow(self, formulation: str = "reduced") -> ReducedFlow:
         """Return the reduced flow (extended) with the frame, in units of this problem; the body must move."""
         return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
 
-    def integrals(self, q_dot: Array, frame: Array) -> dict[str, Array]:
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the integrals whose value is zero: (q,p)."""
+        return frozenset({"q_p"})
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return q, the first column of the frame, or the body angular velocity ω = q∧q̇, equation (44.3)."""
+        q, q_dot = series["frame"][..., 0], series["q_dot"]
+        if name == "q":
+            return np.asarray(q)
+        product = q[..., :, None] * q_dot[..., None, :]
+        return np.asarray(product - np.swapaxes(product, -1, -2))
+
+    def completed(self, series: Series) -> Series:
+        """Return series along the principal axes of A in the body axes, with the spheroconic coordinates."""
+        spheroconic = series.get("spheroconic")
+        if spheroconic is None:
+            spheroconic = to_spheroconic(self.A, series["frame"][:, :, 0])
+        turned = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
+        return {"tau1": series["tau1"], "spheroconic": spheroconic, **turned}
+
+    def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along states in the body axes, by name, first axis the times.
 
         ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n; ``constants`` c_2…c_{n−1}.
         """
+        q_dot, frame = series["q_dot"], series["frame"]
         if self.axes is not None:
             q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
         q = frame[..., 0]
@@ -161,77 +211,11 @@ class Veselova:
             "constants": integrals.constants_of_motion(self.A, q, q_dot),
         }
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
-        return {"system": self.system, **self.given}
-
-    def conditioning_floor(self, times: Array) -> Array:
-        """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
-        return np.asarray(np.finfo(float).eps * np.maximum(1.0, np.linalg.norm(self.q_dot) * np.abs(times)), dtype=np.float64)
-
     def to_body_axes(self, vectors: Array) -> Array:
         """Return components along the given body axes of vectors (..., n) or column matrices (..., n, k) in principal axes."""
         if self.axes is None:
             return vectors
         return np.asarray(vectors @ self.axes.T if vectors.ndim < 3 else self.axes @ vectors, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class ExactState:
-    """The data as exact rationals in principal axes, q not yet scaled and q_dot not yet projected.
-
-    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the natural one was left to us
-    """
-
-    A: tuple[Fraction, ...]
-    q: tuple[Fraction, ...]
-    q_dot: tuple[Fraction, ...]
-    frame: tuple[tuple[Fraction, ...], ...] | None
-
-    @property
-    def natural(self) -> bool:
-        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a sign matrix."""
-        return self.frame is None
-
-    @cached_property
-    def tangent(self) -> tuple[Fraction, ...]:
-        """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
-        along = sum((a * b for a, b in zip(self.q, self.q_dot)), Fraction()) / sum((a * a for a in self.q), Fraction())
-        return tuple(b - along * a for a, b in zip(self.q, self.q_dot))
-
-
-def _principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
-    """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix."""
-    if not is_matrix(A):
-        diagonal = exact_vector(A, ("A",))
-        if len(diagonal) < 2:
-            raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
-        for i, value in enumerate(diagonal):
-            if value <= 0 or float(value) == 0:
-                raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
-        return diagonal, None
-    n = len(A)
-    if n < 2:
-        raise InvalidInput(("A",), "at least 2 rows (n ≥ 2)", f"{n}")
-    matrix = to_float(exact_matrix(A, ("A",), n))
-    asymmetry = np.abs(matrix - matrix.T)
-    if np.max(asymmetry) > INPUT_TOLERANCE * np.max(np.abs(matrix)):
-        i, j = divmod(int(np.argmax(asymmetry)), n)
-        raise InvalidInput(("A", i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
-    values, axes = np.linalg.eigh((matrix + matrix.T) / 2)
-    if values[0] <= n * np.finfo(float).eps * values[-1]:
-        raise InvalidInput(("A",), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
-    return tuple(map(Fraction, values.tolist())), axes
-
-
-def _read_only(array: Array) -> Array:
-    array.setflags(write=False)
-    return array
-
-
-def _unit(vector: Array) -> Array:
-    scaled = vector / np.max(np.abs(vector))  # squares of very large or small entries would leave the float range
-    return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
 def _rounded(tangent: tuple[Fraction, ...]) -> Array:
@@ -246,19 +230,6 @@ def _require_finite(velocity: Array, given: tuple[Fraction, ...]) -> None:
     if not np.all(np.isfinite(velocity)):
         largest = f"entries up to {float(max(abs(x) for x in given)):.3g}"
         raise InvalidInput(("q_dot",), "components along the principal axes within the range of a float", largest)
-
-
-def _require_on_sphere(q: Array, q_dot: Array) -> None:
-    length = float(np.linalg.norm(q))
-    if abs(length - 1) > INPUT_TOLERANCE:
-        raise InvalidInput(("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
-    largest = float(np.max(np.abs(q_dot)))
-    if largest > 0:
-        slope = float((q_dot / largest) @ q) / float(np.linalg.norm(q_dot / largest))
-        if abs(slope) > INPUT_TOLERANCE:
-            raise InvalidInput(
-                ("q_dot",), "a vector orthogonal to q to 1e-9 of its length (or normalize=True)", f"cosine {slope:.3g} with q"
-            )
 
 
 def _require_representable_energy(A: Array, q: Array, q_dot: Array) -> None:

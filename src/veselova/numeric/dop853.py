@@ -1,4 +1,4 @@
-"""SciPy's DOP853 (Dormand–Prince, order 8) as an integrator of the reduced flow."""
+"""SciPy's DOP853 (Dormand–Prince, order 8) as an integrator of a flow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.flow import ReducedFlow
+from veselova.mechanics.flow import Flow
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["Dop853"]
@@ -24,7 +24,7 @@ class Dop853(Integrator):
     tolerances: ClassVar[tuple[float, float]] = (1e-13, 1e-12)
     method: ClassVar[str] = "dop853"
 
-    def __init__(self, flow: ReducedFlow, tolerance: float) -> None:
+    def __init__(self, flow: Flow, tolerance: float) -> None:
         self._flow = flow
         self._tolerance = tolerance
         self._steps = 0

@@ -1,4 +1,4 @@
-"""What an integrator of the reduced flow is: one segment of time, states at the wanted times and at the end."""
+"""What an integrator of a flow is: one segment of time, states at the wanted times and at the end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import ReducedFlow
+from veselova.mechanics.flow import Flow
 
 __all__ = ["Integrator"]
 
@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 
 
 class Integrator(ABC):
-    """A back end: integrates the field of a ReducedFlow over one segment at a fixed tolerance."""
+    """A back end: integrates the field of a Flow over one segment at a fixed tolerance."""
 
     #: Tolerance of the answer, and the looser one of the second run that measures its error.
     tolerances: ClassVar[tuple[float, float]]
     method: ClassVar[str]
 
     @abstractmethod
-    def __init__(self, flow: ReducedFlow, tolerance: float) -> None:
+    def __init__(self, flow: Flow, tolerance: float) -> None:
         """Prepare for one flow at one tolerance; raises BackendMissing when the library is not installed."""
 
     @abstractmethod

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
-from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.flow import Flow
+from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.mechanics.veselova import Veselova
 from veselova.numeric.integrator import Integrator
 from veselova.version import __version__
 
@@ -47,34 +47,37 @@ _DIFFERENCE_SAFETY = 4.0
 _CHECKPOINTS = 32
 
 
-def solve(problem: Veselova, times: Any, *, method: str = "dop853") -> Trajectory:
-    """Return the motion at the given times by integrating (extended), ė_k = −ωe_k and (4.6).
+def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: str | None = None) -> Trajectory:
+    """Return the motion at the given times by integrating the problem's flow; the start is at time zero.
 
-    ``method``: ``dop853`` (SciPy, relative tolerance 1e-13) or ``taylor`` (heyoka, to rounding). Time starts at t = 0.
+    ``method``: ``dop853`` (SciPy, relative tolerance 1e-13) or ``taylor`` (heyoka, to rounding). ``formulation``: one of the
+    problem's ``formulations``, equations of motion that differ and agree; None takes the first.
     The error is measured: a second integration, at a looser tolerance and from a start a few roundings away; the estimate
-    is four times the running maximum of the difference in q and frame, plus the rounding that both may share. Raises InvalidInput
-    for bad times or an unknown method, BackendMissing without the library, Unsolved when the integrator gives up.
+    is four times the running maximum of the difference in the bounded outputs, plus the rounding that both may share. Raises
+    InvalidInput for bad times or names, BackendMissing without the library, Unsolved when the integrator gives up.
     Tested for n = 2…8, |ω t| ≤ 10⁴: the true error stays below twice the estimate.
     """
     grid = validated_times(times)
     if not isinstance(method, str) or method not in METHODS:
         raise InvalidInput(("method",), f"one of {', '.join(METHODS)}", shown(method))
+    if formulation is not None and formulation not in problem.formulations:
+        raise InvalidInput(("formulation",), f"one of {', '.join(problem.formulations)}", shown(formulation))
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
-    began = time.perf_counter()
+    chosen, began = formulation or problem.formulations[0], time.perf_counter()
     if problem.moves:
-        frame, q_dot, tau1, error, steps = _integrate_twice(problem, grid, backend)
+        series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
+        series = problem.completed(series)
     else:
-        frame, q_dot = np.tile(problem.frame, (grid.size, 1, 1)), np.zeros((grid.size, problem.n))
-        tau1, error, steps = np.zeros(grid.size), np.full(grid.size, np.finfo(float).eps), 0
-    states = (tau1, q_dot, frame, to_spheroconic(problem.A, frame[:, :, 0]))
-    details = {"tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
+        series = {name: np.repeat(values, grid.size, axis=0) for name, values in problem.start.items()}
+        error, steps = np.full(grid.size, np.finfo(float).eps), 0
+    details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
     provenance = Provenance("numeric", method, 15, __version__, time.perf_counter() - began, details)
-    return Trajectory.of_principal(problem, grid, states, error, provenance, dense=partial(solve, problem, method=method))
+    again = partial(solve, problem, method=method, formulation=formulation)
+    return Trajectory(problem, grid, error, series, provenance, dense=again)
 
 
-def _integrate_twice(problem: Veselova, grid: Array, backend: type[Integrator]) -> tuple[Array, Array, Array, Array, int]:
-    flow = problem.flow
+def _integrate_twice(flow: Flow, bounded: tuple[str, ...], grid: Array, backend: type[Integrator]) -> tuple[Series, Array, int]:
     asked = grid / flow.time_unit
     farthest = float(np.max(np.abs(asked)))
     if not farthest <= _FARTHEST:
@@ -85,16 +88,23 @@ def _integrate_twice(problem: Veselova, grid: Array, backend: type[Integrator]) 
     scaled = np.union1d(asked, np.linspace(min(asked[0], 0.0), max(asked[-1], 0.0), _CHECKPOINTS))
     neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)
     answer, check = backend(flow, backend.tolerances[0]), backend(neighbour, backend.tolerances[1])
-    frame, q_dot, tau1 = flow.unpack(_integrate(flow, scaled, answer))
-    difference = np.max(np.abs(frame - neighbour.unpack(_integrate(neighbour, scaled, check))[0]), axis=(1, 2))
-    rounding = _SHARED_ROUNDING * np.finfo(float).eps * (1 + np.abs(scaled))
+    series = flow.unpack(_integrate(flow, scaled, answer))
+    other = neighbour.unpack(_integrate(neighbour, scaled, check))
+    difference = np.max([_largest(series[name] - other[name]) for name in bounded if name in series], axis=0)
+    rounding = flow.size * _SHARED_ROUNDING * np.finfo(float).eps * (1 + np.abs(scaled))
     # One step's own error, and that of interpolating inside it, is in both runs where their first steps coincide.
-    error = _DIFFERENCE_SAFETY * _running_maximum(scaled, difference) + rounding + backend.tolerances[0]
+    truncation = flow.size * backend.tolerances[0]
+    error = _DIFFERENCE_SAFETY * _running_maximum(scaled, difference) + rounding + truncation
     kept = np.searchsorted(scaled, asked)
-    return frame[kept], q_dot[kept], tau1[kept], error[kept], answer.steps
+    return {name: values[kept] for name, values in series.items()}, error[kept], answer.steps
 
 
-def _integrate(flow: Any, scaled: Array, integrator: Integrator) -> Array:
+def _largest(values: Array) -> Array:
+    """Return the largest component at each time, in absolute value."""
+    return np.asarray(np.max(np.abs(values.reshape(values.shape[0], -1)), axis=1))
+
+
+def _integrate(flow: Flow, scaled: Array, integrator: Integrator) -> Array:
     """Return the states at the scaled times, integrating outwards from t = 0 in both directions."""
     states = np.empty((scaled.size, flow.initial.size))
     for direction in (1.0, -1.0):

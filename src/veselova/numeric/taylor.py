@@ -1,24 +1,27 @@
-"""heyoka's adaptive Taylor method as an integrator of the reduced flow (extra ``fast``)."""
+"""heyoka's adaptive Taylor method as an integrator of a flow (extra ``fast``)."""
 
 from __future__ import annotations
 
 import copy
-from functools import lru_cache
+from collections.abc import Hashable
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import BackendMissing, Unsolved
-from veselova.mechanics.flow import ReducedFlow
+from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved
+from veselova.mechanics.flow import Flow, Operations
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["Taylor"]
 
 Array = NDArray[np.float64]
 
-#: From this dimension on the compact mode: it compiles in 0.2 s where unrolled code takes seconds, and runs up to 2× slower.
-_COMPACT_FROM = 4
+#: From this many equations on the compact mode: it compiles in 0.2 s where unrolled code takes seconds, and runs up to 2× slower.
+_COMPACT_FROM = 20
+
+#: Compiled fields that are kept.
+_MOST_COMPILED = 64
 
 
 class Taylor(Integrator):
@@ -28,9 +31,9 @@ class Taylor(Integrator):
     tolerances: ClassVar[tuple[float, float]] = (2.0**-52, 1e-14)
     method: ClassVar[str] = "taylor"
 
-    def __init__(self, flow: ReducedFlow, tolerance: float) -> None:
-        self._integrator = copy.copy(_compiled(flow.n, tolerance))
-        self._integrator.pars[:] = np.concatenate([flow.A, flow.inverse, [flow.twice_energy]])
+    def __init__(self, flow: Flow, tolerance: float) -> None:
+        self._integrator = copy.copy(_compiled(flow, tolerance))
+        self._integrator.pars[:] = flow.parameters
         self._steps = 0
 
     def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
@@ -53,31 +56,43 @@ class Taylor(Integrator):
         return self._steps
 
 
-@lru_cache(maxsize=32)
-def _compiled(n: int, tolerance: float) -> Any:
-    """Return heyoka's compiled integrator of the field of ReducedFlow: A, A⁻¹ and W are its run-time parameters."""
+_known: dict[tuple[Hashable, float], Any] = {}
+
+
+def _compiled(flow: Flow, tolerance: float) -> Any:
+    """Return heyoka's compiled integrator of a field, its parameters left open; one is kept for every structure."""
     try:
         import heyoka as hy
     except ImportError:
         raise BackendMissing("heyoka", "method='taylor'", "pip install 'veselova[fast]'") from None
-    p = hy.make_vars(*[f"p{i}" for i in range(n)])
-    E = np.array(hy.make_vars(*[f"e{i}_{k}" for i in range(n) for k in range(n)])).reshape(n, n)
-    tau1 = hy.make_vars("tau1")
-    A, inverse, twice_energy = [hy.par[i] for i in range(n)], [hy.par[n + i] for i in range(n)], hy.par[2 * n]
-    q = list(E[:, 0])
+    if flow.structure is None:
+        raise InvalidInput(("method",), "dop853 (this field has no symbolic form)", "taylor")
+    key = flow.structure, tolerance
+    if key not in _known:
+        variables = hy.make_vars(*[f"x{i}" for i in range(flow.initial.size)])
+        parameters = [hy.par[i] for i in range(flow.parameters.size)]
+        derivatives = flow.field(np.array(variables, dtype=object), np.array(parameters, dtype=object), _symbols(hy))
+        if len(_known) >= _MOST_COMPILED:
+            _known.clear()
+        _known[key] = hy.taylor_adaptive(
+            [(x, hy.expression(dx) if isinstance(dx, float) else dx) for x, dx in zip(variables, derivatives, strict=True)],
+            np.ones(len(variables)),
+            tol=tolerance,
+            compact_mode=len(variables) >= _COMPACT_FROM,
+            pars=np.ones(len(parameters)),
+        )
+    return _known[key]
 
-    def dot(x: Any, y: Any) -> Any:
-        return hy.sum([a * b for a, b in zip(x, y, strict=True)])
 
-    Aq, p_inverse = [a * x for a, x in zip(A, q)], [b * x for b, x in zip(inverse, p)]
-    qAq, qq = dot(q, Aq), dot(q, q)
-    along = dot(p_inverse, q)
-    q_dot = [(a - along / qq * x) / qAq for a, x in zip(p_inverse, q)]
-    multiplier = -(dot(p, p_inverse) * qq - dot(p, q) * along) / (qAq * qq * qq)
-    equations = [(a, multiplier * x) for a, x in zip(p, q)]
-    normal, turning = [dot(q, E[:, k]) for k in range(n)], [dot(q_dot, E[:, k]) for k in range(n)]
-    equations += [(E[i, k], q_dot[i] * normal[k] - q[i] * turning[k]) for i in range(n) for k in range(n)]
-    equations.append((tau1, hy.sqrt(twice_energy / qAq)))
-    return hy.taylor_adaptive(
-        equations, np.ones(n + n * n + 1), tol=tolerance, compact_mode=n >= _COMPACT_FROM, pars=np.ones(2 * n + 1)
-    )
+def _symbols(hy: Any) -> Operations:
+    """Return the operations on arrays of heyoka's expressions; its own sums compile ten times faster than chains of additions."""
+
+    def dot(a: Any, b: Any) -> Any:
+        rows, columns = np.atleast_2d(a), np.atleast_2d(b.T)
+        product = np.empty((len(rows), len(columns)), dtype=object)
+        for i, row in enumerate(rows):
+            product[i] = [hy.sum([x * y for x, y in zip(row, column, strict=True)]) for column in columns]
+        flat = product.reshape(a.shape[:-1] + b.shape[1:])
+        return flat[()] if flat.ndim == 0 else flat
+
+    return Operations(hy.sqrt, dot)

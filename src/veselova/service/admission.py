@@ -86,10 +86,11 @@ def _integer(text: str) -> int | str:
 
 def admit(request: TorusRequest, settings: Settings) -> None:
     """Raise InvalidInput where a request is beyond the limits of this server, before its numbers are looked at."""
-    problem = request.problem
-    n = len(problem.A) if isinstance(problem.A, list) else 0
+    n = request.problem.dimension
     if n > settings.max_dimension:
-        raise InvalidInput(("problem", "A"), f"at most {settings.max_dimension} entries on this server", str(n))
+        raise InvalidInput(
+            ("problem", request.problem.measured), f"at most {settings.max_dimension} entries on this server", str(n)
+        )
     if request.budget_s > settings.max_budget_s:
         raise InvalidInput(("budget_s",), f"at most {settings.max_budget_s:g} on this server", f"{request.budget_s:g}")
     if not isinstance(request, ComparisonRequest):

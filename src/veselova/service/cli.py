@@ -226,7 +226,7 @@ def _print_json(document: Any) -> None:
 
 
 #: Fields of a motion's request that say nothing of its torus.
-_OF_MOTIONS = ("times", "engine", "method", "outputs", "digits", "certified")
+_OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
 
 _WRITERS = (".npz", ".csv", ".parquet", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
@@ -245,7 +245,7 @@ def _check_files(output: Path | None, plot: Path | None) -> None:
             raise InvalidInput((option,), "a file that can be written", str(path))
 
 
-def _write(trajectory: Any, path: Path, outputs: list[Any]) -> None:
+def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:
     from veselova.service.documents import encoded, trajectory_document
 
     if path.suffix.lower() == ".json":

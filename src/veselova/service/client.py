@@ -18,11 +18,11 @@ import stamina
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
 from veselova.mechanics.exact import plain
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Trajectory
-from veselova.mechanics.veselova import Veselova
-from veselova.service.documents import NEEDED_OUTPUTS, comparison_of, torus_of, trajectory_of
+from veselova.service.documents import comparison_of, stored_outputs, torus_of, trajectory_of
 
 __all__ = ["AsyncClient", "Client"]
 
@@ -66,15 +66,17 @@ def _pause_before_retry(error: Exception) -> bool | float:
     return isinstance(error, _Retry) and (error.pause or True)
 
 
-def _problem(problem: Veselova | Mapping[str, Any]) -> Veselova:
+def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
     """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated here already."""
-    if isinstance(problem, Veselova):
+    if isinstance(problem, Problem):
         return problem
     if not isinstance(problem, Mapping):
-        raise InvalidInput(("problem",), "a veselova.Veselova or a mapping with its JSON fields", shown(problem))
-    from veselova.service.schemas import VeselovaModel, read_request
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", shown(problem)
+        )
+    from veselova.service.schemas import TorusRequest, read_request
 
-    return read_request(VeselovaModel, dict(problem)).problem()
+    return read_request(TorusRequest, {"problem": dict(problem)}).problem.problem()
 
 
 def _times(times: Any) -> Any:
@@ -85,9 +87,9 @@ def _times(times: Any) -> Any:
 
 
 def _trajectory_call(
-    problem: Veselova | Mapping[str, Any],
+    problem: Problem | Mapping[str, Any],
     times: Any,
-    engine: str = "analytic",
+    engine: str | None = None,
     method: str | None = None,
     *,
     digits: int = 15,
@@ -101,24 +103,24 @@ def _trajectory_call(
 
 
 def _compare_call(
-    problem: Veselova | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
+    problem: Problem | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
 ) -> _Call[Comparison]:
     """Return both engines' motions and how they agree (see ``veselova.compare``)."""
     asked = _problem(problem)
     return _Call("/v1/comparisons", _motion(asked, times, method, budget_s), budget_s, partial(comparison_of, asked))
 
 
-def _torus_call(problem: Veselova | Mapping[str, Any], *, budget_s: float = 10.0) -> _Call[Torus]:
+def _torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> _Call[Torus]:
     """Return the invariant torus of a motion (see ``veselova.torus``)."""
     return _Call("/v1/tori", {"problem": _problem(problem).as_dict(), "budget_s": budget_s}, budget_s, torus_of)
 
 
-def _motion(problem: Veselova, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
+def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
     return {
         "problem": problem.as_dict(),
         "times": _times(times),
         "method": method,
-        "outputs": list(NEEDED_OUTPUTS),
+        "outputs": list(stored_outputs(problem)),
         "budget_s": budget_s,
     }
 

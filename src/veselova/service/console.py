@@ -17,6 +17,9 @@ __all__ = ["print_comparison", "print_torus", "print_trajectory"]
 #: Rows of a trajectory that a terminal is shown; files and JSON have all.
 _SHOWN_TIMES = 12
 
+#: Components of the series shown.
+_SHOWN_COMPONENTS = 6
+
 
 def _table(*columns: str) -> Table:
     table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
@@ -32,20 +35,26 @@ def _heading(console: Console, text: str) -> None:
 def _describe(trajectory: Trajectory) -> str:
     problem, provenance = trajectory.problem, trajectory.provenance
     span = f"{trajectory.times.size} times from {trajectory.times[0]:g} to {trajectory.times[-1]:g}"
-    motion = f"n = {problem.n}, energy {problem.energy:.12g}, {span}"
-    return f"{motion}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
+    return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
 
 
 def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     """Print the motion at some of its times, the error estimate and the drift of the integrals."""
     console.print(_describe(trajectory), highlight=False)
-    n = trajectory.problem.n
-    shown = min(n, 6)
-    table = _table("t", "τ₁", *(f"q_{i + 1}" for i in range(shown)), *(["…"] if n > shown else []), "error")
+    problem = trajectory.problem
+    series = trajectory.series(problem.portrait)
+    rows = series.reshape(series.shape[0], -1)
+    names = [problem.portrait + "".join(f"_{i + 1}" for i in index) for index in np.ndindex(series.shape[1:])]
+    more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
+    clock = ["tau1"] if "tau1" in problem.outputs else []
+    table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     for i in np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int)):
-        components = [f"{x: .9f}" for x in trajectory.q[i, :shown]] + (["…"] if n > shown else [])
-        table.add_row(f"{trajectory.times[i]:g}", f"{trajectory.tau1[i]:.6f}", *components, f"{error[i]:.1e}")
+        components = [
+            *(f"{trajectory.series(name)[i]:.6f}" for name in clock),
+            *(f"{x: .9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
+        ]
+        table.add_row(f"{trajectory.times[i]:g}", *components, *more, f"{error[i]:.1e}")
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
 

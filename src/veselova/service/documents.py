@@ -12,30 +12,32 @@ import orjson
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus import Torus
-from veselova.mechanics.trajectory import OUTPUTS, Provenance, Trajectory
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.trajectory import Provenance, Trajectory
 
 __all__ = [
-    "NEEDED_OUTPUTS",
     "comparison_document",
     "comparison_of",
     "encoded",
+    "stored_outputs",
     "torus_of",
     "trajectory_document",
     "trajectory_of",
 ]
 
-#: The outputs from which a Trajectory can be rebuilt: q is the first column of the frame, and ω = q∧q̇.
-NEEDED_OUTPUTS = ("q_dot", "frame", "spheroconic", "tau1")
+
+def stored_outputs(problem: Problem) -> tuple[str, ...]:
+    """Return the outputs from which a Trajectory can be rebuilt: the others follow from them."""
+    return tuple(name for name in problem.outputs if name not in problem.derived)
 
 
-def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:
+def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = None) -> dict[str, Any]:
     """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's start and drift.
 
     Decimals are strings, and each series has one of radii beside it.
     """
-    drift, decimals, names = trajectory.drift, trajectory.decimals, tuple(outputs)
+    drift, decimals, names = trajectory.drift, trajectory.decimals, tuple(outputs or trajectory.problem.outputs)
     extended: dict[str, Any] = {}
     if decimals is not None:
         extended = {
@@ -54,27 +56,19 @@ def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] = tuple(O
     }
 
 
-def trajectory_of(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
-    """Return the trajectory of a document that has NEEDED_OUTPUTS; numbers come back to the last bit or digit."""
+def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
+    """Return the trajectory of a document that has the stored outputs; numbers come back to the last bit or digit."""
     if "radii" in document:
         return _with_decimals(problem, document)
-    series = {name: np.array(document["series"][name], dtype=np.float64) for name in NEEDED_OUTPUTS}
+    series = {name: np.array(document["series"][name], dtype=np.float64) for name in stored_outputs(problem)}
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
-    return Trajectory(
-        problem,
-        times,
-        error,
-        series["tau1"],
-        series["frame"][:, :, 0],
-        series["q_dot"],
-        series["frame"],
-        series["spheroconic"],
-        Provenance(**document["provenance"]),
+    return Trajectory(problem, times, error, series, Provenance(**document["provenance"]))
+
+
+def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
+    midpoints, radii = (
+        {name: _decimals(document[kind][name]) for name in stored_outputs(problem)} for kind in ("series", "radii")
     )
-
-
-def _with_decimals(problem: Veselova, document: Mapping[str, Any]) -> Trajectory:
-    midpoints, radii = ({name: _decimals(document[kind][name]) for name in NEEDED_OUTPUTS} for kind in ("series", "radii"))
     provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     decimals = Decimals.with_derived(provenance.digits, certified, midpoints, radii)
@@ -85,9 +79,9 @@ def _decimals(strings: Any) -> Any:
     return np.vectorize(Decimal, otypes=[object])(np.array(strings, dtype=object))
 
 
-def comparison_document(comparison: Comparison, outputs: Iterable[str] = tuple(OUTPUTS)) -> dict[str, Any]:
+def comparison_document(comparison: Comparison, outputs: Iterable[str] | None = None) -> dict[str, Any]:
     """Return the document of a comparison: both trajectories, and the largest deviation of every output."""
-    outputs = tuple(outputs)
+    outputs = None if outputs is None else tuple(outputs)
     return {
         **comparison.summary(),
         "analytic": trajectory_document(comparison.analytic, outputs),
@@ -95,8 +89,8 @@ def comparison_document(comparison: Comparison, outputs: Iterable[str] = tuple(O
     }
 
 
-def comparison_of(problem: Veselova, document: Mapping[str, Any]) -> Comparison:
-    """Return the comparison of a document whose trajectories have NEEDED_OUTPUTS."""
+def comparison_of(problem: Problem, document: Mapping[str, Any]) -> Comparison:
+    """Return the comparison of a document whose trajectories have the stored outputs."""
     return Comparison(trajectory_of(problem, document["analytic"]), trajectory_of(problem, document["numeric"]))
 
 

@@ -8,10 +8,10 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from veselova.mechanics.trajectory import OUTPUTS
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
 from veselova.service.problem_details import MEDIA_TYPE
 from veselova.service.routes import RESOURCES
+from veselova.service.systems import SYSTEMS
 from veselova.service.tasks import TASKS
 from veselova.version import __version__
 
@@ -24,10 +24,11 @@ _MATRIX: dict[str, Any] = {"type": "array", "items": _NUMBERS}
 def _series(number: dict[str, Any]) -> dict[str, Any]:
     """Return the schemas of all outputs, by the schema of their numbers."""
     schemas: dict[str, Any] = {}
-    for name, axes in OUTPUTS.items():
-        schemas[name] = number
-        for _ in range(len(axes) + 1):
-            schemas[name] = {"type": "array", "items": schemas[name]}
+    for model in SYSTEMS.values():
+        for name, axes in model.problem_class.outputs.items():
+            schemas[name] = number
+            for _ in range(len(axes) + 1):
+                schemas[name] = {"type": "array", "items": schemas[name]}
     return schemas
 
 
@@ -71,7 +72,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "error": {
                 "type": "array",
                 "items": _NUMBER_OR_DECIMAL,
-                "description": "a bound on every component of q and frame at each time",
+                "description": "a bound on every component of the bounded series (q and frame of system veselova) at each time",
             },
             "provenance": _PROVENANCE,
         },

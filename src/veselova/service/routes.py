@@ -11,11 +11,11 @@ import orjson
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from veselova.mechanics.trajectory import OUTPUTS
 from veselova.service.admission import admit, read_json, require_acceptable
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
+from veselova.service.systems import SYSTEMS
 from veselova.service.tasks import TASKS
 from veselova.service.workers import Workers
 from veselova.version import __version__
@@ -29,18 +29,21 @@ RESOURCES = {
     "/v1/tori": ("torus", "Describe the invariant torus of a motion", "Curve, periods, frequencies, phases"),
 }
 
-#: The systems served, for clients that discover them.
-_SYSTEMS = {
-    "systems": [
+
+def _systems() -> list[dict[str, Any]]:
+    """Return the systems served, for clients that discover them."""
+    return [
         {
-            "system": "veselova",
-            "title": "Rank-one Veselova problem with inertia (A_i A_j/det A)",
-            "fields": ["A", "q", "q_dot", "frame", "normalize"],
-            "engines": {"analytic": ["theta", "angles"], "numeric": ["dop853", "taylor"]},
-            "outputs": list(OUTPUTS),
+            "system": name,
+            "title": (model.__doc__ or "").strip().splitlines()[0],
+            "fields": [field for field in model.model_fields if field != "system"],
+            "engines": {engine: list(methods) for engine, methods in model.problem_class.engines.items()},
+            "formulations": list(model.problem_class.formulations),
+            "outputs": list(model.problem_class.outputs),
+            "time": model.problem_class.time,
         }
+        for name, model in SYSTEMS.items()
     ]
-}
 
 
 def router(settings: Settings, workers: Workers) -> APIRouter:
@@ -53,7 +56,7 @@ def router(settings: Settings, workers: Workers) -> APIRouter:
 
     @routes.get("/v1/systems", summary="List the systems that can be solved", tags=["service"])
     async def systems() -> Response:
-        return _json({**_SYSTEMS, "version": __version__, "limits": settings.model_dump()})
+        return _json({"systems": _systems(), "version": __version__, "limits": settings.model_dump()})
 
     @routes.get("/healthz", summary="Whether the server runs", tags=["service"])
     async def healthz() -> Response:

@@ -8,77 +8,35 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
+from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
 from veselova.mechanics.exact import exact_number, to_float
 from veselova.mechanics.times import uniform_times, validated_times
-from veselova.mechanics.trajectory import OUTPUTS
-from veselova.mechanics.veselova import Veselova
 from veselova.service.examples import BODY4, BODY4_PROBLEM
+from veselova.service.systems import SYSTEMS, ProblemModel, Request, Times
 
 __all__ = ["ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
-
-_NUMBER = {
-    "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100}],
-    "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
-}
-_VECTOR = {"type": "array", "items": _NUMBER, "minItems": 2}
-_MATRIX = {"type": "array", "items": _VECTOR, "minItems": 2}
-_UNIFORM = {
-    "type": "object",
-    "properties": {"start": _NUMBER, "stop": _NUMBER, "count": {"type": "integer", "minimum": 1}},
-    "required": ["start", "stop", "count"],
-    "additionalProperties": False,
-}
-_TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
-
-_Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
-_Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
-_Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
-_Times = Annotated[Any, WithJsonSchema(_TIMES)]
-
-Output = Literal["q", "q_dot", "frame", "omega", "spheroconic", "tau1"]
-
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
 _DEEPEST = 8
 
-#: A request has seven fields at most; beyond this many, unknown ones are not listed one by one.
+#: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
 _MOST_FIELDS = 40
+
+#: No system has as many series.
+_MOST_OUTPUTS = 20
 
 #: A field name is quoted up to here.
 _LONGEST_NAME = 100
 
 
-class _Request(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class VeselovaModel(_Request):
-    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state at t = 0."""
-
-    system: Literal["veselova"]
-    A: Annotated[_Inertia, Field(description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2")]
-    q: Annotated[_Vector, Field(description="unit vector e_1, n numbers")]
-    q_dot: Annotated[_Vector, Field(description="its velocity, orthogonal to q, n numbers")]
-    frame: Annotated[_Frame, Field(description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out")] = None
-    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
-
-    def problem(self) -> Veselova:
-        """Return the problem; raises InvalidInput located below ``problem``."""
-        try:
-            return Veselova(self.A, self.q, self.q_dot, self.frame, normalize=self.normalize)
-        except InvalidInput as error:
-            raise error.below("problem") from None
-
-
-class TorusRequest(_Request):
+class TorusRequest(Request):
     """A problem whose invariant torus is asked for."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
 
-    problem: VeselovaModel
+    problem: ProblemModel
     budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped")] = 10.0
 
 
@@ -87,9 +45,13 @@ class ComparisonRequest(TorusRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
 
-    times: Annotated[_Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
+    times: Annotated[Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
     method: Annotated[str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")] = None
-    outputs: Annotated[list[Output], Field(min_length=1, max_length=len(OUTPUTS))] = list(OUTPUTS)  # type: ignore[arg-type]
+    formulation: Annotated[str | None, Field(description="numeric: which equations of the system are integrated")] = None
+    outputs: Annotated[
+        list[str] | None,
+        Field(min_length=1, max_length=_MOST_OUTPUTS, description="series of the system (GET /v1/systems); all when left out"),
+    ] = None
     digits: Annotated[int, Field(ge=15, le=15, description="15: a comparison has the digits of the numeric engine")] = 15
 
     def time_grid(self) -> Any:
@@ -117,6 +79,16 @@ class ComparisonRequest(TorusRequest):
         """Return whether times are needed to more digits than a double has."""
         return False
 
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the request for the system that it asks of."""
+        kind = SYSTEMS[self.problem.system].problem_class
+        named = f"one of {', '.join(kind.outputs)}"
+        return [
+            InvalidInput(("outputs", i), named, shown(name))
+            for i, name in enumerate(self.outputs or ())
+            if name not in kind.outputs
+        ]
+
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""
         count = self.times.get("count") if isinstance(self.times, dict) else self.times
@@ -128,7 +100,9 @@ class ComparisonRequest(TorusRequest):
 class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
-    engine: Literal["analytic", "numeric"] = "analytic"
+    engine: Annotated[
+        Literal["analytic", "numeric"] | None, Field(description="analytic where the system has a closed form, when left out")
+    ] = None
     digits: Annotated[int, Field(ge=15, le=1000, description="decimal digits; beyond 15, answers are decimal strings")] = 15
     certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
 
@@ -137,7 +111,7 @@ class TrajectoryRequest(ComparisonRequest):
         return self.digits > 15 or self.certified
 
 
-_Model = TypeVar("_Model", bound=_Request)
+_Model = TypeVar("_Model", bound=Request)
 
 
 def read_request(model: type[_Model], document: Any) -> _Model:
@@ -148,9 +122,12 @@ def read_request(model: type[_Model], document: Any) -> _Model:
         if isinstance(part, dict) and len(part) > _MOST_FIELDS:
             raise InvalidRequest([InvalidInput(path, "the fields of a request", f"{len(part)} fields")])
     try:
-        return model.model_validate(document)
+        request = model.model_validate(document)
     except ValidationError as error:
         raise InvalidRequest([_fault(item) for item in error.errors(include_url=False, include_context=True)]) from None
+    if isinstance(request, ComparisonRequest) and (faults := request.faults()):
+        raise InvalidRequest(faults)
+    return request
 
 
 def _is_deeper(document: Any, levels: int) -> bool:
@@ -172,7 +149,15 @@ def _is_deeper(document: Any, levels: int) -> bool:
 def _fault(item: Any) -> InvalidInput:
     """Return pydantic's finding in the words of the other doors: field, required, given."""
     path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
+    if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:  # where pydantic says which model it took
+        path = ("problem", *path[2:])
     kind, given = item["type"], shown(item.get("input"))
+    if kind == "union_tag_not_found":
+        if isinstance(item.get("input"), dict):
+            return InvalidInput((*path, "system"), "this field", "nothing")
+        return InvalidInput(path, "a JSON object", given)
+    if kind == "union_tag_invalid":
+        return InvalidInput((*path, "system"), f"one of {', '.join(SYSTEMS)}", shown(item["input"]["system"]))
     if kind == "missing":
         return InvalidInput(path, "this field", "nothing")
     if kind == "extra_forbidden":
@@ -183,7 +168,7 @@ def _fault(item: Any) -> InvalidInput:
         "literal_error": str(item.get("ctx", {}).get("expected", "")),
         "bool_type": "true or false",
         "too_short": "at least one entry",
-        "too_long": f"at most {len(OUTPUTS)} entries",
+        "too_long": f"at most {_MOST_OUTPUTS} entries",
         "float_type": "a number",
         "int_type": "a whole number",
         "greater_than": "a number greater than 0",

@@ -19,7 +19,8 @@ __all__ = ["TASKS", "answer", "requested_comparison", "requested_torus", "reques
 def requested_trajectory(request: TrajectoryRequest) -> Trajectory:
     """Return the motion that a request asks of one engine."""
     problem, times = request.problem.problem(), request.time_grid()
-    return solve(problem, times, request.engine, request.method, digits=request.digits, certified=request.certified)
+    precision: dict[str, Any] = {"digits": request.digits, "certified": request.certified}
+    return solve(problem, times, request.engine, request.method, formulation=request.formulation, **precision)
 
 
 def requested_comparison(request: ComparisonRequest) -> Comparison:

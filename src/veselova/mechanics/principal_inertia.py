@@ -1,0 +1,41 @@
+"""The matrix A of a body: given along its principal axes, or as a symmetric matrix that is diagonalised."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, to_float
+from veselova.mechanics.sphere import INPUT_TOLERANCE
+
+__all__ = ["principal_inertia"]
+
+Array = NDArray[np.float64]
+
+
+def principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
+    """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix."""
+    if not is_matrix(A):
+        diagonal = exact_vector(A, ("A",))
+        if len(diagonal) < 2:
+            raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
+        for i, value in enumerate(diagonal):
+            if value <= 0 or float(value) == 0:
+                raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
+        return diagonal, None
+    n = len(A)
+    if n < 2:
+        raise InvalidInput(("A",), "at least 2 rows (n ≥ 2)", f"{n}")
+    matrix = to_float(exact_matrix(A, ("A",), n))
+    asymmetry = np.abs(matrix - matrix.T)
+    if np.max(asymmetry) > INPUT_TOLERANCE * np.max(np.abs(matrix)):
+        i, j = divmod(int(np.argmax(asymmetry)), n)
+        raise InvalidInput(("A", i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
+    values, axes = np.linalg.eigh((matrix + matrix.T) / 2)
+    if values[0] <= n * np.finfo(float).eps * values[-1]:
+        raise InvalidInput(("A",), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
+    return tuple(map(Fraction, values.tolist())), axes

@@ -1,0 +1,92 @@
+"""What every problem is: a system of the paper with its state at time zero, immutable and validated on construction."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.flow import Flow
+
+__all__ = ["Problem", "Series"]
+
+Array = NDArray[np.float64]
+
+#: Series by name, first axis the times.
+Series = Mapping[str, Array]
+
+
+class Problem(ABC):
+    """A system and its start. A subclass is one system: its data, its series, its integrals, and the field that moves it."""
+
+    #: The discriminator of the JSON, and the name of the independent variable.
+    system: ClassVar[str]
+    time: ClassVar[str] = "t"
+
+    #: The series of a trajectory, with the names of the axes that follow the time axis; the order of every listing and file.
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]]
+    #: Those that follow from the others, by ``derive``; and those whose every component ``error`` bounds.
+    derived: ClassVar[tuple[str, ...]] = ()
+    bounded: ClassVar[tuple[str, ...]]
+
+    #: The series that tables and pictures show.
+    portrait: ClassVar[str]
+
+    #: Engines that serve the system, with their methods, and the formulations that the numerical one integrates; defaults first.
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
+    formulations: ClassVar[tuple[str, ...]]
+
+    #: The arguments as given, JSON-ready.
+    given: Mapping[str, Any]
+
+    @abstractmethod
+    def flow(self, formulation: str) -> Flow:
+        """Return the field with this start; it must move."""
+
+    @abstractmethod
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along series, by name, first axis the times."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """Return the system and its size in a few words."""
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the integrals whose value is zero, so that their drift is absolute."""
+        return frozenset()
+
+    @property
+    @abstractmethod
+    def start(self) -> Series:
+        """Return the series at time zero, each with a first axis of length one."""
+
+    @property
+    @abstractmethod
+    def turning(self) -> float:
+        """Return the rate at which the state turns at the start, in radians per unit of time."""
+
+    @property
+    def moves(self) -> bool:
+        """Return whether anything moves; a problem at rest stays at its start."""
+        return True
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return one of the ``derived`` series."""
+        raise KeyError(name)
+
+    def completed(self, series: Series) -> Series:
+        """Return the series of a flow, with what it leaves to the problem, along the axes in which the problem was given."""
+        return series
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
+        return {"system": self.system, **self.given}
+
+    def conditioning_floor(self, times: Array) -> Array:
+        """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
+        return np.asarray(np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64)

@@ -1,0 +1,63 @@
+"""Points of the unit sphere with a tangent velocity, as given and exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import InvalidInput
+
+__all__ = ["INPUT_TOLERANCE", "ExactState", "require_on_sphere", "unit"]
+
+Array = NDArray[np.float64]
+
+#: How far from unit length, tangency and orthogonality an input may be: ten-digit data pass, typing errors do not.
+INPUT_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class ExactState:
+    """The data as exact rationals in principal axes, q not yet scaled and q_dot not yet projected.
+
+    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the natural one was left to us
+    """
+
+    A: tuple[Fraction, ...]
+    q: tuple[Fraction, ...]
+    q_dot: tuple[Fraction, ...]
+    frame: tuple[tuple[Fraction, ...], ...] | None
+
+    @property
+    def natural(self) -> bool:
+        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a sign matrix."""
+        return self.frame is None
+
+    @cached_property
+    def tangent(self) -> tuple[Fraction, ...]:
+        """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
+        along = sum((a * b for a, b in zip(self.q, self.q_dot)), Fraction()) / sum((a * a for a in self.q), Fraction())
+        return tuple(b - along * a for a, b in zip(self.q, self.q_dot))
+
+
+def unit(vector: Array) -> Array:
+    """Return the vector scaled to unit length."""
+    scaled = vector / np.max(np.abs(vector))  # squares of very large or small entries would leave the float range
+    return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
+
+
+def require_on_sphere(q: Array, velocity: Array, name: str = "q_dot") -> None:
+    """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to the tolerance."""
+    length = float(np.linalg.norm(q))
+    if abs(length - 1) > INPUT_TOLERANCE:
+        raise InvalidInput(("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
+    largest = float(np.max(np.abs(velocity)))
+    if largest > 0:
+        slope = float((velocity / largest) @ q) / float(np.linalg.norm(velocity / largest))
+        if abs(slope) > INPUT_TOLERANCE:
+            raise InvalidInput(
+                (name,), "a vector orthogonal to q to 1e-9 of its length (or normalize=True)", f"cosine {slope:.3g} with q"
+            )

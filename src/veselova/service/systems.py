@@ -1,0 +1,101 @@
+"""The JSON of problems: one model for each system, told apart by ``system``.
+
+The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document) and validated where the
+problem is built, so that Python, command line and HTTP refuse the same input with the same sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+
+from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.neumann import NeumannSystem
+from veselova.mechanics.problem import Problem
+from veselova.mechanics.veselova import Veselova
+
+__all__ = ["SYSTEMS", "ProblemModel", "Request", "Times"]
+
+_NUMBER = {
+    "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100}],
+    "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
+}
+_VECTOR = {"type": "array", "items": _NUMBER, "minItems": 2}
+_MATRIX = {"type": "array", "items": _VECTOR, "minItems": 2}
+_UNIFORM = {
+    "type": "object",
+    "properties": {"start": _NUMBER, "stop": _NUMBER, "count": {"type": "integer", "minimum": 1}},
+    "required": ["start", "stop", "count"],
+    "additionalProperties": False,
+}
+_TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
+
+Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
+Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
+Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
+Times = Annotated[Any, WithJsonSchema(_TIMES)]
+
+
+class Request(BaseModel):
+    """What every part of a request is: no field but those stated, no value converted."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class SystemModel(Request):
+    """A problem of one system."""
+
+    #: What the model becomes, and the field that shows its size: a number, or a list with as many entries.
+    problem_class: ClassVar[type[Problem]]
+    measured: ClassVar[str]
+
+    system: str
+
+    @property
+    def dimension(self) -> int:
+        """Return how many components a vector of the problem has, before anything is validated."""
+        value = getattr(self, self.measured)
+        return value if isinstance(value, int) else len(value) if isinstance(value, list) else 0
+
+    def problem(self) -> Problem:
+        """Return the problem; raises InvalidInput located below ``problem``."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields if name != "system"}
+        try:
+            return self.problem_class(**fields)
+        except InvalidInput as error:
+            raise error.below("problem") from None
+
+
+class VeselovaModel(SystemModel):
+    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state at t = 0."""
+
+    problem_class: ClassVar[type[Problem]] = Veselova
+    measured: ClassVar[str] = "A"
+
+    system: Literal["veselova"]
+    A: Annotated[Inertia, Field(description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2")]
+    q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
+    q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
+    frame: Annotated[Frame, Field(description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out")] = None
+    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
+
+
+class NeumannModel(SystemModel):
+    """The Neumann system on the unit sphere with potential ½(A⁻¹q,q), in its own time τ₁, and its state at τ₁ = 0."""
+
+    problem_class: ClassVar[type[Problem]] = NeumannSystem
+    measured: ClassVar[str] = "A"
+
+    system: Literal["neumann"]
+    A: Annotated[Vector, Field(description="n positive numbers; n ≥ 2")]
+    q: Annotated[Vector, Field(description="unit vector, n numbers")]
+    q_prime: Annotated[Vector, Field(description="its velocity dq/dτ₁, orthogonal to q, n numbers")]
+    normalize: Annotated[bool, Field(description="scale q to unit length and project q_prime on its tangent space first")] = False
+
+
+#: The systems, by the name that tells them apart.
+SYSTEMS: Mapping[str, type[SystemModel]] = {"veselova": VeselovaModel, "neumann": NeumannModel}
+
+ProblemModel = Annotated[VeselovaModel | NeumannModel, Field(discriminator="system")]
