@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
     from veselova.mechanics.comparison import Comparison as Comparison
+    from veselova.mechanics.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.errors import BackendMissing as BackendMissing
     from veselova.mechanics.errors import InternalContradiction as InternalContradiction
     from veselova.mechanics.errors import InvalidInput as InvalidInput
@@ -43,6 +44,7 @@ _HOMES = {
     "BackendMissing": "veselova.mechanics.errors",
     "Client": "veselova.service.client",
     "Comparison": "veselova.mechanics.comparison",
+    "EllipsoidGeodesic": "veselova.mechanics.ellipsoid",
     "InternalContradiction": "veselova.mechanics.errors",
     "InvalidInput": "veselova.mechanics.errors",
     "InvalidRequest": "veselova.mechanics.errors",

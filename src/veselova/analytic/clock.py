@@ -1,7 +1,8 @@
-"""The rate of the clock, dt/dτ₁ as a function on the torus, and what a clock is.
+"""The rate of the clock, d(time)/dτ₁ as a function on the torus, and what a clock is.
 
-dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper). Two independent clocks
-integrate it along z = z⁰ + fτ₁: analytic.fourier_clock and analytic.panel_clock.
+dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper); for the arc length of a
+geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent clocks integrate either along z = z⁰ + fτ₁: analytic.fourier_clock
+and analytic.panel_clock.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
-from veselova.analytic.precision import Values
+from veselova.analytic.curve import Curve
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
 __all__ = ["Clock", "ClockRate"]
@@ -25,19 +28,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ClockRate:
-    """dt/dτ₁ = scale · Π_s √(λ_s/b_{2s}) on the torus of one motion: the factors are at most one at any genus."""
+    """d(time)/dτ₁ = scale · Π_s φ(λ_s) on the torus of one motion; the factors φ are at most one at any genus.
+
+    time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
+    """
 
     inversion: AbelJacobi
     scale: Any
+    time: str
 
     @classmethod
-    def of(cls, spectrum: Spectrum, inversion: AbelJacobi) -> ClockRate:
+    def of(cls, spectrum: Spectrum, inversion: AbelJacobi, time: str) -> ClockRate:
         """Return the rate whose scale follows from its value at the start."""
         curve, fine = inversion.periods.curve, spectrum.arithmetic
-        squared = fine.number(1)
+        product = fine.number(1)
         for s, point in enumerate(spectrum.spheroconic):
-            squared = squared * point / fine.number(curve.branch_points[2 * s + 2])
-        return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * fine.sqrt(squared))))
+            product = product * _factor(curve, s, point, time, fine)
+        return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * product)), time)
 
     def at(self, psi: Values) -> Values:
         """Return dt/dτ₁ at angles of shape (N, g)."""
@@ -49,7 +56,7 @@ class ClockRate:
     def _factor(self, s: int, below: Values) -> Values:
         curve = self.inversion.periods.curve
         point = curve.branch_points[2 * s + 1] + below
-        return np.asarray(curve.arithmetic.sqrt(point / curve.branch_points[2 * s + 2]))
+        return np.asarray(_factor(curve, s, point, self.time, curve.arithmetic))
 
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
@@ -77,6 +84,13 @@ class ClockRate:
         return self.scale * self.inversion.periods.arithmetic.determinant(np.stack(means, axis=1))
 
 
+def _factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
+    """Return φ(λ_s) for the cut s = 0…g−1."""
+    if time == "t":
+        return arithmetic.sqrt(point / arithmetic.number(curve.branch_points[2 * s + 2]))
+    return arithmetic.number(curve.branch_points[2 * s + 1]) / point if time == "s" else 1 + 0 * point
+
+
 class Clock(ABC):
     """Neumann time as a function of physical time along one orbit, and back."""
 
@@ -98,3 +112,29 @@ class Clock(ABC):
     @abstractmethod
     def size(self) -> int:
         """Return the number of modes or of panel nodes."""
+
+
+class UniformClock(Clock):
+    """The clock of a motion whose time is Neumann's, in its own unit."""
+
+    name: ClassVar[str] = "uniform"
+
+    def __init__(self, in_time: LinearFlow, rate: float) -> None:
+        self._in_time, self._rate = in_time, rate
+
+    def tau1(self, times: Array) -> tuple[Array, Array]:
+        """Return (τ₁, z)."""
+        return times / self._rate, self._in_time.phases(times)
+
+    def time(self, tau1: Array) -> Array:
+        """Return τ₁ in the problem's unit."""
+        return self._rate * tau1
+
+    def error(self, tau1: Array) -> Array:
+        """Return zeros: nothing is integrated."""
+        return np.zeros_like(tau1)
+
+    @property
+    def size(self) -> int:
+        """Return 0."""
+        return 0

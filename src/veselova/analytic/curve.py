@@ -1,4 +1,4 @@
-"""The hyperelliptic curve w² = R(λ) = −λ Π(λ−I_i) Π_{k≥2}(λ−c_k), equation (Rad), of genus g = n−1."""
+"""The hyperelliptic curve w² = R(λ) = −Π(λ−I_i) Π(λ−c_k), equation (Rad), of genus g = n−1; c_1 = 0 but for Neumann's system."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["BranchPoint", "Curve", "Layout"]
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """Where a branch point comes from: ``I`` with ``index`` the sorted body axis (from 0), or ``c`` with c_1 = 0 at index 0."""
+    """Where a branch point comes from: ``I`` with ``index`` the sorted body axis (from 0), or ``c`` with c_1 at index 0."""
 
     kind: Literal["I", "c"]
     index: int
@@ -27,7 +27,7 @@ class BranchPoint:
 class Layout:
     """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
 
-    places (m,) their indices j · own_cut (m,) the cut (from 0) that each ends, −1 for c_1 = 0, which ends none
+    places (m,) their indices j · own_cut (m,) the cut (from 0) that each ends, −1 for b_0, which ends none
     is_own (g, m) whether b_k ends cut s · mate (m,) the number of the cut's other end, −1 where that is of the other kind
     beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k (m where there is none)
     sides (g, m) the sign of λ_s − b_k
@@ -43,7 +43,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Curve:
-    """The branch points b_0 = 0 < b_1 < … < b_{2g} and all their differences, each rounded once from more digits.
+    """The branch points b_0 < b_1 < … < b_{2g} and all their differences, each rounded once from more digits.
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
     differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c.
@@ -101,8 +101,14 @@ class Curve:
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least inner gap against the wider of its two cuts: how near a separatrix is; 1 for genus one."""
-        j = np.arange(2, 2 * self.genus, 2)
-        gaps, before, after = (self.differences[j + k, j + k + 1] for k in (0, -1, 1))
-        ratios = [float(gap / (gap + max(cut, other))) for gap, cut, other in zip(gaps, before, after, strict=True)]
+        """Return the least gap that can close against the wider of its two cuts: how near a separatrix is; 1 without any.
+
+        The first gap is one between c_1 = 0 and the least I, but for Neumann's system, where it may close as the others may.
+        """
+        widths = [self.differences[j, j + 1] for j in range(2 * self.genus)]
+        first = 2 if self.branch_points[0] == 0 else 0
+        ratios = [
+            float(widths[j] / (widths[j] + max(widths[j + 1], widths[j - 1] if j else widths[j + 1])))
+            for j in range(first, 2 * self.genus, 2)
+        ]
         return min(ratios, default=1.0)

@@ -16,6 +16,7 @@ from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import InvalidInput, Unsolved
 from veselova.mechanics.times import exact_times
+from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
 from veselova.version import __version__
@@ -40,12 +41,14 @@ _SHOWN = 3
 class EnclosedMotion:
     """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
 
-    problem: Veselova
+    problem: TorusProblem
     digits: int
     certified: bool
     method: str | None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.problem, Veselova):
+            raise InvalidInput(("digits",), f"15, not certified, for system {self.problem.system}", str(self.digits))
         if self.problem.axes is not None:
             field = "certified" if self.digits <= 15 else "digits"
             raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")

@@ -63,7 +63,7 @@ class EnclosedSolution:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(Curve.of(found.spectrum, DOUBLE))))
             begin = start(found.spectrum, curve, self.spectrum)
             self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
-            rate = ClockRate.of(self.spectrum, inversion)
+            rate = ClockRate.of(self.spectrum, inversion, "t")
             origin, frequencies = inversion.map(self._angles)[0], inversion.periods.frequencies
             self._quotients: ThetaQuotients | None = None
             if method == "theta":

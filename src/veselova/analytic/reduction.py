@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.exact import to_float
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["Moving", "moving_part"]
 
@@ -34,6 +34,7 @@ class Moving:
     axes (m,) the principal axis of each, or the first of its group · unit: the A that counts as 1
     frozen: the A's of the directions that do not move, in the problem's units
     turned: whether a group of equal A's has two moving directions
+    time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and c_1 need not be zero
     """
 
     A: tuple[Fraction, ...]
@@ -46,6 +47,7 @@ class Moving:
     unit: Fraction
     frozen: tuple[Fraction, ...]
     turned: bool
+    time: str
 
     @cached_property
     def directions(self) -> Array:
@@ -104,8 +106,8 @@ class Moving:
         return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), vectors=tuple(vectors))
 
 
-def moving_part(problem: Veselova) -> Moving:
-    """Return what moves of a problem with q̇ ≠ 0: at least two directions, and no more than two for any value of A."""
+def moving_part(problem: TorusProblem) -> Moving:
+    """Return what moves of a problem that moves: at least two directions, and no more than two for any value of A."""
     exact = problem.exact
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
@@ -130,6 +132,7 @@ def moving_part(problem: Veselova) -> Moving:
         unit=unit,
         frozen=tuple(frozen),
         turned=any(a == b for (a, *_), (b, *_) in itertools.pairwise(kept)),
+        time=problem.time,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
-from veselova.analytic.clock import Clock, ClockRate
+from veselova.analytic.clock import Clock, ClockRate, UniformClock
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
@@ -27,7 +27,7 @@ from veselova.analytic.theta import Theta
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
 from veselova.mechanics.spheroconic import to_spheroconic
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["METHODS", "Solution"]
 
@@ -69,6 +69,9 @@ _PANEL_CYCLES = 5e4
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
+#: dτ₁/d(time) is proportional to this power of (q,Aq).
+_POWERS = {"t": -0.5, "s": 1.0, "tau1": 0.0}
+
 #: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
 _SAMPLES = 48
 _FEW = 16
@@ -95,9 +98,9 @@ class Solution:
     analytic.reduction). Raises Unsolved at rest, where there is no curve.
     """
 
-    def __init__(self, problem: Veselova, distance: Fraction | None = None) -> None:
+    def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
         if not problem.moves:
-            raise Unsolved("at-rest", "q_dot = 0: the body rests, and without energy there is neither a curve nor Neumann time")
+            raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
         found = resolved(moving_part(problem), DOUBLE.digits, distance)
         self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
         self.curve = Curve.of(self.spectrum, DOUBLE)
@@ -119,7 +122,7 @@ class Solution:
     @cached_property
     def rate(self) -> ClockRate:
         """Return dt/dτ₁ on the torus, in double precision."""
-        return ClockRate.of(self.spectrum, self.inversion)
+        return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
     def rate_at(self, z: Array) -> Array:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
@@ -128,9 +131,10 @@ class Solution:
         return 1 / self._clock_rate(self.quotients.position(z))
 
     def _clock_rate(self, q: Array) -> Array:
-        """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, W fixed by the start."""
+        """Return dτ₁/d(time), a power of (q,Aq), at positions along the moving directions; its factor is fixed by the start."""
         start = np.asarray(self.spectrum.q, dtype=np.float64)
-        return np.asarray(float(self.spectrum.clock_rate) * np.sqrt((start**2 @ self._A) / (q**2 @ self._A)))
+        ratio = (q**2 @ self._A) / (start**2 @ self._A)
+        return np.asarray(float(self.spectrum.clock_rate) * ratio ** _POWERS[self.problem.time])
 
     @cached_property
     def _A(self) -> Array:
@@ -167,7 +171,7 @@ class Solution:
     def _guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
         periods = Periods(Curve.of(self.spectrum, extended(_GUARD_DIGITS)))
-        mean = ClockRate.of(self.spectrum, AbelJacobi(periods, coarse=self.inversion)).mean
+        mean = ClockRate.of(self.spectrum, AbelJacobi(periods, coarse=self.inversion), self.problem.time).mean
         flows = (LinearFlow.of(self._origin, periods.frequencies), LinearFlow.of(self._origin, periods.frequencies / mean))
         return flows[0], flows[1], float(mean)
 
@@ -179,6 +183,8 @@ class Solution:
             raise Unsolved(
                 "too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {_GUARD_DIGITS} digits"
             )
+        if self.problem.time == "tau1":
+            return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None:
             few = _PANEL_CYCLES if self.near_separatrix else _FOURIER_FROM.get(self.curve.genus, np.inf)
             name = "fourier" if cycles > few else "panels"

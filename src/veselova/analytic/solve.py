@@ -17,8 +17,8 @@ from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.times import validated_times
+from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.mechanics.veselova import Veselova
 from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
@@ -36,7 +36,7 @@ _NO_DIGIT = 0.1
 
 
 def solve(
-    problem: Veselova,
+    problem: TorusProblem,
     times: Any,
     *,
     method: str | None = None,
@@ -73,7 +73,7 @@ def solve(
 class _Motion:
     """A motion that can be asked for times; the solution is kept, and made again where it was left behind by pickling."""
 
-    problem: Veselova
+    problem: TorusProblem
     method: str | None
     clock: str | None
 
@@ -117,7 +117,7 @@ class _Motion:
         }
         provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
         series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
-        return Trajectory(self.problem, grid, error, series, provenance, dense=self)
+        return Trajectory(self.problem, grid, self.problem.bound(series, error), series, provenance, dense=self)
 
     def _resting(self, grid: Array, began: float) -> Trajectory:
         series = {name: np.repeat(values, grid.size, axis=0) for name, values in self.problem.start.items()}

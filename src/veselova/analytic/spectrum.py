@@ -2,9 +2,9 @@
 
 I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1} at the start are the
 eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the components x_s of q' along the eigenvectors,
-c_1 = 0 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s). So they interlace by
-construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact rationals, and digits are added until every
-difference of neighbours has enough of its own: a gap of 1e-280 is as good as one of 0.1.
+c_1 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
+So they interlace by construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact rationals, and digits are
+added until every difference of neighbours has enough of its own: a gap of 1e-280 is as good as one of 0.1.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Spectrum:
     """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I.
 
     inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime = dq/dτ₁
-    constants (m−1,) c_1 = 0 … c_{m−1} · spheroconic (m−1,) λ's at t = 0 · clock_rate dτ₁/dt at t = 0
+    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · clock_rate dτ₁/d(time) there
     """
 
     arithmetic: Arithmetic
@@ -53,7 +53,7 @@ class Spectrum:
 
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
-        """Return (value, kind, index), increasing; c_1 = 0 first, and a c before the I that it equals."""
+        """Return (value, kind, index), increasing."""
         labelled: list[tuple[Any, Literal["I", "c"], int]] = [(c, "c", k) for k, c in enumerate(self.constants)]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
         return sorted(labelled, key=lambda item: item[:2])
@@ -109,7 +109,7 @@ def spectrum(moving: Moving, digits: int) -> Spectrum:
     """Return the spectra of what moves with enough digits for all differences of neighbouring branch points."""
     wanted = 2 * digits + _SPARE
     most = wanted - _COINCIDE
-    working = min(most, wanted + 10 + _digits_between(moving))
+    working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
         found = _spectrum(moving, extended(working), digits)
         narrowest = min(found.widths) if found is not None else 0
@@ -130,6 +130,14 @@ def _digits_between(moving: Moving) -> int:
     return max(0, (nearest.denominator.bit_length() - nearest.numerator.bit_length()) * 3 // 10)
 
 
+def _digits_of_speed(moving: Moving) -> int:
+    """Return how many digits |q'|² has before the point, in units of the largest I, where it is given: c_1 is as large."""
+    if moving.time != "tau1":
+        return 0
+    square = sum(moving.v_squared, Fraction()) * moving.unit / sum(moving.q_squared, Fraction())
+    return max(0, math.ceil(square)).bit_length() * 3 // 10
+
+
 def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
     """Return the spectra at one precision; None where it is too low for iterations to settle, or for c_1 = 0 to come out."""
     q, v, rate = tangent(moving, arithmetic)
@@ -138,18 +146,25 @@ def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | N
         points = zeros_between_poles(inverse, q * q, 0, arithmetic)
         along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
         spheroconic = arithmetic.array(points)
-        if abs(1 - np.sum(along * along / spheroconic)) > arithmetic.number(10) ** -digits:
-            return None
         constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
+        if moving.time == "tau1":
+            # All eigenvalues add up to the trace; none but the lowest is missing, and none at all where q' = 0.
+            rest = np.sum(spheroconic) - np.sum(along * along) - np.sum(arithmetic.array(constants))
+            constants = sorted([rest, *constants]) if len(constants) < len(points) else constants
+        elif abs(1 - np.sum(along * along / spheroconic)) > arithmetic.number(10) ** -digits:
+            return None
+        else:
+            constants = [arithmetic.number(0), *constants]
     except TooFewDigits:
         return None
-    return Spectrum(arithmetic, inverse, q, v, arithmetic.array([0, *constants]), spheroconic, rate)
+    return Spectrum(arithmetic, inverse, q, v, arithmetic.array(constants), spheroconic, rate)
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
-    """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/dt.
+    """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until roots are taken.
 
-    (dτ₁/dt)² = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(Aq,q), exact until the root is taken.
+    With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose tangent is along Aw, (dτ₁/ds)²
+    = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q| = 1.
     """
     triples = list(zip(moving.q_squared, moving.v_squared, moving.qv, strict=True))
     qq = sum(moving.q_squared, Fraction())
@@ -157,7 +172,13 @@ def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any
     qAq = sum((a * x for a, x in zip(moving.A, moving.q_squared, strict=True)), Fraction())
     vAv = sum((a * x for a, x in zip(moving.A, moving.v_squared, strict=True)), Fraction())
     qAv = sum((a * x for a, x in zip(moving.A, moving.qv, strict=True)), Fraction())
-    rate = arithmetic.sqrt(arithmetic.number((vAv * qAq - qAv * qAv) / qAq))
+    speed = 1 / moving.unit if moving.time == "tau1" else (vAv * qAq - qAv * qAv) / qAq
+    rate = speed
+    if moving.time == "s":
+        r = qAv / qAq
+        squares = [a * a * (v2 - 2 * r * qv + r * r * q2) for a, (q2, v2, qv) in zip(moving.A, triples, strict=True)]
+        tangent_squared = sum(squares, Fraction())
+        rate = speed * qAq / (qq * tangent_squared * moving.unit)
     q = arithmetic.sqrt(arithmetic.array([q2 / qq for q2, _, _ in triples]))
     v = [
         arithmetic.number(qv - along * q2) / arithmetic.sqrt(arithmetic.number(q2))
@@ -165,7 +186,11 @@ def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any
         else arithmetic.sqrt(arithmetic.number(v2))
         for q2, v2, qv in triples
     ]
-    return q, arithmetic.array(v) / rate, rate
+    return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
+
+
+def _root(value: Fraction, arithmetic: Arithmetic) -> Any:
+    return arithmetic.sqrt(arithmetic.number(value))
 
 
 def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Extended) -> list[Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.integrals import neumann_velocity, tangent_basis
 
-__all__ = ["natural_frame", "orthonormalized", "refined"]
+__all__ = ["moser_frame", "natural_frame", "orthonormalized", "refined"]
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,12 @@ def natural_frame(A: Array, q: Array, q_dot: Array) -> Array:
     Signs: (q', n_k) ≥ 0 for k ≥ 3 and (q', γ) ≥ 0; the sign of n_2 (of γ when n = 2) makes the determinant +1.
     A body at rest gets the eigenvectors of A⁻¹ restricted to q⊥ in the same places.
     """
-    basis = tangent_basis(q)
-    v = neumann_velocity(A, q, q_dot)
+    return moser_frame(A, q, neumann_velocity(A, q, q_dot))
+
+
+def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
+    """Return the same for a Neumann motion with velocity q' of any size, γ being the eigenvector of the least constant c_1."""
+    basis, v = tangent_basis(q), q_prime
     restricted = basis.T @ (np.diag(1 / A) - np.outer(v, v)) @ basis
     vectors = basis @ np.linalg.eigh(restricted)[1]  # columns γ, n_2, …, n_{n−1}: c_1 = 0 is the smallest
     vectors = vectors * np.where(v @ vectors < 0, -1.0, 1.0)
@@ -57,18 +61,22 @@ def orthonormalized(frame: Array) -> Array:
     return np.asarray(0.5 * (3.0 * frame - frame @ gram), dtype=np.float64)
 
 
-def refined(frame: Array, A: Sequence[Fraction], q: Sequence[Fraction], tangent: Sequence[Fraction]) -> Array:
+def refined(
+    frame: Array, A: Sequence[Fraction], q: Sequence[Fraction], tangent: Sequence[Fraction], rate_squared: Fraction | None = None
+) -> Array:
     """Return a natural frame to the last bit, from one in double precision and the exact data.
 
     Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS bits, H = NᵀMN with
     M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii), which squares the turn. A frame whose constants
-    nearly coincide is returned as it is, and so is one at rest or of high dimension.
+    nearly coincide is returned as it is, and so is one at rest or of high dimension. ``rate_squared`` is (dτ₁/d(time))² for the
+    time of ``tangent``, that of a Veselova problem where it is left out.
     """
-    if frame.shape[0] > _LARGEST_REFINED or not any(tangent):
+    if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
     largest = 1 / min(A)
-    qAq, vAv, qAv = (_weighted(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
-    rate_squared = (vAv * qAq - qAv * qAv) / qAq
+    if rate_squared is None:
+        qAq, vAv, qAv = (_weighted(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
+        rate_squared = (vAv * qAq - qAv * qAv) / qAq
     velocity = _fixed([[x * y / (rate_squared * largest) for y in tangent] for x in tangent])
     M = _fixed(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
     unit = _unit_vector(q)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_vector, plain, read_only, to_float
-from veselova.mechanics.flow import Flow, Operations
-from veselova.mechanics.integrals import moser_eigenvalues, uhlenbeck_integrals
-from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.integrals import moser_eigenvalues, norm, uhlenbeck_integrals
+from veselova.mechanics.natural_frame import moser_frame, refined
+from veselova.mechanics.neumann_flow import NeumannFlow
+from veselova.mechanics.principal_inertia import positive_numbers
+from veselova.mechanics.problem import Series
 from veselova.mechanics.sphere import ExactState, require_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["NeumannSystem"]
 
@@ -23,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class NeumannSystem(Problem):
+class NeumannSystem(TorusProblem):
     """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q, equation (4.7), in time τ₁.
 
     A        n positive numbers
@@ -31,44 +35,50 @@ class NeumannSystem(Problem):
     q_prime  its velocity dq/dτ₁, tangent to the sphere, (n,)
 
     q must have unit length and q_prime be tangent to 1e-9; with ``normalize=True`` q is scaled and q_prime projected first.
-    On F_0 = 0, equation (4.8), the motion is that of a Veselova problem (Theorem LR→Nn); here F_0 may have any value.
+    On F_0 = 0, equation (4.8), the motion is that of a Veselova problem (Theorem LR→Nn); here F_0 may have any value. The
+    frame's other columns are the eigenvectors n_2 … n_{n−1}, n_1 of A⁻¹ − q'q'ᵀ on q⊥ with eigenvalues c_2 … c_{n−1}, c_1.
     Raises InvalidInput, which names the field, what was required and what was given.
     """
 
     A: Array
     q: Array
     q_prime: Array
+    frame: Array
     exact: ExactState
     given: Mapping[str, Any]
 
     system: ClassVar[str] = "neumann"
     time: ClassVar[str] = "tau1"
-    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {"q": ("axis",), "q_prime": ("axis",), "spheroconic": ("coordinate",)}
-    derived: ClassVar[tuple[str, ...]] = ("spheroconic",)
-    bounded: ClassVar[tuple[str, ...]] = ("q",)
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "q": ("axis",),
+        "q_prime": ("axis",),
+        "frame": ("axis", "vector"),
+        "spheroconic": ("coordinate",),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("q",)
+    bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
     def __init__(self, A: Any, q: Any, q_prime: Any, *, normalize: bool = False) -> None:
         if not isinstance(normalize, bool):
             raise InvalidInput(("normalize",), "true or false", shown(normalize))
-        diagonal = exact_vector(A, ("A",))
-        if len(diagonal) < 2:
-            raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
-        for i, value in enumerate(diagonal):
-            if value <= 0 or float(value) == 0:
-                raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
+        diagonal = positive_numbers(A)
         exact_q, exact_v = exact_vector(q, ("q",), len(diagonal)), exact_vector(q_prime, ("q_prime",), len(diagonal))
         if not any(exact_q):
             raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
-        position, velocity = to_float(exact_q), to_float(exact_v)
+        largest = max(abs(x) for x in exact_q)
+        position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_v)
         if not normalize:
             require_on_sphere(position, velocity, "q_prime")
         exact = ExactState(diagonal, exact_q, exact_v, None)
-        object.__setattr__(self, "exact", exact)
-        arrays = {"A": to_float(diagonal), "q": read_only(unit(position)), "q_prime": to_float(exact.tangent)}
+        arrays = {"A": to_float(diagonal), "q": unit(position), "q_prime": to_float(exact.tangent)}
+        _require_representable(arrays["A"], arrays["q_prime"])
+        frame = moser_frame(arrays["A"], arrays["q"], arrays["q_prime"])
+        arrays["frame"] = refined(frame, exact.A, exact.q, exact.tangent, Fraction(1))
         for name, array in arrays.items():
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
+        object.__setattr__(self, "exact", exact)
         given = {"A": A, "q": q, "q_prime": q_prime, "normalize": normalize}
         object.__setattr__(self, "given", {name: plain(value) for name, value in given.items()})
 
@@ -77,34 +87,42 @@ class NeumannSystem(Problem):
         return f"NeumannSystem({', '.join(parts)})".replace("\n", "")
 
     @property
-    def n(self) -> int:
-        """Return the dimension of the ambient space."""
-        return int(self.A.size)
+    def title(self) -> str:
+        """Return the system, its dimension and its energy."""
+        return f"{self.system}, n = {self.n}, energy {float(self._energy(self.q, self.q_prime)):.12g}"
 
     @property
-    def title(self) -> str:
-        """Return the system and its dimension."""
-        return f"{self.system}, n = {self.n}, energy {float(self._energy(self.q, self.q_prime)):.12g}"
+    def moves(self) -> bool:
+        """Return whether the point moves: it rests where q' = 0 and q is an eigenvector of A."""
+        values = {a for a, x in zip(self.exact.A, self.exact.q, strict=True) if x}
+        return any(self.exact.tangent) or len(values) > 1
 
     @property
     def turning(self) -> float:
         """Return the larger of |q'| and √max I."""
-        return float(max(np.linalg.norm(self.q_prime), np.sqrt(np.max(1 / self.A))))
+        return float(max(norm(self.q_prime), np.sqrt(np.max(1 / self.A))))
 
     @property
     def start(self) -> Series:
         """Return the series at τ₁ = 0."""
-        return {"q": self.q[None], "q_prime": self.q_prime[None]}
+        spheroconic = to_spheroconic(self.A, self.q[None])
+        return {"q_prime": self.q_prime[None], "frame": self.frame[None], "spheroconic": spheroconic}
 
     def flow(self, formulation: str = "neumann") -> NeumannFlow:
         """Return the field (4.7) in units of this problem."""
-        unit_of_time = 1 / self.turning
-        inverse = unit_of_time**2 / self.A
-        return NeumannFlow(inverse, unit_of_time, np.concatenate([self.q, unit_of_time * self.q_prime]))
+        time_unit = 1 / self.turning
+        return NeumannFlow(time_unit**2 / self.A, time_unit, np.concatenate([time_unit * self.q_prime, self.frame.ravel()]))
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return the spheroconic coordinates."""
-        return to_spheroconic(self.A, series["q"])
+        """Return q, the first column of the frame."""
+        return np.asarray(series["frame"][..., 0])
+
+    def completed(self, series: Series) -> Series:
+        """Return the engine's series under the names of this system, with the spheroconic coordinates."""
+        spheroconic = series.get("spheroconic")
+        if spheroconic is None:
+            spheroconic = to_spheroconic(self.A, series["frame"][:, :, 0])
+        return {"q_prime": series["q_dot"], "frame": series["frame"], "spheroconic": spheroconic}
 
     def _energy(self, q: Array, v: Array) -> Array:
         return np.asarray((np.sum(v * v, axis=-1) + np.sum(q * q / self.A, axis=-1)) / 2, dtype=np.float64)
@@ -114,7 +132,7 @@ class NeumannSystem(Problem):
 
         ``energy`` ½(q',q') + ½(A⁻¹q,q); ``F0`` (4.8); ``neumann`` F_1…F_n; ``constants`` c_1…c_{n−1}; ``q_norm`` (q,q).
         """
-        q, v, A = series["q"], series["q_prime"], self.A
+        q, v, A = series["frame"][..., 0], series["q_prime"], self.A
         qAq, qAv, vAv = (np.sum(a * A * b, axis=-1) for a, b in ((q, q), (q, v), (v, v)))
         return {
             "energy": self._energy(q, v),
@@ -125,47 +143,12 @@ class NeumannSystem(Problem):
         }
 
 
-@dataclass(frozen=True)
-class NeumannFlow(Flow):
-    """Equation (4.7) for states (q, q'), with λ divided by (q,q): off the sphere it is then not unstable."""
-
-    parameters: Array
-    time_unit: float
-    initial: Array
-
-    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return (q', q'')."""
-        q, v = state[: parameters.size], state[parameters.size :]
-        multiplier = (ops.dot(parameters * q, q) - ops.dot(v, v)) / ops.dot(q, q)
-        return np.concatenate([v, multiplier * q - parameters * q])
-
-    def project(self, state: Array) -> Array:
-        """Return the state with |q| = 1, (q,q') = 0 and the energy of the start, by one step along its gradient."""
-        q, v = self._tangent(state)
-        restored = self._tangent(np.concatenate([q, v]) - self._defect(q, v))
-        return np.concatenate(restored)
-
-    def _tangent(self, state: Array) -> tuple[Array, Array]:
-        q, v = state[: self.parameters.size], state[self.parameters.size :]
-        q = q / np.linalg.norm(q)
-        return q, v - (q @ v) * q
-
-    def _defect(self, q: Array, v: Array) -> Array:
-        """Return the step along the energy's gradient that makes up for the energy's change; none at rest."""
-        energy, wanted = (float(b @ b + a @ (self.parameters * a)) / 2 for a, b in ((q, v), self._tangent(self.initial)))
-        force = self.parameters * q - (q @ (self.parameters * q)) * q
-        gradient = np.concatenate([force, v])
-        size = float(gradient @ gradient)
-        return gradient * ((energy - wanted) / size) if size > 0 else gradient
-
-    def neighbour(self, distance: float) -> NeumannFlow:
-        """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(self.initial.size).normal(size=self.initial.size) / np.sqrt(self.parameters.size)
-        return replace(self, initial=np.concatenate(self._tangent(self.initial + distance * direction)))
-
-    def unpack(self, states: Array) -> dict[str, Array]:
-        """Return q and q_prime."""
-        n = self.parameters.size
-        q = states[:, :n] / np.linalg.norm(states[:, :n], axis=1, keepdims=True)
-        v = states[:, n:]
-        return {"q": q, "q_prime": (v - np.sum(q * v, axis=1, keepdims=True) * q) / self.time_unit}
+def _require_representable(A: Array, q_prime: Array) -> None:
+    """Raise InvalidInput where squares of the frequencies or of the velocity leave the range of a float."""
+    with np.errstate(over="ignore", under="ignore"):
+        ranges = {"A": np.concatenate([A * A, 1 / A / A]), "q_prime": np.array([norm(q_prime) ** 2])}
+    for name, squares in ranges.items():
+        if not np.all(np.isfinite(squares)) or (name == "A" and not np.all(squares > 0)):
+            raise InvalidInput(
+                (name,), "squares within the range of a float", f"entries up to {np.max(np.abs(locals()[name])):.3g}"
+            )

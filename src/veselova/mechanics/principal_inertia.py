@@ -12,21 +12,26 @@ from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, to_float
 from veselova.mechanics.sphere import INPUT_TOLERANCE
 
-__all__ = ["principal_inertia"]
+__all__ = ["positive_numbers", "principal_inertia"]
 
 Array = NDArray[np.float64]
+
+
+def positive_numbers(A: Any) -> tuple[Fraction, ...]:
+    """Return the entries of A, two or more numbers above zero, exactly."""
+    diagonal = exact_vector(A, ("A",))
+    if len(diagonal) < 2:
+        raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
+    for i, value in enumerate(diagonal):
+        if value <= 0 or float(value) == 0:
+            raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
+    return diagonal
 
 
 def principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
     """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix."""
     if not is_matrix(A):
-        diagonal = exact_vector(A, ("A",))
-        if len(diagonal) < 2:
-            raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
-        for i, value in enumerate(diagonal):
-            if value <= 0 or float(value) == 0:
-                raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
-        return diagonal, None
+        return positive_numbers(A), None
     n = len(A)
     if n < 2:
         raise InvalidInput(("A",), "at least 2 rows (n ≥ 2)", f"{n}")

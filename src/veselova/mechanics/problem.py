@@ -83,6 +83,10 @@ class Problem(ABC):
         """Return the series of a flow, with what it leaves to the problem, along the axes in which the problem was given."""
         return series
 
+    def bound(self, series: Series, error: Array) -> Array:
+        """Return the error of all bounded series, from that of those among them which are not derived."""
+        return error
+
     def as_dict(self) -> dict[str, Any]:
         """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
         return {"system": self.system, **self.given}

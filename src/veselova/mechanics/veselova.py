@@ -16,10 +16,11 @@ from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, plain, read_only, to_float
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
 from veselova.mechanics.principal_inertia import principal_inertia
-from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.problem import Series
 from veselova.mechanics.reduced_flow import ReducedFlow
 from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, require_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["Veselova"]
 
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Veselova(Problem):
+class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the constraint (44), n ≥ 2.
 
     A        n positive numbers, or a symmetric positive definite n × n matrix, which is diagonalised: the body axes then
@@ -61,7 +62,6 @@ class Veselova(Problem):
     derived: ClassVar[tuple[str, ...]] = ("q", "omega")
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
-    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"analytic": ("theta", "angles"), "numeric": ("dop853", "taylor")}
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False) -> None:
@@ -124,11 +124,6 @@ class Veselova(Problem):
         # Vectors along the principal axes, to the digits that recognise them.
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
         return f"Veselova({', '.join(parts)})".replace("\n", "")
-
-    @property
-    def n(self) -> int:
-        """Return the dimension of the body."""
-        return int(self.A.size)
 
     @property
     def moves(self) -> bool:

@@ -68,6 +68,7 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     if problem.moves:
         series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
         series = problem.completed(series)
+        error = problem.bound(series, error)
     else:
         series = {name: np.repeat(values, grid.size, axis=0) for name, values in problem.start.items()}
         error, steps = np.full(grid.size, np.finfo(float).eps), 0

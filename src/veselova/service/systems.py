@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
+from veselova.mechanics.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
@@ -95,7 +96,24 @@ class NeumannModel(SystemModel):
     normalize: Annotated[bool, Field(description="scale q to unit length and project q_prime on its tangent space first")] = False
 
 
-#: The systems, by the name that tells them apart.
-SYSTEMS: Mapping[str, type[SystemModel]] = {"veselova": VeselovaModel, "neumann": NeumannModel}
+class EllipsoidGeodesicModel(SystemModel):
+    """A geodesic on the ellipsoid Σ X_i²/A_i = 1, in its arc length s, with the normals of the quadrics its tangent touches."""
 
-ProblemModel = Annotated[VeselovaModel | NeumannModel, Field(discriminator="system")]
+    problem_class: ClassVar[type[Problem]] = EllipsoidGeodesic
+    measured: ClassVar[str] = "A"
+
+    system: Literal["ellipsoid-geodesic"]
+    A: Annotated[Vector, Field(description="squares of the semiaxes, n positive numbers; n ≥ 2")]
+    X: Annotated[Vector, Field(description="point of the ellipsoid at s = 0, n numbers")]
+    X_dot: Annotated[Vector, Field(description="unit tangent dX/ds there, n numbers")]
+    normalize: Annotated[bool, Field(description="scale X onto the ellipsoid, project and scale X_dot first")] = False
+
+
+#: The systems, by the name that tells them apart.
+SYSTEMS: Mapping[str, type[SystemModel]] = {
+    "veselova": VeselovaModel,
+    "neumann": NeumannModel,
+    "ellipsoid-geodesic": EllipsoidGeodesicModel,
+}
+
+ProblemModel = Annotated[VeselovaModel | NeumannModel | EllipsoidGeodesicModel, Field(discriminator="system")]

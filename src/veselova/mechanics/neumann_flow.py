@@ -1,0 +1,140 @@
+"""Equation (4.7) with the frame carried along, ė = −(q∧q')e: Neumann's system in its own time, and a geodesic's in arc length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.flow import Flow, Operations
+from veselova.mechanics.integrals import neumann_velocity
+from veselova.mechanics.natural_frame import orthonormalized
+
+__all__ = ["GaussFlow", "NeumannFlow", "moved"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NeumannFlow(Flow):
+    """Neumann's system for flat states (q', E), q the first column of the frame E; parameters are the I_i."""
+
+    parameters: Array
+    time_unit: float
+    initial: Array
+
+    @property
+    def _n(self) -> int:
+        return self.parameters.size
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return (q'', E')."""
+        return _neumann_field(state, parameters, ops)
+
+    def project(self, state: Array) -> Array:
+        """Return the state with E orthonormal, q' tangent, and the energy of the start by one step along its gradient."""
+        v, E = _on_sphere(state, self._n)
+        q = E[:, 0]
+        energy, wanted = self._energy(q, v), self._energy(*_on_sphere(self.initial, self._n)[::-1])
+        force = self.parameters * q - (q @ (self.parameters * q)) * q
+        size = float(force @ force + v @ v)
+        step = (energy - wanted) / size if size > 0 else 0.0
+        E = np.column_stack([q - step * force, E[:, 1:]])
+        return np.concatenate(_flat(_on_sphere(np.concatenate([v - step * v, E.ravel()]), self._n)))
+
+    def _energy(self, frame: Array, v: Array) -> float:
+        q = frame if frame.ndim == 1 else frame[:, 0]
+        return float(v @ v + q @ (self.parameters * q)) / 2
+
+    def neighbour(self, distance: float) -> NeumannFlow:
+        """Return the flow of a start moved by about ``distance``."""
+        moved_state = moved(self.initial, distance, self._n)
+        return replace(self, initial=np.concatenate(_flat(_on_sphere(moved_state, self._n))))
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return frame, q_dot = dq/dτ₁ and tau1-free series along the principal axes."""
+        v, E = _on_spheres(states, self._n)
+        return {"q_dot": v / self.time_unit, "frame": E}
+
+
+@dataclass(frozen=True)
+class GaussFlow(Flow):
+    """A geodesic on the ellipsoid through its unit normal q (Theorem Kno): states (q', E, τ₁) in arc length.
+
+    dτ₁/ds = √J (q,Aq); parameters are the I_i, the A_i and √J, in units of the longest semiaxis.
+    """
+
+    parameters: Array
+    time_unit: float
+    initial: Array
+
+    @property
+    def _n(self) -> int:
+        return (self.parameters.size - 1) // 2
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return d(q', E, τ₁)/ds."""
+        n = (parameters.size - 1) // 2
+        q = state[n:-1].reshape(n, n)[:, 0]
+        rate = parameters[-1] * ops.dot(parameters[n:-1] * q, q)
+        derivative = np.empty_like(state)
+        derivative[:-1] = rate * _neumann_field(state[:-1], parameters[:n], ops)
+        derivative[-1] = rate
+        return derivative
+
+    def project(self, state: Array) -> Array:
+        """Return the state with E orthonormal, q' tangent and F_0 = 0, equation (4.8)."""
+        v, E = _on_sphere(state[:-1], self._n)
+        v = neumann_velocity(self.parameters[self._n : -1], E[:, 0], v)
+        return np.concatenate([*_flat((v, E)), state[-1:]])
+
+    def neighbour(self, distance: float) -> GaussFlow:
+        """Return the flow of a start moved by about ``distance``, with the √J that belongs to it."""
+        initial = self.project(np.append(moved(self.initial[:-1], distance, self._n), 0.0))
+        change = 1 + distance * (0.5 if self._n % 2 else -0.5)
+        return replace(self, initial=initial, parameters=np.append(self.parameters[:-1], self.parameters[-1] * change))
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return frame and tau1."""
+        _, E = _on_spheres(states[:, :-1], self._n)
+        return {"frame": E, "tau1": states[:, -1] * self.time_unit}
+
+
+def _neumann_field(state: Any, inverse: Any, ops: Operations) -> Any:
+    """Return (q'', E'), with λ divided by (q,q): off the sphere the motion is then not unstable."""
+    n = inverse.size
+    v, E = state[:n], state[n:].reshape(n, n)
+    q = E[:, 0]
+    multiplier = (ops.dot(inverse * q, q) - ops.dot(v, v)) / ops.dot(q, q)
+    turned = np.outer(v, ops.dot(q, E)) - np.outer(q, ops.dot(v, E))
+    return np.concatenate([multiplier * q - inverse * q, turned.ravel()])
+
+
+def moved(state: Array, distance: float, n: int) -> Array:
+    """Return a state (a vector, then a frame) whose vector and first column are moved by about ``distance``."""
+    direction = np.random.default_rng(n).normal(size=(2, n)) / np.sqrt(n)
+    size = max(float(np.linalg.norm(state[:n])), 1.0)
+    E = state[n:].reshape(n, -1).copy()
+    E[:, 0] += distance * direction[0]
+    return np.concatenate([state[:n] + distance * size * direction[1], E.ravel()])
+
+
+def _on_sphere(state: Array, n: int) -> tuple[Array, Array]:
+    """Return q' tangent and the frame orthonormal, its first column along q."""
+    v, E = _on_spheres(state[None], n)
+    return v[0], E[0]
+
+
+def _on_spheres(states: Array, n: int) -> tuple[Array, Array]:
+    v, E = states[:, :n], states[:, n:].reshape(-1, n, n)
+    q = E[:, :, :1] / np.linalg.norm(E[:, :, :1], axis=1, keepdims=True)
+    rest = E[:, :, 1:] - q @ (np.swapaxes(q, 1, 2) @ E[:, :, 1:])
+    E = orthonormalized(np.concatenate([q, rest], axis=2))
+    q = E[:, :, 0]
+    return v - np.sum(q * v, axis=1, keepdims=True) * q, E
+
+
+def _flat(state: tuple[Array, Array]) -> tuple[Array, Array]:
+    return state[0], state[1].ravel()

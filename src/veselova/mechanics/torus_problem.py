@@ -1,0 +1,37 @@
+"""Problems whose motion is linear on the real torus of a hyperelliptic curve: what the closed form needs to know of them."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.problem import Problem
+from veselova.mechanics.sphere import ExactState
+
+__all__ = ["TorusProblem"]
+
+Array = NDArray[np.float64]
+
+
+class TorusProblem(Problem):
+    """A point q on Sⁿ⁻¹ that is Neumann's in τ₁, with the frame [q, n_2 … n_{n−1}, γ] or a rotated one.
+
+    Subclasses differ in their time.
+    A (n,) along principal axes · frame (n, n) at the start, along them · exact: the data as rationals · axes (n, n): the
+    principal axes as columns, None where they are the body's. The series of an engine are ``tau1``, ``frame``, ``spheroconic``
+    and ``q_dot``, the velocity in the problem's own ``time``: t, s or tau1; ``completed`` makes the problem's series of them.
+    """
+
+    A: Array
+    frame: Array
+    exact: ExactState
+    axes: Array | None = None
+
+    engines: ClassVar = {"analytic": ("theta", "angles"), "numeric": ("dop853", "taylor")}
+
+    @property
+    def n(self) -> int:
+        """Return the dimension."""
+        return int(self.A.size)
