@@ -93,10 +93,16 @@ class Moving:
         )
 
     def moved(self, axis: int, distance: Fraction) -> Moving:
-        """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that."""
+        """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that.
+
+        Where q̇ is Neumann's q' it is scaled in place of q_i: alone on its axis, q is a unit vector whatever its scale.
+        """
         q_squared, qv, vectors = list(self.q_squared), list(self.qv), list(self.vectors)
         square, product, v_squared = q_squared[axis], qv[axis], self.v_squared[axis]
         if square >= distance**2 * sum(q_squared, Fraction()):
+            if self.time == "tau1":
+                v_scaled = tuple(v * (1 + distance) ** 2 for v in self.v_squared)
+                return replace(self, v_squared=v_scaled, qv=tuple(x * (1 + distance) for x in qv))
             q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
         else:
             s = distance / _near_root(sum(self.v_squared, Fraction()))

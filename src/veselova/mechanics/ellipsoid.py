@@ -38,7 +38,7 @@ class EllipsoidGeodesic(TorusProblem):
 
     X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9; with ``normalize=True`` X is scaled onto the
     ellipsoid and X_dot projected and scaled first. The frame is [q, n_2 … n_{n−1}, γ]: the normal of the ellipsoid, those of
-    the confocal quadrics that the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself.
+    the confocal quadrics that the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself; its determinant is 1 for n > 2.
     Raises InvalidInput, which names the field, what was required and what was given.
     """
 
@@ -77,19 +77,21 @@ class EllipsoidGeodesic(TorusProblem):
         v = to_float([a / v_largest if normalize else a for a in exact_V])
         if not normalize:
             _require_on_ellipsoid(x, v, semiaxes)
-        # q ∝ A⁻¹X, and dq ∝ A⁻¹dX up to a multiple of q.
+        # q ∝ A⁻¹X, and dq ∝ A⁻¹V up to a multiple of q, for V tangent to the ellipsoid.
         q = tuple(a / b for a, b in zip(exact_X, diagonal, strict=True))
-        q_dot = tuple(a / b for a, b in zip(exact_V, diagonal, strict=True))
-        exact = ExactState(diagonal, q, q_dot, None)
-        if not any(exact.tangent):
+        tangent = ExactState(diagonal, q, exact_V, None).tangent
+        exact = ExactState(diagonal, q, tuple(a / b for a, b in zip(tangent, diagonal, strict=True)), None)
+        if not any(tangent):
             raise InvalidInput(("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal")
         A_float = to_float(diagonal)
         normal = unit(to_float([a / max(abs(b) for b in q) for a in q]))
         largest = max(abs(a) for a in exact.tangent)
         velocity = to_float([a / largest for a in exact.tangent])
         frame = refined(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent)
-        tangent = frame[:, -1]
-        arrays = {"A": A_float, "X": position(A_float, normal), "X_dot": tangent.copy(), "frame": orthonormalized(frame)}
+        frame = orthonormalized(frame)
+        if frame[:, -1] @ velocity < 0:  # n = 2, where γ has no partner whose sign makes the determinant positive
+            frame[:, -1] = -frame[:, -1]
+        arrays = {"A": A_float, "X": position(A_float, normal), "X_dot": frame[:, -1].copy(), "frame": frame}
         for name, array in arrays.items():
             object.__setattr__(self, name, read_only(array))
         object.__setattr__(self, "exact", exact)

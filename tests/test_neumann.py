@@ -1,0 +1,111 @@
+"""Neumann's system for any value of F_0, in theta functions and integrated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from veselova import InvalidInput, NeumannSystem, Unsolved, solve
+
+Generator = np.random.Generator
+
+TIMES = np.array([-30.0, -2.0, 0.0, 0.7, 11.0, 30.0])
+
+SPECIAL: dict[str, tuple[Any, Any, Any]] = {
+    "turning-everywhere": ([1, 2, 3, 4], [0.5] * 4, [0] * 4),
+    "through-the-pole": ([3, 2, 1], [1, 0, 0], [0, 0.5, 0.3]),
+    "from-the-unstable-pole": ([3, 2, 1], [0, 0, 1], [0.5, 0.5, 0]),
+    "planar": ([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0]),
+    "symmetric": ([2, 2, 1], [0.48, 0.6, 0.64], [0.1, 0.3, 0.2]),
+    "isotropic": ([2, 2, 2], [0.48, 0.6, 0.64], [0.1, 0.3, 0.2]),
+    "fast": ([1, 2, 3, 4], [0.5] * 4, [30, -30, 10, -10]),
+    "slow": ([1, 2, 3, 4], [0.5] * 4, [1e-9, -1e-9, 0, 0]),
+    "wide": ([1e-3, 1, 1e3], [0.6, 0.48, 0.64], [1, 1, 1]),
+    "circle": ([2, 1], [0.8, 0.6], [-0.9, 1.2]),
+}
+
+
+def drawn(rng: Generator, n: int) -> NeumannSystem:
+    """Velocities from slow to fast: c_1 < I_1, c_1 > I_1 and c_1 < 0 all occur."""
+    A = np.exp(rng.uniform(0, np.log(5), n))
+    return NeumannSystem(A, rng.normal(size=n), rng.normal(size=n) * rng.choice([0.1, 0.6, 3.0]), normalize=True)
+
+
+@pytest.mark.parametrize("n", range(2, 8))
+@pytest.mark.parametrize("method", ["theta", "angles"])
+def test_the_closed_form_agrees_with_integration(n: int, method: str, rng: Generator) -> None:
+    for _ in range(5):
+        problem = drawn(rng, n)
+        closed, found = solve(problem, TIMES, method=method), solve(problem, TIMES, "numeric", "taylor")
+        difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
+        assert np.all(difference <= closed.error + found.error)
+        assert np.max(closed.error) <= 1e-11 * max(1.0, problem.turning)
+        assert np.allclose(closed.q_prime, found.q_prime, atol=1e-10 * problem.turning)
+        assert np.allclose(closed.spheroconic, found.spheroconic, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", sorted(SPECIAL))
+def test_special_starts_are_served(name: str) -> None:
+    A, q, v = SPECIAL[name]
+    problem = NeumannSystem(A, q, v, normalize=True)
+    closed, found = solve(problem, TIMES / 3), solve(problem, TIMES / 3, "numeric", "taylor")
+    assert np.all(np.max(np.abs(closed.frame - found.frame), axis=(1, 2)) <= closed.error + found.error)
+    assert np.max(closed.error) < 1e-11
+
+
+def test_a_pendulum_on_its_separatrix_climbs_for_as_long_as_the_data_tell() -> None:
+    """U = ½(A⁻¹q,q), n = 2: with the energy of the top, sin of the angle to it falls like 1/cosh."""
+    top, gap = NeumannSystem(["1", "1/2"], ["1", "0"], ["0", "1"]), 1.0
+    assert top.integrals({**top.start})["energy"][0] == 1.0  # ½(1 + 1) against ½·2 at the top: the separatrix
+    found = solve(top, [0.0, 1.0, 5.0])
+    assert found.provenance.details["regime"] == "separatrix"
+    assert np.allclose(found.q[:, 0], 1 / np.cosh(gap * found.times), atol=np.max(found.error))
+    assert np.all(np.diff(found.error) > 0)
+    with pytest.raises(Unsolved, match="no-digit-left"):
+        solve(top, [60.0])
+
+
+def test_a_point_at_an_eigenvector_rests() -> None:
+    for engine in ("analytic", "numeric"):
+        found = solve(NeumannSystem([3, 2, 1], [0, 1, 0], [0, 0, 0]), TIMES, engine)
+        assert np.array_equal(found.q, np.tile([0.0, 1, 0], (TIMES.size, 1)))
+
+
+def test_neumann_time_costs_the_same_anywhere(rng: Generator) -> None:
+    problem = drawn(rng, 3)
+    far = solve(problem, [1e9])
+    assert far.provenance.details["clock"] == "uniform"
+    assert far.error[0] < 1e-6
+    near = solve(problem, [10.0])
+    turned = NeumannSystem(problem.A, near.q[0], near.q_prime[0], normalize=True)
+    assert np.allclose(solve(turned, [-10.0]).q[0], problem.q, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [2, 4, 6])
+def test_integrals_are_conserved(n: int, rng: Generator) -> None:
+    times = np.linspace(0, 100, 21)
+    problem = drawn(rng, n)
+    assert max(solve(problem, times).drift.values()) <= 1e-13
+    assert max(solve(problem, times, "numeric", "taylor").drift.values()) <= 1e-12
+    assert max(solve(problem, times, "numeric").drift.values()) <= 1e-10
+
+
+@pytest.mark.parametrize(
+    ("fields", "path"),
+    [
+        ({"A": [1, 0]}, "A[1]"),
+        ({"A": [1e-200, 1]}, "A"),
+        ({"q": [1, 1]}, "q"),
+        ({"q": [0, 0]}, "q"),
+        ({"q_prime": [1, 0]}, "q_prime"),
+        ({"q_prime": [0, 1e200]}, "q_prime"),
+        ({"q_prime": [0]}, "q_prime"),
+        ({"normalize": None}, "normalize"),
+    ],
+)
+def test_bad_neumann_starts_are_refused_by_field(fields: dict[str, Any], path: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        NeumannSystem(**{"A": [2, 1], "q": [1, 0], "q_prime": [0, 1], **fields})
+    assert caught.value.field == path
