@@ -38,7 +38,8 @@ class EllipsoidGeodesic(TorusProblem):
 
     X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9; with ``normalize=True`` X is scaled onto the
     ellipsoid and X_dot projected and scaled first. The frame is [q, n_2 … n_{n−1}, γ]: the normal of the ellipsoid, those of
-    the confocal quadrics that the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself; its determinant is 1 for n > 2.
+    the confocal quadrics that the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself, with
+    determinant 1 for n > 2.
     Raises InvalidInput, which names the field, what was required and what was given.
     """
 
