@@ -80,14 +80,6 @@ class Balls(Arithmetic):
             return flint.arb((mantissa, exponent))
         return flint.arb(value)
 
-    def array(self, values: Any) -> Values:
-        """Return an object array of balls."""
-        given = np.array(values, dtype=object)
-        result = np.empty(given.shape, dtype=object)
-        for index, value in np.ndenumerate(given):
-            result[index] = self.number(value)
-        return result
-
     #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
     atan2 = staticmethod(np.frompyfunc(lambda y, x: flint.arb.atan2(y, x), 2, 1))
 

@@ -60,7 +60,7 @@ class ClockRate:
         periods = self.inversion.periods
         g, result = periods.genus, []
         for s, cut in enumerate(periods.cuts):
-            psi = cut.nodes(count)
+            psi = periods.arithmetic.nodes(count)
             below, above = cut.distances(psi)
             forms = cut.forms(below, above) * self._factor(s, below)
             angles = np.zeros((count, g), dtype=psi.dtype)

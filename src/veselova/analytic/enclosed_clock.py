@@ -111,7 +111,7 @@ class EnclosedClock:
     def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
         half = reach / (2 * count)
-        theta = np.pi * (2 * np.arange(_SAMPLE) + 1) / (2 * _SAMPLE)
+        theta = DOUBLE.nodes(_SAMPLE)
         panels = np.unique(np.linspace(0, count - 1, _SAMPLED_PANELS).astype(np.int64))
         tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
@@ -129,7 +129,7 @@ class EnclosedClock:
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])
-        waves = xp.cos(xp.array([xp.pi * (2 * i + 1) / (2 * nodes) for i in range(nodes)]))
+        waves = xp.cos(xp.nodes(nodes))
         values = self._orbit.rates(direction * (centres[:, None] - half * waves).ravel())
         return _Panels(xp, half, centres, xp.cosine_series(values.reshape(count, nodes)), xp.array([0] * count), None)
 

@@ -63,7 +63,7 @@ class Periods:
 
     def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (g, N): value = Σ_m h_m cos mψ."""
-        psi = interval.nodes(self.node_count(interval))
+        psi = self.arithmetic.nodes(self.node_count(interval))
         coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
         if self.arithmetic.certified:
             coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))

@@ -49,9 +49,13 @@ class Arithmetic(ABC):
     def number(self, value: Any) -> Any:
         """Return one number (Fraction, float, or a number of another arithmetic), rounded to this precision."""
 
-    @abstractmethod
     def array(self, values: Any) -> Values:
         """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.shape, dtype=object)
+        for index, value in np.ndenumerate(given):
+            result[index] = self.number(value)
+        return result
 
     @abstractmethod
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
@@ -74,6 +78,10 @@ class Arithmetic(ABC):
         """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
         return values
 
+    def nodes(self, count: int) -> Values:
+        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
+        return self.array([self.pi * (2 * i + 1) / (2 * count) for i in range(count)])
+
     def sine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
         orders = self.array(list(range(1, coefficients.shape[1] + 1)))
@@ -91,7 +99,7 @@ class Arithmetic(ABC):
         return sums
 
     def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N midpoints ψ = π(2i+1)/2N of (0, π), shape (K, N) as values."""
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (K, N) as values."""
         count = values.shape[1]
         table = self.cos(self.array(list(range(4 * count))) * (self.pi / (2 * count)))
         waves = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)]
@@ -173,14 +181,6 @@ class Extended(Arithmetic):
         if isinstance(value, np.generic):
             value = value.item()
         return self._context.mpf(value)
-
-    def array(self, values: Any) -> Values:
-        """Return an object array of multiprecision numbers."""
-        given = np.array(values, dtype=object)
-        result = np.empty(given.shape, dtype=object)
-        for index, value in np.ndenumerate(given):
-            result[index] = self.number(value)
-        return result
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""
