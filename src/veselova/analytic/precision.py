@@ -18,13 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprf
 
-__all__ = ["DOUBLE", "Arithmetic", "Double", "Extended", "extended"]
+__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Double", "Extended", "extended"]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
 
 #: A sum of waves as a function of angles.
 Sums = Callable[[Values], Values]
+
+#: Coefficients at the end of a series that show how far it has fallen; what it leaves out is their sum times this, where that
+#: is not bounded.
+LAST_COEFFICIENTS, _TAIL = 3, 4
 
 
 class Arithmetic(ABC):
@@ -106,6 +110,19 @@ class Arithmetic(ABC):
         coefficients = self.product(values, waves) * 2 / count
         coefficients[:, 0] = coefficients[:, 0] / 2
         return np.asarray(coefficients)
+
+    @staticmethod
+    def bounded_tail(largest: Any, decay: Any, count: int) -> Any:
+        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the aliases in those, at any real ψ.
+
+        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤ 2Mρ^m.
+        """
+        return 6 * largest * decay**count / (1 - decay)
+
+    @staticmethod
+    def estimated_tail(series: Values) -> Values:
+        """Return what cosine series leave out judging by their last coefficients, shape (K,) for (K, N)."""
+        return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
     def product(self, a: Values, b: Values) -> Values:
         """Return the matrix product."""
