@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
-from veselova.analytic.precision import Values
+from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["Clock", "ClockRate"]
+__all__ = ["Clock", "ClockRate", "clock_rate"]
 
 Array = NDArray[np.float64]
 
@@ -75,6 +75,13 @@ class ClockRate:
         count = max(series.shape[1] for series in self.inversion.periods.cut_series)
         means = [np.sum(weights, axis=1) for weights, _ in self.columns(count)]
         return self.scale * self.inversion.periods.arithmetic.determinant(np.stack(means, axis=1))
+
+
+def clock_rate(spectrum: Spectrum, q: Values, arithmetic: Arithmetic) -> Values:
+    """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, (N, m); W follows from the start."""
+    start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
+    ratio = ((start * start) @ A) / ((q * q) @ A)
+    return np.asarray(arithmetic.number(spectrum.clock_rate) * arithmetic.sqrt(ratio))
 
 
 class Clock(ABC):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
-from veselova.analytic.clock import ClockRate
+from veselova.analytic.clock import ClockRate, clock_rate
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
@@ -84,7 +84,7 @@ class EnclosedSolution:
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         attitude = self._attitude(self.orbit.phases(tau1))
-        q_dot = (attitude.q_prime * self.orbit.clock_rates(attitude.q)[:, None]) @ self._directions.T
+        q_dot = (attitude.q_prime * clock_rate(self.spectrum, attitude.q, xp)[:, None]) @ self._directions.T
         frame = np.empty((len(times), n, n), dtype=object)
         frame[:, :, 0] = attitude.q @ self._directions.T
         frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part

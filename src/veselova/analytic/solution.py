@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
-from veselova.analytic.clock import Clock, ClockRate
+from veselova.analytic.clock import Clock, ClockRate, clock_rate
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
@@ -125,16 +125,7 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
         if not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return 1 / self._clock_rate(self.quotients.position(z))
-
-    def _clock_rate(self, q: Array) -> Array:
-        """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, W fixed by the start."""
-        start = np.asarray(self.spectrum.q, dtype=np.float64)
-        return np.asarray(float(self.spectrum.clock_rate) * np.sqrt((start**2 @ self._A) / (q**2 @ self._A)))
-
-    @cached_property
-    def _A(self) -> Array:
-        return to_float(self.moving.A)
+        return 1 / clock_rate(self.spectrum, self.quotients.position(z), DOUBLE)
 
     @property
     def near_separatrix(self) -> bool:
@@ -273,7 +264,7 @@ class Solution:
         frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
-        q_dot = (attitude.q_prime @ moving.directions.T) * self._clock_rate(attitude.q)[:, None]
+        q_dot = (attitude.q_prime @ moving.directions.T) * clock_rate(self.spectrum, attitude.q, DOUBLE)[:, None]
         if attitude.spheroconic.size:
             frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
             spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)
