@@ -22,9 +22,8 @@ _FINER = 2
 #: Newton's steps from the zeros found to those digits.
 _STEPS = 2
 
-#: A zero is looked for within this many times what its value leaves open, then a thousandfold, so often.
-_FIRST_REACH = 4
-_WIDENINGS = 5
+#: A zero is looked for within this many times what its value leaves open, then within so many times that, so often.
+_FIRST_REACH, _WIDER, _WIDENINGS = 4, 1000, 5
 
 
 def enclosed(found: Resolved) -> Spectrum:
@@ -79,8 +78,8 @@ def _zeros(found: Values, coarse_poles: Values, poles: Values, weights: Values, 
         terms = weights[live] / (x - poles[live])
         return constant + np.sum(terms), -np.sum(terms / (x - poles[live]))
 
-    balls_found = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
-    return xp.array(balls_found)
+    zeros = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
+    return xp.array(zeros)
 
 
 def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: Balls) -> Any:
@@ -92,5 +91,5 @@ def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: B
     for _ in range(_WIDENINGS):
         if falling(middle - reach)[0] > 0 and falling(middle + reach)[0] < 0:
             return xp.widened(middle, reach)
-        reach = reach * 1000
+        reach = _WIDER * reach
     raise Unsolved("not-enclosed", "a constant of motion or a spheroconic coordinate: no change of sign could be shown")
