@@ -20,6 +20,8 @@ from problems import Case, tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.curve import Curve
+from veselova.analytic.enclosed_clock import EnclosedClock
+from veselova.analytic.enclosed_fourier import EnclosedFourier
 from veselova.analytic.enclosed_solution import EnclosedSolution, orthonormal
 from veselova.analytic.enclosure import enclosed
 from veselova.analytic.interval import Interval
@@ -122,9 +124,6 @@ def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
     solution = EnclosedSolution(Solution(body3()), 45, False, "angles")
     near = vs.solve(body3(), [20]).tau1 / float(solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit)))
-    from veselova.analytic.enclosed_clock import EnclosedClock
-    from veselova.analytic.enclosed_fourier import EnclosedFourier
-
     with solution.arithmetic as xp:
         times = xp.array([20])
         by_panels = EnclosedClock(solution.orbit, near, False).tau1(times, near)
