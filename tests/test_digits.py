@@ -29,6 +29,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.times import exact_times
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
@@ -145,6 +146,21 @@ def test_strings_are_taken_exactly_and_doubles_as_what_they_store() -> None:
     assert 1e-18 < deviation(one, two, "q") < 1e-14
     assert deviation(two, three, "q") == 0
     assert deviation(one, vs.solve(exact, [0.1], digits=30).decimals, "q") > 1e-19  # type: ignore[arg-type]
+
+
+def test_times_in_an_array_are_taken_as_exactly_as_in_a_list(server: Server) -> None:
+    times = np.array(["1/3", 2], dtype=object)
+    assert exact_times(times)[0] == (Fraction(1, 3), 2)
+    assert exact_times(np.array([0.1]))[0] == (Fraction(0.1),)
+    with vs.Client(server.url) as client:
+        answers = [
+            solve(body3(), given, digits=25).decimals for solve in (vs.solve, client.trajectory) for given in (times, list(times))
+        ]
+    first = answers[0]
+    assert first is not None
+    for other in answers[1:]:
+        assert other is not None
+        assert deviation(first, other, "frame") == 0
 
 
 @pytest.mark.parametrize(

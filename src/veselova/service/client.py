@@ -6,7 +6,7 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
@@ -80,8 +80,8 @@ def _problem(problem: Veselova | Mapping[str, Any]) -> Veselova:
 def _times(times: Any) -> Any:
     if isinstance(times, Mapping):
         return dict(times)
-    grid = validated_times(times)  # refuses here what the server would
-    return plain(list(times)) if isinstance(times, Sequence) and not isinstance(times, range) else grid.tolist()
+    validated_times(times)  # refuses here what the server would
+    return plain(times)
 
 
 def _trajectory_call(
