@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova import Veselova
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ENGINES", "compare", "solve", "start_on_torus", "torus"]
 
-#: Digits that can be asked for.
-FEWEST_DIGITS, MOST_DIGITS = 15, 1000
-
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
 
@@ -33,7 +31,7 @@ def solve(
     engine: str = "analytic",
     method: str | None = None,
     *,
-    digits: int = 15,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
 ) -> Trajectory:
     """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
@@ -51,7 +49,7 @@ def solve(
         raise InvalidInput(("engine",), f"one of {', '.join(ENGINES)}", shown(engine))
     _require_precision(engine, digits, certified)
     options: dict[str, Any] = {} if method is None else {"method": method}
-    if digits > FEWEST_DIGITS or certified:
+    if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
     return answer

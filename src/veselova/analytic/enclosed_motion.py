@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.solution import Solution
-from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import InvalidInput, Unsolved
 from veselova.mechanics.times import exact_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
@@ -47,7 +47,7 @@ class EnclosedMotion:
 
     def __post_init__(self) -> None:
         if self.problem.axes is not None:
-            field = "certified" if self.digits <= 15 else "digits"
+            field = "digits" if self.digits > FEWEST_DIGITS else "certified"
             raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")
 
     def __call__(self, times: Any) -> Trajectory:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
-from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
+from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.times import validated_times
@@ -39,7 +39,7 @@ def solve(
     *,
     method: str | None = None,
     clock: str | None = None,
-    digits: int = DOUBLE.digits,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
@@ -56,12 +56,12 @@ def solve(
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
-    if digits == DOUBLE.digits and not certified:
+    if not beyond_double(digits, certified):
         return _Motion(problem, method, clock)(grid)
     if certified and method == "theta":
         raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
     if clock is not None:
-        raise InvalidInput(("clock",), f"none, where digits > {DOUBLE.digits} or errors are certified", shown(clock))
+        raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(times)
@@ -113,13 +113,13 @@ class _Motion:
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
-        provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
+        provenance = Provenance("analytic", route, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
         return Trajectory.of_principal(self.problem, grid, (tau1, *states), error, provenance, dense=self)
 
     def _resting(self, grid: Array, began: float) -> Trajectory:
         n, frame = self.problem.n, np.tile(self.problem.frame, (grid.size, 1, 1))
         states = np.zeros((grid.size, n)), frame, to_spheroconic(self.problem.A, frame[:, :, 0])
-        provenance = Provenance("analytic", "rest", 15, __version__, time.perf_counter() - began, {"regime": "rest"})
+        provenance = Provenance("analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"})
         error = np.full(grid.size, np.finfo(float).eps)
         return Trajectory.of_principal(self.problem, grid, (np.zeros(grid.size), *states), error, provenance, dense=self)
 

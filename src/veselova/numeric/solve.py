@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.times import validated_times
@@ -69,7 +70,7 @@ def solve(problem: Veselova, times: Any, *, method: str = "dop853") -> Trajector
         tau1, error, steps = np.zeros(grid.size), np.full(grid.size, np.finfo(float).eps), 0
     states = (tau1, q_dot, frame, to_spheroconic(problem.A, frame[:, :, 0]))
     details = {"tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
-    provenance = Provenance("numeric", method, 15, __version__, time.perf_counter() - began, details)
+    provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
     return Trajectory.of_principal(problem, grid, states, error, provenance, dense=partial(solve, problem, method=method))
 
 

@@ -16,6 +16,7 @@ import orjson
 import stamina
 
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
 from veselova.mechanics.exact import plain
 from veselova.mechanics.times import validated_times
@@ -90,7 +91,7 @@ def _trajectory_call(
     engine: str = "analytic",
     method: str | None = None,
     *,
-    digits: int = 15,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
     budget_s: float = 10.0,
 ) -> _Call[Trajectory]:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
 
+from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
 from veselova.mechanics.exact import exact_number, to_float
 from veselova.mechanics.times import uniform_times, validated_times
@@ -90,7 +91,9 @@ class ComparisonRequest(TorusRequest):
     times: Annotated[_Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
     method: Annotated[str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")] = None
     outputs: Annotated[list[Output], Field(min_length=1, max_length=len(OUTPUTS))] = list(OUTPUTS)  # type: ignore[arg-type]
-    digits: Annotated[int, Field(ge=15, le=15, description="15: a comparison has the digits of the numeric engine")] = 15
+    digits: Annotated[
+        int, Field(ge=FEWEST_DIGITS, le=FEWEST_DIGITS, description="a comparison has the digits of the numeric engine")
+    ] = FEWEST_DIGITS
 
     def time_grid(self) -> Any:
         """Return the times asked for, an array or the list given; raises InvalidInput located at ``times``."""
@@ -129,12 +132,14 @@ class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
     engine: Literal["analytic", "numeric"] = "analytic"
-    digits: Annotated[int, Field(ge=15, le=1000, description="decimal digits; beyond 15, answers are decimal strings")] = 15
+    digits: Annotated[
+        int, Field(ge=FEWEST_DIGITS, le=MOST_DIGITS, description=f"beyond {FEWEST_DIGITS}, answers are decimal strings")
+    ] = FEWEST_DIGITS
     certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
 
     @property
     def _exact(self) -> bool:
-        return self.digits > 15 or self.certified
+        return beyond_double(self.digits, self.certified)
 
 
 _Model = TypeVar("_Model", bound=_Request)
