@@ -283,6 +283,22 @@ def test_a_matrix_of_inertia_has_the_digits_of_its_axes() -> None:
         assert caught.value.field == field
 
 
+@pytest.mark.parametrize("A", [["3", "2", "1"], ["2", "2", "1"], ["2", "2", "2"]], ids=str)
+def test_a_body_at_rest_keeps_the_frame_that_it_was_given(A: list[str]) -> None:
+    frame = [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]]
+    found = vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0], frame), [-1, "1e9"], digits=30, certified=True)
+    assert found.decimals is not None
+    assert np.all(found.decimals.midpoints["frame"] == np.vectorize(Decimal)(frame))
+    assert not found.tau1.any()
+    assert not found.q_dot.any()
+    # Between the poles 1/A the λ of q = (0.6, 0, 0.8) is 0.64/A_1 + 0.36/A_3.
+    exact = sorted([Fraction(16, 25) / Fraction(A[0]) + Fraction(9, 25) / Fraction(A[2]), 1 / Fraction(A[1])])
+    for middle, radius, expected in zip(*(x["spheroconic"][1] for x in (found.decimals.midpoints, found.decimals.radii)), exact):
+        assert abs(Fraction(middle) - expected) <= Fraction(radius) < Fraction(1, 10**30)
+    with pytest.raises(vs.Unsolved, match="natural frame"):
+        vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0]), [1], digits=30)
+
+
 def test_what_cannot_be_enclosed_says_which_step_failed() -> None:
     symmetric = vs.Veselova([2, 2, 1], [0.6, 0, 0.8], [0.4, 0.7, -0.3])
     with pytest.raises(vs.Unsolved, match="equal A's") as caught:
