@@ -114,7 +114,7 @@ def test_periods_agree_with_another_quadrature(n: int, rng: np.random.Generator)
     for intervals in (periods.cuts, periods.gaps):
         for interval in intervals:
             count = periods.node_count(interval)
-            psi = interval.nodes(count)
+            psi = periods.arithmetic.nodes(count)
             means = np.mean(interval.forms(*interval.distances(psi)), axis=1) * np.pi
             for k in range(1, n):
                 expected = nodal_integral(periods.curve, interval, k) / 2

@@ -20,6 +20,8 @@ from problems import Case, tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.curve import Curve
+from veselova.analytic.enclosed_clock import EnclosedClock
+from veselova.analytic.enclosed_fourier import EnclosedFourier
 from veselova.analytic.enclosed_solution import EnclosedSolution, orthonormal
 from veselova.analytic.enclosure import enclosed
 from veselova.analytic.interval import Interval
@@ -27,6 +29,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.times import exact_times
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
@@ -122,9 +125,6 @@ def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
     solution = EnclosedSolution(Solution(body3()), 45, False, "angles")
     near = vs.solve(body3(), [20]).tau1 / float(solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit)))
-    from veselova.analytic.enclosed_clock import EnclosedClock
-    from veselova.analytic.enclosed_fourier import EnclosedFourier
-
     with solution.arithmetic as xp:
         times = xp.array([20])
         by_panels = EnclosedClock(solution.orbit, near, False).tau1(times, near)
@@ -146,6 +146,21 @@ def test_strings_are_taken_exactly_and_doubles_as_what_they_store() -> None:
     assert 1e-18 < deviation(one, two, "q") < 1e-14
     assert deviation(two, three, "q") == 0
     assert deviation(one, vs.solve(exact, [0.1], digits=30).decimals, "q") > 1e-19  # type: ignore[arg-type]
+
+
+def test_times_in_an_array_are_taken_as_exactly_as_in_a_list(server: Server) -> None:
+    times = np.array(["1/3", 2], dtype=object)
+    assert exact_times(times)[0] == (Fraction(1, 3), 2)
+    assert exact_times(np.array([0.1]))[0] == (Fraction(0.1),)
+    with vs.Client(server.url) as client:
+        answers = [
+            solve(body3(), given, digits=25).decimals for solve in (vs.solve, client.trajectory) for given in (times, list(times))
+        ]
+    first = answers[0]
+    assert first is not None
+    for other in answers[1:]:
+        assert other is not None
+        assert deviation(first, other, "frame") == 0
 
 
 @pytest.mark.parametrize(
@@ -266,6 +281,22 @@ def test_a_matrix_of_inertia_has_the_digits_of_its_axes() -> None:
         with pytest.raises(vs.InvalidInput) as caught:
             vs.solve(problem, [1], **options)  # type: ignore[arg-type]
         assert caught.value.field == field
+
+
+@pytest.mark.parametrize("A", [["3", "2", "1"], ["2", "2", "1"], ["2", "2", "2"]], ids=str)
+def test_a_body_at_rest_keeps_the_frame_that_it_was_given(A: list[str]) -> None:
+    frame = [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]]
+    found = vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0], frame), [-1, "1e9"], digits=30, certified=True)
+    assert found.decimals is not None
+    assert np.all(found.decimals.midpoints["frame"] == np.vectorize(Decimal)(frame))
+    assert not found.tau1.any()
+    assert not found.q_dot.any()
+    # Between the poles 1/A the λ of q = (0.6, 0, 0.8) is 0.64/A_1 + 0.36/A_3.
+    exact = sorted([Fraction(16, 25) / Fraction(A[0]) + Fraction(9, 25) / Fraction(A[2]), 1 / Fraction(A[1])])
+    for middle, radius, expected in zip(*(x["spheroconic"][1] for x in (found.decimals.midpoints, found.decimals.radii)), exact):
+        assert abs(Fraction(middle) - expected) <= Fraction(radius) < Fraction(1, 10**30)
+    with pytest.raises(vs.Unsolved, match="natural frame"):
+        vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0]), [1], digits=30)
 
 
 def test_what_cannot_be_enclosed_says_which_step_failed() -> None:

@@ -122,6 +122,14 @@ def test_invalid_input_gets_422_with_a_pointer(server: Server, body: str, pointe
     assert "\n" not in fault["detail"]
 
 
+@pytest.mark.parametrize(("given", "word"), [(None, "null"), (True, "true"), (False, "false"), ("None", "'None'")])
+def test_constants_are_reported_as_json_spells_them(server: Server, given: Any, word: str) -> None:
+    bad = {**GOOD, "problem": {**GOOD["problem"], "A": [3, given, 1]}}
+    document = is_problem(post(server, "/v1/trajectories", bad), 422, "invalid-input")
+    assert document["detail"] == document["errors"][0]["detail"]
+    assert document["detail"].endswith(f"; given {word}.")
+
+
 @pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])
 def test_what_is_not_json_gets_400(server: Server, body: bytes) -> None:
     is_problem(post(server, "/v1/tori", body), 400, "malformed-json")

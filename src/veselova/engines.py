@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.trajectory import Trajectory
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ENGINES", "compare", "solve", "start_on_torus", "torus"]
 
-#: Digits that can be asked for.
-FEWEST_DIGITS, MOST_DIGITS = 15, 1000
-
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
 
@@ -34,7 +32,7 @@ def solve(
     engine: str | None = None,
     method: str | None = None,
     *,
-    digits: int = 15,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
     formulation: str | None = None,
 ) -> Trajectory:
@@ -58,7 +56,7 @@ def solve(
     options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     if engine == "analytic" and formulation is not None:
         raise InvalidInput(("formulation",), "none (the closed form has one)", shown(formulation))
-    if digits > FEWEST_DIGITS or certified:
+    if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
     return answer

@@ -7,7 +7,9 @@ in balls goes inside ``with balls(digits):``, which sets the precision, keeps ot
 from __future__ import annotations
 
 import math
+import operator
 import threading
+from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
@@ -79,14 +81,6 @@ class Balls(Arithmetic):
             mantissa, exponent = value.man_exp
             return flint.arb((mantissa, exponent))
         return flint.arb(value)
-
-    def array(self, values: Any) -> Values:
-        """Return an object array of balls."""
-        given = np.array(values, dtype=object)
-        result = np.empty(given.shape, dtype=object)
-        for index, value in np.ndenumerate(given):
-            result[index] = self.number(value)
-        return result
 
     #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
     atan2 = staticmethod(np.frompyfunc(lambda y, x: flint.arb.atan2(y, x), 2, 1))
@@ -162,24 +156,15 @@ class Balls(Arithmetic):
 
     def powers(self, exponents: Values, bases: Values) -> Values:
         """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
-        result: Any = 1
-        for k in range(exponents.shape[1]):
-            orders, places = np.unique(exponents[:, k], return_inverse=True)
-            result = result * np.stack([bases[:, k] ** int(order) for order in orders])[places]
-        return np.asarray(result)
+        return _products(exponents, bases, operator.pow)
 
     def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
         """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
 
-        Powers are squared and multiplied once for each coordinate; 2 log₂|m| products each lose a third of a bit.
+        A power takes up to 2 log₂|m| products, each of which loses up to half a bit.
         """
-        result: Any = 1
-        for k in range(modes.shape[1]):
-            orders, places = np.unique(np.abs(modes[:, k]), return_inverse=True)
-            powers = np.stack([turns[:, k] ** int(order) for order in orders])
-            column = np.where((modes[:, k] < 0)[:, None], _conjugate(powers[places]), powers[places])
-            result = result * column
-        return np.asarray(_real(result)), np.asarray(_imaginary(result))
+        products = _products(modes, turns, lambda w, m: w**m if m >= 0 else _conjugate(w**-m))
+        return np.asarray(_real(products)), np.asarray(_imaginary(products))
 
     @staticmethod
     def _array(matrix: Any) -> Values:
@@ -245,6 +230,15 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     radius = (x.rad() + rounding).abs_upper()
     # Six digits of a number printed to nearest, and one in the last of them on top.
     return rounded, Decimal(radius.str(6, radius=False)) * Decimal("1.00001") if radius else Decimal(0)
+
+
+def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:
+    """Return Π_k power(w_k, m_k), shape (M, N), for exponents (M, g) and bases (N, g), each power formed once."""
+    result: Any = 1
+    for column, base in zip(exponents.T, bases.T, strict=True):
+        orders, places = np.unique(column, return_inverse=True)
+        result = result * np.stack([power(base, int(order)) for order in orders])[places]
+    return np.asarray(result)
 
 
 def _matrix(values: Values) -> Any:

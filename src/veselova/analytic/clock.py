@@ -21,7 +21,7 @@ from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["Clock", "ClockRate"]
+__all__ = ["Clock", "ClockRate", "clock_rate"]
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class ClockRate:
         periods = self.inversion.periods
         g, result = periods.genus, []
         for s, cut in enumerate(periods.cuts):
-            psi = cut.nodes(count)
+            psi = periods.arithmetic.nodes(count)
             below, above = cut.distances(psi)
             forms = cut.forms(below, above) * self._factor(s, below)
             angles = np.zeros((count, g), dtype=psi.dtype)
@@ -89,6 +89,14 @@ def _factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic)
     if time == "t":
         return arithmetic.sqrt(point / arithmetic.number(curve.branch_points[2 * s + 2]))
     return arithmetic.number(curve.branch_points[2 * s + 1]) / point if time == "s" else 1 + 0 * point
+
+
+def clock_rate(spectrum: Spectrum, q: Values, time: str, arithmetic: Arithmetic) -> Values:
+    """Return dτ₁/d(time), a power of (q,Aq), at positions (N, m) along the moving directions; the start gives its factor."""
+    start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
+    ratio = ((q * q) @ A) / ((start * start) @ A)
+    power = 1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
+    return np.asarray(arithmetic.number(spectrum.clock_rate) * power)
 
 
 class Clock(ABC):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.precision import DOUBLE, Values
+from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
 
@@ -36,12 +36,9 @@ _SAMPLE, _SAMPLE_DIGITS = 64, 11
 #: Panels looked at for that.
 _SAMPLED_PANELS = 200
 
-#: Coefficients at the end of a series that must be small, how much larger than the precision they may be (they are rounding
-#: there), and how many more nodes are taken where they are not.
-_LAST, _NEARLY, _MORE = 3, 1e3, 1.25
-
-#: What is left out of a falling series, in units of the last coefficients.
-_TAIL = 4
+#: How much larger than the precision the last coefficients of a series may be (they are rounding there), and how many more
+#: nodes are taken where they are larger.
+_NEARLY, _MORE = 1e3, 1.25
 
 #: Newton's steps double the digits from those of a double.
 _FIRST_DIGITS = 10
@@ -89,10 +86,11 @@ class EnclosedClock:
         if self._certified:
             width, largest = self._orbit.strip
             count = math.ceil(reach / (2 * _PANEL_IN_STRIPS * width))
+            # The strip, as wide as so many half panels, holds an ellipse of half axes with sum 1/decay: a strip in the angle.
             ratio = 2 * count * width / reach
             decay = self._xp.number(1 / (ratio + math.sqrt(1 + ratio * ratio))) * (1 + 1e-12)
             nodes = math.ceil(self._xp.nats / -math.log(float(decay)))
-            truncation = _from_strip(largest, decay, nodes)
+            truncation = self._xp.bounded_tail(largest, decay, nodes)
             panels = self._evaluated(reach, direction, count, nodes)
             return replace(panels, truncation=self._xp.array([truncation] * count), steepest=largest / width)
         fastest = max(abs(float(f)) for f in self._orbit.frequencies)
@@ -101,17 +99,17 @@ class EnclosedClock:
         nodes = self._expected_nodes(reach, direction, count)
         while True:
             panels = self._evaluated(reach, direction, count, nodes)
-            last = panels.rates[:, -_LAST:]
+            last = panels.rates[:, -LAST_COEFFICIENTS:]
             middle = self._xp.midpoints(last)
             size, noise = (np.sum(self._xp.at_most(x), axis=1) for x in (middle, last - middle))
             if np.all(size <= _NEARLY * (noise + self._xp.epsilon * panels.rates[:, 0])):
-                return replace(panels, truncation=_TAIL * (size + noise))
+                return replace(panels, truncation=self._xp.estimated_tail(panels.rates))
             nodes = math.ceil(_MORE * nodes)
 
     def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
         half = reach / (2 * count)
-        theta = np.pi * (2 * np.arange(_SAMPLE) + 1) / (2 * _SAMPLE)
+        theta = DOUBLE.nodes(_SAMPLE)
         panels = np.unique(np.linspace(0, count - 1, _SAMPLED_PANELS).astype(np.int64))
         tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
@@ -121,7 +119,7 @@ class EnclosedClock:
         falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
         seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))
         per_digit = seen / max(1.0, -math.log10(falling[min(seen, _SAMPLE - 1)]))
-        return math.ceil(per_digit * float(self._xp.digits)) + _LAST
+        return math.ceil(per_digit * float(self._xp.digits)) + LAST_COEFFICIENTS
 
     def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         if count * nodes > _MOST_NODES:
@@ -129,7 +127,7 @@ class EnclosedClock:
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])
-        waves = xp.cos(xp.array([xp.pi * (2 * i + 1) / (2 * nodes) for i in range(nodes)]))
+        waves = xp.cos(xp.nodes(nodes))
         values = self._orbit.rates(direction * (centres[:, None] - half * waves).ravel())
         return _Panels(xp, half, centres, xp.cosine_series(values.reshape(count, nodes)), xp.array([0] * count), None)
 
@@ -138,11 +136,6 @@ def expected_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
     """Return about how many nodes panels to the farthest time take, truncation judged by coefficients."""
     cycles = float(np.max(np.abs(approximate))) * max(abs(float(f)) for f in orbit.frequencies)
     return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
-
-
-def _from_strip(largest: Any, decay: Any, nodes: int) -> Any:
-    """Return 6 M ρ^(−N)/(1−1/ρ): |c_m| ≤ 2Mρ^(−m) on an ellipse of half axes with sum ρ, truncation and aliases together."""
-    return 6 * largest * decay**nodes / (1 - decay)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.fourier_clock import grown
+from veselova.analytic.fourier_clock import ColumnsForModes, grown
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.precision import Values
 from veselova.analytic.strip import Orbit
@@ -66,17 +66,10 @@ class EnclosedFourier:
     def _significant(self) -> tuple[NDArray[np.int64], Values]:
         """Return the modes m with |F_m| above the precision, and F_m, the largest first."""
         rate, xp = self._orbit.rate, self._xp
-        longest = max(series.shape[1] for series in rate.inversion.periods.cut_series)
-        columns: list[Any] = []
-        nodes = 0
+        columns = ColumnsForModes(rate)
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
-            nonlocal columns, nodes
-            needed = 2 * longest + 2 * int(np.max(np.abs(modes)))
-            if needed > nodes:
-                nodes = needed + 32
-                columns = [(weights.T, xp.turns(G)) for weights, G in rate.columns(nodes)]
-            stacks = [xp.product(xp.waves(modes, turns)[0], weights) for weights, turns in columns]
+            stacks = [xp.product(xp.waves(modes, xp.turns(G))[0], weights.T) for weights, G in columns(modes)]
             values = np.array([xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)], dtype=object)
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
@@ -95,20 +88,23 @@ class EnclosedFourier:
         values, slopes = self._xp.product(sines.T, columns), self._xp.product(cosines.T, columns)
         return values[:-1, 0] - values[-1, 0], slopes[:-1, 1]
 
-    def tau1(self, times: Values, _: NDArray[np.float64]) -> Values:
+    def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly."""
         xp: Any = self._xp
         uniform = times / self._mean
         z = self._orbit.phases(uniform)
         z = z - xp.floor(z)
-        delta = xp.array(self._near(z.astype(float)))
-        for last in [False] * math.ceil(math.log2(xp.digits / _FIRST_DIGITS)) + [True]:
+
+        def excess(delta: Values) -> tuple[Values, Values]:
             value, slope = self._periodic(z + delta[:, None] * self._orbit.frequencies)
-            excess = self._mean * delta + value
-            if last:
-                return np.asarray(uniform + delta + xp.around_zero((abs(excess) + self._tail) / (self._mean + slope)))
-            delta = xp.midpoints(delta - excess / (self._mean + slope))
-        raise AssertionError
+            return self._mean * delta + value, self._mean + slope
+
+        delta = xp.array(self._near(z.astype(float)))
+        for _ in range(math.ceil(math.log2(xp.digits / _FIRST_DIGITS))):
+            value, slope = excess(delta)
+            delta = xp.midpoints(delta - value / slope)
+        value, slope = excess(delta)
+        return np.asarray(uniform + delta + xp.around_zero((abs(value) + self._tail) / slope))
 
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return δ in double precision, from the uniform phases."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -11,12 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.balls import Balls, balls
+from veselova.analytic.enclosed_rest import resting_series
 from veselova.analytic.enclosed_solution import EnclosedSolution
+from veselova.analytic.precision import Values
 from veselova.analytic.solution import Solution
-from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import InvalidInput, Unsolved
 from veselova.mechanics.times import exact_times
-from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
 from veselova.version import __version__
@@ -41,23 +44,21 @@ _SHOWN = 3
 class EnclosedMotion:
     """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
 
-    problem: TorusProblem
+    problem: Veselova
     digits: int
     certified: bool
     method: str | None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.problem, Veselova):
-            raise InvalidInput(("digits",), f"15, not certified, for system {self.problem.system}", str(self.digits))
         if self.problem.axes is not None:
-            field = "certified" if self.digits <= 15 else "digits"
+            field = "digits" if self.digits > FEWEST_DIGITS else "certified"
             raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
         began, (exact, grid) = time.perf_counter(), exact_times(times)
-        if not self.problem.moves:
-            raise Unsolved("at-rest", "q_dot = 0: the body rests, and there is nothing to compute to more digits")
+        if not any(self.problem.exact.tangent):
+            return self._resting(grid, began)
         solution = Solution(self.problem)
         approximate = solution.clock(grid).tau1(grid)[0]
         method = self.method or ("theta" if solution.near_separatrix and not self.certified else "angles")
@@ -71,10 +72,27 @@ class EnclosedMotion:
             missing = self._missing(decimals, working)
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
-                provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
-                return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
+                return self._trajectory(method, grid, decimals, details, began)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+
+    def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:
+        working = 2 * self.digits + _SPARE
+        with balls(working, self.certified) as xp:
+            decimals = self._decimals(resting_series(self.problem, grid.size, xp), xp)
+        details = {"regime": "rest", "working_digits": working, "certified": self.certified}
+        return self._trajectory("rest", grid, decimals, details, began)
+
+    def _trajectory(
+        self, method: str, grid: NDArray[np.float64], decimals: Decimals, details: Mapping[str, Any], began: float
+    ) -> Trajectory:
+        provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
+        return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
+
+    def _decimals(self, series: Mapping[str, Values], xp: Balls) -> Decimals:
+        pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
+        midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
+        return Decimals(self.digits, self.certified, midpoints, radii)
 
     def _missing(self, decimals: Decimals, working: int) -> int:
         """Return how many digits the largest error is above the one asked for."""
@@ -93,6 +111,4 @@ class EnclosedMotion:
                 neighbour = EnclosedSolution(coarse, working, self.certified, method, -solution.distance)
                 other, _ = neighbour.series(xp.array(exact), approximate)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
-            pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
-        midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
-        return Decimals(self.digits, self.certified, midpoints, radii), {"clock": clock.name, "clock_size": clock.size}
+            return self._decimals(series, xp), {"clock": clock.name, "clock_size": clock.size}

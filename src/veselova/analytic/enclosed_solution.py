@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
-from veselova.analytic.clock import ClockRate
+from veselova.analytic.clock import ClockRate, clock_rate
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
@@ -23,14 +23,14 @@ from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.quotients import ThetaQuotients
-from veselova.analytic.reduction import moving_part
+from veselova.analytic.reduction import Moving, moving_part
 from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import start
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["EnclosedSolution"]
+__all__ = ["EnclosedSolution", "frame_around", "series_of"]
 
 #: A rotation this near to a matrix of signs is one: beyond, constants of motion are so close together that the natural frame of
 #: the problem, in double precision, is taken for a given one.
@@ -84,24 +84,11 @@ class EnclosedSolution:
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         attitude = self._attitude(self.orbit.phases(tau1))
-        q_dot = (attitude.q_prime * self.orbit.clock_rates(attitude.q)[:, None]) @ self._directions.T
+        q_dot = (attitude.q_prime * clock_rate(self.spectrum, attitude.q, "t", xp)[:, None]) @ self._directions.T
         frame = np.empty((len(times), n, n), dtype=object)
         frame[:, :, 0] = attitude.q @ self._directions.T
         frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part
-        unit = xp.number(moving.unit)
-        frozen = np.tile(xp.array([1 / a for a in moving.frozen]), (len(times), 1))
-        coordinates = np.concatenate([attitude.spheroconic / unit, frozen], axis=1)
-        order = np.argsort(coordinates.astype(float), axis=1, kind="stable")
-        product = frame[:, :, :1] * q_dot[:, None, :]
-        series = {
-            "q": frame[:, :, 0],
-            "q_dot": q_dot,
-            "frame": frame,
-            "omega": product - np.swapaxes(product, 1, 2),
-            "spheroconic": np.take_along_axis(coordinates, order, axis=1),
-            "tau1": tau1 * xp.sqrt(unit),
-        }
-        return series, clock
+        return series_of(moving, q_dot, frame, attitude.spheroconic, tau1, xp), clock
 
     def _attitude(self, z: Values) -> Attitude:
         if self._quotients is None:
@@ -132,9 +119,7 @@ class EnclosedSolution:
         """Return e_2 … e_n at t = 0: the given ones, made exactly orthonormal."""
         xp, exact = self.arithmetic, self.problem.exact
         rows = exact.frame if exact.frame is not None else self.problem.frame
-        q = self._directions @ self.spectrum.q
-        normals = xp.array(rows)[:, 1:]
-        return orthonormal(np.column_stack([q, normals - np.outer(q, q @ normals)]), xp)[:, 1:]
+        return frame_around(self._directions @ self.spectrum.q, rows, xp)[:, 1:]
 
     @cached_property
     def _rotation(self) -> Values:
@@ -154,6 +139,31 @@ class EnclosedSolution:
         if not self.moving.frozen:
             return 0
         return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
+
+
+def series_of(
+    moving: Moving, q_dot: Values, frame: Values, spheroconic: Values, tau1: Values, arithmetic: Any
+) -> Mapping[str, Values]:
+    """Return the series of a trajectory by name, from q̇ and frame along the principal axes, λ and τ₁ of the moving part."""
+    xp, unit = arithmetic, arithmetic.number(moving.unit)
+    frozen = np.tile(xp.array([1 / a for a in moving.frozen]), (len(tau1), 1))
+    coordinates = np.concatenate([spheroconic / unit, frozen], axis=1)
+    order = np.argsort(coordinates.astype(float), axis=1, kind="stable")
+    product = frame[:, :, :1] * q_dot[:, None, :]
+    return {
+        "q": frame[:, :, 0],
+        "q_dot": q_dot,
+        "frame": frame,
+        "omega": product - np.swapaxes(product, 1, 2),
+        "spheroconic": np.take_along_axis(coordinates, order, axis=1),
+        "tau1": tau1 * xp.sqrt(unit),
+    }
+
+
+def frame_around(q: Values, rows: Any, arithmetic: Any) -> Values:
+    """Return the frame with first column q, a unit vector, and the other columns of ``rows`` made exactly orthonormal."""
+    normals = arithmetic.array(rows)[:, 1:]
+    return orthonormal(np.column_stack([q, normals - np.outer(q, q @ normals)]), arithmetic)
 
 
 def orthonormal(frame: Values, arithmetic: Any) -> Values:

@@ -34,8 +34,7 @@ class EnclosedTheta:
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
         self._T, self._xp = T, arithmetic
-        self._coarse: Array = T.astype(float)
-        self._F = list(cheapest_waves(self._coarse))
+        self._F = list(cheapest_waves(T.astype(float)))
         self._G = [i for i in range(self.genus) if i not in self._F]
         self._constants: dict[Characteristic, tuple[Values, Values]] = {}
         if self.size > _MOST_TERMS:
@@ -78,7 +77,10 @@ class EnclosedTheta:
         return np.rint(2 * x).astype(np.int64)
 
     def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
-        """Return θ[ε;δ](z)·√det T_GG at points of shape (N, g) for each characteristic, shape (N, len(characteristics))."""
+        """Return θ[ε;δ](z)·√det T_GG at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
+
+        The first characteristic must be zero: what the sums leave out is measured against its values, which have no zeros.
+        """
         xp, result = self._xp, np.empty((len(z), len(characteristics)), dtype=object)
         bells: dict[tuple[int, ...], tuple[Values, Values, Values]] = {}
         turns: dict[tuple[Any, ...], tuple[Values, Values]] = {}
@@ -97,7 +99,7 @@ class EnclosedTheta:
             sums = np.sum(cosines.T * xp.product(bell, real) - sines.T * xp.product(bell, imaginary), axis=1)
             odd = np.array(nearest @ np.array([characteristic.epsilon[i] for i in self._G], dtype=int), dtype=float) % 2
             result[:, index] = np.where(odd == 1, -sums, sums) if self._G else sums
-        return xp.widened(result, np.abs(result[:, :1]) * xp.epsilon) if result.size else result
+        return np.asarray(xp.widened(result, np.abs(result[:, :1]) * xp.epsilon))
 
     def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values]:
         """Return (e^{−π rᵀT_GG⁻¹r + 2π kᵀT_GG⁻¹r}, r, n) with y_G = n + r, k on the Gaussian lattice."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -10,11 +10,12 @@ import numpy as np
 
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.precision import Values, extended
+from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.analytic.spectrum import Resolved, Spectrum, tangent
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["enclosed", "spheroconic"]
+__all__ = ["enclosed", "resting_spheroconic", "spheroconic"]
 
 #: Digits of the balls against those in which the zeros were found: differences of nearby zeros and poles enter what follows.
 _FINER = 2
@@ -22,9 +23,8 @@ _FINER = 2
 #: Newton's steps from the zeros found to those digits.
 _STEPS = 2
 
-#: A zero is looked for within this many times what its value leaves open, then a thousandfold, so often.
-_FIRST_REACH = 4
-_WIDENINGS = 5
+#: A zero is looked for within this many times what its value leaves open, then within so many times that, so often.
+_FIRST_REACH, _WIDER, _WIDENINGS = 4, 1000, 5
 
 
 def enclosed(found: Resolved) -> Spectrum:
@@ -52,6 +52,13 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     return np.asarray(xp.widened(xp.array(middles).reshape(len(q), -1), (radius * inverse[-1])[:, None]))
 
 
+def resting_spheroconic(moving: Moving, xp: Balls) -> Values:
+    """Return the λ's of a start with q̇ = 0, (m−1,), with m the A's along which q has a component; raises Unsolved as above."""
+    poles = [1 / a for a in moving.A]
+    found = _zeros_of_position(poles, list(moving.q_squared), _FINER * xp.digits)
+    return _zeros(found, poles, xp.array(poles), xp.array(moving.q_squared), 0, xp)
+
+
 def _zeros_of_position(poles: list[Fraction], weights: list[Fraction], digits: int) -> list[Any]:
     arithmetic = extended(digits)
     try:
@@ -70,7 +77,7 @@ def _component(s: int, coarse: Spectrum, q: Values, v: Values, inverse: Values, 
     return np.sum(row * v[live]) / np.sum(row * row).sqrt()
 
 
-def _zeros(found: Values, coarse_poles: Values, poles: Values, weights: Values, constant: int, xp: Balls) -> Values:
+def _zeros(found: Iterable[Any], coarse_poles: Iterable[Any], poles: Values, weights: Values, constant: int, xp: Balls) -> Values:
     """Return balls around the zeros of constant + Σ w_i/(x−p_i), which falls between its poles; a pole of weight zero is one."""
     at_pole = dict(zip(coarse_poles, poles, strict=True))
     live = np.array([not weight.is_zero() for weight in weights])
@@ -79,8 +86,8 @@ def _zeros(found: Values, coarse_poles: Values, poles: Values, weights: Values, 
         terms = weights[live] / (x - poles[live])
         return constant + np.sum(terms), -np.sum(terms / (x - poles[live]))
 
-    balls_found = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
-    return xp.array(balls_found)
+    zeros = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
+    return xp.array(zeros)
 
 
 def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: Balls) -> Any:
@@ -92,5 +99,5 @@ def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: B
     for _ in range(_WIDENINGS):
         if falling(middle - reach)[0] > 0 and falling(middle + reach)[0] < 0:
             return xp.widened(middle, reach)
-        reach = reach * 1000
+        reach = _WIDER * reach
     raise Unsolved("not-enclosed", "a constant of motion or a spheroconic coordinate: no change of sign could be shown")

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from veselova.analytic.clock import Clock, ClockRate
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.precision import Values
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["FourierClock", "grown"]
+__all__ = ["ColumnsForModes", "FourierClock", "grown"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,9 @@ _SMALLEST_MODE = 4e-16
 
 #: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
+
+#: Nodes beyond those that modes ask for: room for the next layers.
+_SPARE_NODES = 32
 
 #: Modes that bring the inverse clock near its answer before all of them are summed.
 _FIRST_MODES = 64
@@ -113,22 +117,31 @@ class FourierClock(Clock):
 
 def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
     """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
-    longest = max(series.shape[1] for series in rate.inversion.periods.cut_series)
-    threshold = _SMALLEST_MODE * float(rate.mean)
-    count, columns = 0, []
+    columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
 
     def determinants(modes: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
-        nonlocal count, columns
-        needed = 2 * longest + 2 * int(np.max(np.abs(modes)))
-        if needed > count:  # nodes enough for e^{−2πi m·G_s}, with room for the next layers
-            count = needed + 32
-            columns = rate.columns(count)
-        matrices = np.stack([np.cos(2 * np.pi * (modes @ G.T)) @ weights.T for weights, G in columns], axis=2)
+        matrices = np.stack([np.cos(2 * np.pi * (modes @ G.T)) @ weights.T for weights, G in columns(modes)], axis=2)
         values = float(rate.scale) * np.linalg.det(matrices)
         return values, np.abs(values) > threshold
 
     modes, values = grown(rate.inversion.periods.genus, determinants)
     return modes.astype(np.float64), values.astype(np.float64)
+
+
+class ColumnsForModes:
+    """``ClockRate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
+
+    def __init__(self, rate: ClockRate) -> None:
+        self._rate, self._longest = rate, max(series.shape[1] for series in rate.inversion.periods.cut_series)
+        self._count, self._columns = 0, list[tuple[Values, Values]]()
+
+    def __call__(self, modes: NDArray[np.int64]) -> list[tuple[Values, Values]]:
+        """Return the columns for modes (M, g)."""
+        needed = 2 * (self._longest + int(np.max(np.abs(modes))))
+        if needed > self._count:
+            self._count = needed + _SPARE_NODES
+            self._columns = self._rate.columns(self._count)
+        return self._columns
 
 
 def grown(

@@ -58,11 +58,6 @@ class Interval:
         root = math.prod(self.curve.arithmetic.sqrt(factor) for factor in factors)
         return self.jacobi.quarter / self.curve.arithmetic.pi / root
 
-    def nodes(self, count: int) -> Values:
-        """Return ``count`` midpoints of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
-        xp = self.curve.arithmetic
-        return xp.array([xp.pi * (2 * i + 1) / (2 * count) for i in range(count)])
-
     def roots(self, psi: Values) -> tuple[Values, Values]:
         """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate relative to itself."""
         xp, (before, width, _) = self.curve.arithmetic, self._widths

@@ -22,9 +22,6 @@ __all__ = ["Periods"]
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
-#: Last coefficients of a series, whose sum times this is taken for what it leaves out where that is not bounded.
-_LAST, _TAIL = 3, 4
-
 
 @dataclass(frozen=True)
 class Periods:
@@ -63,21 +60,20 @@ class Periods:
 
     def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (g, N): value = Σ_m h_m cos mψ."""
-        psi = interval.nodes(self.node_count(interval))
+        psi = self.arithmetic.nodes(self.node_count(interval))
         coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
         if self.arithmetic.certified:
             coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))
         return coefficients
 
     def _bound(self, interval: Interval, times: int) -> Values:
-        """Return 6 M_k e^(−times·Nβ)/(1−e^(−β)), with M_k the bound of form k in a strip of half width β, shape (g,).
+        """Return the bound of what the forms' series leave out after times·N coefficients, shape (g,).
 
-        |h_m| ≤ 2M e^(−mβ). Truncation after N coefficients and the aliases in those kept come to at most this with times = 1, at
-        any real ψ; the alias in h_0 alone with times = 2.
+        With times = 1 that is the error of N coefficients at any real ψ; the alias in h_0 alone is below that with times = 2.
         """
         xp, count = self.arithmetic, self.node_count(interval)
         decay = xp.exp(xp.number(-interval.strip))
-        return np.asarray(6 * interval.bound_in_strip() * decay ** (times * count) / (1 - decay))
+        return np.asarray(xp.bounded_tail(interval.bound_in_strip(), decay, times * count))
 
     @cached_property
     def series_truncation(self) -> Values:
@@ -87,8 +83,7 @@ class Periods:
         """
         if self.arithmetic.certified:
             return np.asarray(sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts))
-        last = sum(np.sum(np.abs(series[:, -_LAST:]), axis=1) for series in self.cut_series)
-        return np.asarray(_TAIL * (np.abs(self.inverse_cycles) @ last))
+        return np.asarray(sum(np.abs(self.inverse_cycles) @ self.arithmetic.estimated_tail(series) for series in self.cut_series))
 
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:

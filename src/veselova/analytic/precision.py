@@ -18,13 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprf
 
-__all__ = ["DOUBLE", "Arithmetic", "Double", "Extended", "extended"]
+__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Double", "Extended", "extended"]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
 
 #: A sum of waves as a function of angles.
 Sums = Callable[[Values], Values]
+
+#: Coefficients at the end of a series that show how far it has fallen; what it leaves out is their sum times this, where that
+#: is not bounded.
+LAST_COEFFICIENTS, _TAIL = 3, 4
 
 
 class Arithmetic(ABC):
@@ -49,9 +53,13 @@ class Arithmetic(ABC):
     def number(self, value: Any) -> Any:
         """Return one number (Fraction, float, or a number of another arithmetic), rounded to this precision."""
 
-    @abstractmethod
     def array(self, values: Any) -> Values:
         """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.shape, dtype=object)
+        for index, value in np.ndenumerate(given):
+            result[index] = self.number(value)
+        return result
 
     @abstractmethod
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
@@ -74,6 +82,10 @@ class Arithmetic(ABC):
         """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
         return values
 
+    def nodes(self, count: int) -> Values:
+        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
+        return self.array([self.pi * (2 * i + 1) / (2 * count) for i in range(count)])
+
     def sine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
         orders = self.array(list(range(1, coefficients.shape[1] + 1)))
@@ -91,13 +103,26 @@ class Arithmetic(ABC):
         return sums
 
     def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N midpoints ψ = π(2i+1)/2N of (0, π), shape (K, N) as values."""
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (K, N) as values."""
         count = values.shape[1]
         table = self.cos(self.array(list(range(4 * count))) * (self.pi / (2 * count)))
         waves = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)]
         coefficients = self.product(values, waves) * 2 / count
         coefficients[:, 0] = coefficients[:, 0] / 2
         return np.asarray(coefficients)
+
+    @staticmethod
+    def bounded_tail(largest: Any, decay: Any, count: int) -> Any:
+        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the aliases in those, at any real ψ.
+
+        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤ 2Mρ^m.
+        """
+        return 6 * largest * decay**count / (1 - decay)
+
+    @staticmethod
+    def estimated_tail(series: Values) -> Values:
+        """Return what cosine series leave out judging by their last coefficients, shape (K,) for (K, N)."""
+        return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
     def product(self, a: Values, b: Values) -> Values:
         """Return the matrix product."""
@@ -173,14 +198,6 @@ class Extended(Arithmetic):
         if isinstance(value, np.generic):
             value = value.item()
         return self._context.mpf(value)
-
-    def array(self, values: Any) -> Values:
-        """Return an object array of multiprecision numbers."""
-        given = np.array(values, dtype=object)
-        result = np.empty(given.shape, dtype=object)
-        for index, value in np.ndenumerate(given):
-            result[index] = self.number(value)
-        return result
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
-from veselova.analytic.clock import Clock, ClockRate, UniformClock
+from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
@@ -69,9 +69,6 @@ _PANEL_CYCLES = 5e4
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
-#: dτ₁/d(time) is proportional to this power of (q,Aq).
-_POWERS = {"t": -0.5, "s": 1.0, "tau1": 0.0}
-
 #: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
 _SAMPLES = 48
 _FEW = 16
@@ -128,17 +125,7 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
         if not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return 1 / self._clock_rate(self.quotients.position(z))
-
-    def _clock_rate(self, q: Array) -> Array:
-        """Return dτ₁/d(time), a power of (q,Aq), at positions along the moving directions; its factor is fixed by the start."""
-        start = np.asarray(self.spectrum.q, dtype=np.float64)
-        ratio = (q**2 @ self._A) / (start**2 @ self._A)
-        return np.asarray(float(self.spectrum.clock_rate) * ratio ** _POWERS[self.problem.time])
-
-    @cached_property
-    def _A(self) -> Array:
-        return to_float(self.moving.A)
+        return 1 / clock_rate(self.spectrum, self.quotients.position(z), self.problem.time, DOUBLE)
 
     @property
     def near_separatrix(self) -> bool:
@@ -279,7 +266,9 @@ class Solution:
         frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
-        q_dot = (attitude.q_prime @ moving.directions.T) * self._clock_rate(attitude.q)[:, None]
+        q_dot = (attitude.q_prime @ moving.directions.T) * clock_rate(self.spectrum, attitude.q, self.problem.time, DOUBLE)[
+            :, None
+        ]
         if attitude.spheroconic.size:
             frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
             spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)

@@ -15,10 +15,12 @@ from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
+from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.veselova import Veselova
 from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
@@ -41,7 +43,7 @@ def solve(
     *,
     method: str | None = None,
     clock: str | None = None,
-    digits: int = DOUBLE.digits,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
@@ -58,12 +60,14 @@ def solve(
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
-    if digits == DOUBLE.digits and not certified:
+    if not beyond_double(digits, certified):
         return _Motion(problem, method, clock)(grid)
     if certified and method == "theta":
         raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
     if clock is not None:
-        raise InvalidInput(("clock",), f"none, where digits > {DOUBLE.digits} or errors are certified", shown(clock))
+        raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
+    if not isinstance(problem, Veselova):
+        raise InvalidInput(("digits",), f"{FEWEST_DIGITS}, not certified, for system {problem.system}", str(digits))
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(times)
@@ -115,13 +119,13 @@ class _Motion:
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
-        provenance = Provenance("analytic", route, 15, __version__, time.perf_counter() - began, details)
+        provenance = Provenance("analytic", route, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
         series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
         return Trajectory(self.problem, grid, self.problem.bound(series, error), series, provenance, dense=self)
 
     def _resting(self, grid: Array, began: float) -> Trajectory:
         series = {name: np.repeat(values, grid.size, axis=0) for name, values in self.problem.start.items()}
-        provenance = Provenance("analytic", "rest", 15, __version__, time.perf_counter() - began, {"regime": "rest"})
+        provenance = Provenance("analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"})
         return Trajectory(self.problem, grid, np.full(grid.size, DOUBLE.epsilon), series, provenance, dense=self)
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.clock import ClockRate
+from veselova.analytic.clock import ClockRate, clock_rate
 from veselova.analytic.precision import Values
 from veselova.analytic.spectrum import Spectrum
 
@@ -51,25 +51,18 @@ class Orbit:
     def rates(self, tau1: Values) -> Values:
         """Return dt/dτ₁ at Neumann times (N,)."""
         z = self.phases(tau1)
-        return self.rate.at(self.rate.inversion.invert(z)) if self.position is None else 1 / self.clock_rates(self.position(z))
-
-    def clock_rates(self, q: Values) -> Values:
-        """Return dτ₁/dt = √(W/(q,Aq)) at positions along the moving directions, (N, m); W follows from the start."""
-        spectrum, xp = self.spectrum, self.rate.inversion.arithmetic
-        start = np.sum(spectrum.q * spectrum.q / spectrum.inverse)
-        return np.asarray(spectrum.clock_rate * xp.sqrt(start / np.sum(q * q / spectrum.inverse, axis=1)))
+        if self.position is None:
+            return self.rate.at(self.rate.inversion.invert(z))
+        return 1 / clock_rate(self.spectrum, self.position(z), "t", self.rate.inversion.arithmetic)
 
     @cached_property
     def strip(self) -> tuple[float, Any]:
         """Return (y, M) with |dt/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on its torus."""
         inverse, points = self.spectrum.inverse, self.rate.inversion.periods.curve.branch_points
-        lowest = inverse[0]
-        level = float(
-            (np.sum(self.spectrum.q_prime * self.spectrum.q_prime) + np.sum(inverse * self.spectrum.q * self.spectrum.q)).upper()
-        )
+        q, q_prime = self.spectrum.q, self.spectrum.q_prime
+        lowest, level = float(inverse[0].lower()), float((np.sum(q_prime * q_prime) + np.sum(inverse * q * q)).upper())
         # (q,Aq) = Π λ_s/Π I_i, and I_1 = 1/A_1: the least of a⁻².
-        share = float((lowest * math.prod(points[1::2]) / math.prod(inverse)).lower())
-        lowest = float(lowest.lower())
+        share = float((inverse[0] * math.prod(points[1::2]) / math.prod(inverse)).lower())
         d = _LARGEST_TURN * math.sqrt(share)
         kappa = max(abs(2 - level - lowest), abs(2 * lowest - level - 1))
         bend = (kappa + 4 * d + 2 * d * d) * (1 + d)

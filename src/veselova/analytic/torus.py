@@ -69,7 +69,7 @@ def _actions(periods: Periods) -> Array:
     curve, actions = periods.curve, []
     places = curve.layout("c").places
     for cut in periods.cuts:
-        psi = cut.nodes(periods.node_count(cut))
+        psi = periods.arithmetic.nodes(periods.node_count(cut))
         below, above = cut.distances(psi)
         to_constants = cut.to_branch_points(below, above)[:, places]
         common, of_gaps = cut.measure(below, above)
@@ -81,7 +81,7 @@ def _monomial_cycles(periods: Periods) -> Array:
     """Return a in the basis λ^{k−1}dλ/(2√|R|)."""
     g, columns = periods.genus, []
     for s, cut in enumerate(periods.cuts):
-        psi = cut.nodes(periods.node_count(cut))
+        psi = periods.arithmetic.nodes(periods.node_count(cut))
         below, above = cut.distances(psi)
         point = periods.curve.branch_points[2 * s + 1] + below
         common, of_gaps = cut.measure(below, above)

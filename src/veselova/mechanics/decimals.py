@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import localcontext
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,20 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import BackendMissing
 
-__all__ = ["Decimals"]
+__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "beyond_double"]
 
 Objects = NDArray[np.object_]
 
+#: Digits that can be asked for; the fewest are those of double precision.
+FEWEST_DIGITS, MOST_DIGITS = 15, 1000
+
 #: Digits in which products are formed beyond those kept: what is rounded there is far below their radii.
 _SPARE_DIGITS = 30
+
+
+def beyond_double(digits: int, certified: bool) -> bool:
+    """Return whether an answer with so many digits, or with certified errors, has decimals and takes its data exactly."""
+    return digits > FEWEST_DIGITS or certified
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,7 +58,7 @@ class Decimals:
             omega, omega_radius = product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
         return cls(digits, certified, {**midpoints, "q": q, "omega": omega}, {**radii, "q": r, "omega": omega_radius})
 
-    @property
+    @cached_property
     def error(self) -> Objects:
         """Return the largest radius of q and frame at each time, (N,)."""
         return np.array([max([*q, *frame.ravel()]) for q, frame in zip(self.radii["q"], self.radii["frame"], strict=True)])

@@ -32,11 +32,15 @@ __all__ = [
 #: Longest rendering of a given value in a message: enough to recognise it, short enough for one line.
 _SHOWN_CHARACTERS = 60
 
+#: Texts that are shown in quotes: without them they would read as nothing, or as another value.
+_QUOTED = ("", "None", "True", "False")
+
 
 def shown(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
     try:
-        text = value if isinstance(value, str) and value.strip() != "" else repr(value)
+        bare = isinstance(value, str) and value.strip() not in _QUOTED
+        text = str(value) if bare else repr(value)
     except ValueError:  # an int of more digits than Python is willing to print
         text = f"an integer of about {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else "a value"
     # Lone surrogates, which JSON strings can carry, cannot be written as UTF-8.

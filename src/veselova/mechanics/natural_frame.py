@@ -16,14 +16,17 @@ __all__ = ["moser_frame", "natural_frame", "orthonormalized", "refined"]
 
 Array = NDArray[np.float64]
 
-#: Bits after the point in refinement; its steps, the last being one that turns by less than 2^−35; and the largest turn from
-#: which it converges: constants nearer than 1e-14 of the largest leave their normals as they are.
+#: Bits after the point in refinement.
 _BITS = 320
+
+#: Steps of refinement; one that turns by less than 2^−_ENOUGH is the last.
 _STEPS, _ENOUGH = 5, 35
+
+#: The largest turn from which it converges: where constants are nearer than 1e-14 of the largest, the frame stays as it is.
+_LARGEST_TURN = 0.05
 
 #: Constants within 2^−_NEAREST of each other count as equal: their difference may be rounding.
 _NEAREST = 100
-_LARGEST_TURN = 0.05
 
 #: Dimension beyond which refinement, n³ products of integers, would take longer than a second.
 _LARGEST_REFINED = 48

@@ -46,8 +46,7 @@ def validated_times(times: Any) -> Array:
 def exact_times(times: Any) -> tuple[tuple[Fraction, ...], Array]:
     """Return the times as exact rationals, and as validated doubles; raises InvalidInput as above."""
     grid = validated_times(times)
-    given = times if isinstance(times, (list, tuple)) else grid.tolist()
-    return exact_vector(given, ("times",)), grid
+    return exact_vector(times, ("times",)), grid
 
 
 def uniform_times(start: float, stop: float, count: int) -> Array:

@@ -117,20 +117,13 @@ class Trajectory:
 
     def columns(self) -> dict[str, Array]:
         """Return the flat table of the trajectory: time, error and every component, named like ``frame_1_2`` (from 1)."""
-        table = {self.problem.time: self.times, "error": self.error}
-        for name in self.problem.outputs:
-            values = self.series(name)
-            for index in np.ndindex(values.shape[1:]):
-                table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
-        return table
+        return self._table(self.error, {name: self.series(name) for name in self.problem.outputs})
 
-    def _decimal_columns(self, decimals: Decimals) -> dict[str, Any]:
-        table: dict[str, Any] = dict(self.columns())
-        table["error"] = decimals.error
-        for name in self.problem.outputs:
-            values = decimals.midpoints[name]
-            for index in np.ndindex(values.shape[1:]):
-                table["_".join([name, *(str(i + 1) for i in index)])] = values[(slice(None), *index)]
+    def _table(self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        table: dict[str, NDArray[Any]] = {self.problem.time: self.times, "error": error}
+        for name in series:
+            for index in np.ndindex(series[name].shape[1:]):
+                table["_".join([name, *(str(i + 1) for i in index)])] = series[name][(slice(None), *index)]
         return table
 
     def to_npz(self, path: str | Path) -> None:
@@ -146,12 +139,10 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> None:
         """Write the flat table as comma-separated values, 17 digits or all of the decimals, one row per time."""
-        table = self.columns()
+        table, form = self.columns(), "%.17g"
         if self.decimals is not None:
-            rows = np.column_stack([values.astype(str) for values in self._decimal_columns(self.decimals).values()])
-            np.savetxt(path, rows, fmt="%s", delimiter=",", header=",".join(table), comments="")
-            return
-        np.savetxt(path, np.column_stack(list(table.values())), fmt="%.17g", delimiter=",", header=",".join(table), comments="")
+            table, form = self._table(self.decimals.error, self.decimals.midpoints), "%s"
+        np.savetxt(path, np.column_stack(list(table.values())), fmt=form, delimiter=",", header=",".join(table), comments="")
 
     def to_parquet(self, path: str | Path) -> None:
         """Write the flat table as Parquet, doubles only; raises BackendMissing without pyarrow."""

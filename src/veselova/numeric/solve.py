@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.flow import Flow
 from veselova.mechanics.problem import Problem, Series
@@ -73,7 +74,7 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
         series = {name: np.repeat(values, grid.size, axis=0) for name, values in problem.start.items()}
         error, steps = np.full(grid.size, np.finfo(float).eps), 0
     details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
-    provenance = Provenance("numeric", method, 15, __version__, time.perf_counter() - began, details)
+    provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
     again = partial(solve, problem, method=method, formulation=formulation)
     return Trajectory(problem, grid, error, series, provenance, dense=again)
 

@@ -6,7 +6,7 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
@@ -16,6 +16,7 @@ import orjson
 import stamina
 
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
 from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
@@ -82,8 +83,8 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
 def _times(times: Any) -> Any:
     if isinstance(times, Mapping):
         return dict(times)
-    grid = validated_times(times)  # refuses here what the server would
-    return plain(list(times)) if isinstance(times, Sequence) and not isinstance(times, range) else grid.tolist()
+    validated_times(times)  # refuses here what the server would
+    return plain(times)
 
 
 def _trajectory_call(
@@ -92,7 +93,7 @@ def _trajectory_call(
     engine: str | None = None,
     method: str | None = None,
     *,
-    digits: int = 15,
+    digits: int = FEWEST_DIGITS,
     certified: bool = False,
     budget_s: float = 10.0,
 ) -> _Call[Trajectory]:

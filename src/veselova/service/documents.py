@@ -38,21 +38,20 @@ def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = 
     Decimals are strings, and each series has one of radii beside it.
     """
     drift, decimals, names = trajectory.drift, trajectory.decimals, tuple(outputs or trajectory.problem.outputs)
-    extended: dict[str, Any] = {}
-    if decimals is not None:
-        extended = {
-            "series": {name: decimals.strings(name) for name in names},
-            "radii": {name: decimals.strings(name, radii=True) for name in names},
-            "error": [str(error) for error in decimals.error],
-        }
+    error: Any
+    if decimals is None:
+        series, error, radii = {name: trajectory.series(name) for name in names}, trajectory.error, {}
+    else:
+        series, error = {name: decimals.strings(name) for name in names}, [str(error) for error in decimals.error]
+        radii = {"radii": {name: decimals.strings(name, radii=True) for name in names}}
     return {
         "engine": trajectory.provenance.engine,
         "times": trajectory.times,
-        "series": {name: trajectory.series(name) for name in names if decimals is None},
+        "series": series,
         "integrals": {name: {"initial": values[0], "drift": drift[name]} for name, values in trajectory.integrals.items()},
-        "error": trajectory.error,
+        "error": error,
         "provenance": trajectory.provenance.as_dict(),
-        **extended,
+        **radii,
     }
 
 

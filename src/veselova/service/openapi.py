@@ -8,6 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
+from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
 from veselova.service.problem_details import MEDIA_TYPE
 from veselova.service.routes import RESOURCES
@@ -60,7 +61,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "times": _NUMBERS,
             "series": {
                 **_object(_series(_NUMBER_OR_DECIMAL), required=[]),
-                "description": "decimals where more than 15 digits, or certified errors, were asked for",
+                "description": f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for",
             },
             "radii": {**_object(_series(_DECIMAL), required=[]), "description": "the error of every decimal"},
             "integrals": {

@@ -42,6 +42,9 @@ _REFUSALS = {
     "over-budget": (504, "The time budget was used up"),
 }
 
+#: Python's spelling of constants → that of JSON.
+_JSON_CONSTANTS = {"None": "null", "True": "true", "False": "false"}
+
 
 class Refused(Exception):
     """A request that the service refuses for a reason of its own, by the code of its document."""
@@ -64,8 +67,9 @@ def problem_document(error: Exception) -> dict[str, Any]:
     status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
     detail = str(error) if code != "internal-error" else "An unexpected error; it has been logged."
     document = _document(status, code, title, detail)
-    faults = error.faults if isinstance(error, InvalidRequest) else (error,) if isinstance(error, InvalidInput) else ()
-    if faults:
+    if isinstance(error, (InvalidInput, InvalidRequest)):
+        faults = [_in_json(fault) for fault in (error.faults if isinstance(error, InvalidRequest) else (error,))]
+        document["detail"] = " ".join(str(fault) for fault in faults)
         document["errors"] = [{"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults]
     if isinstance(error, Unsolved):
         document["outcome"] = error.outcome
@@ -83,6 +87,11 @@ def problem_response(error: Exception) -> Response:
 
 def _document(status: int, code: str, title: str, detail: str) -> dict[str, Any]:
     return {"type": f"urn:veselova:problem:{code}", "title": title, "status": status, "detail": detail}
+
+
+def _in_json(fault: InvalidInput) -> InvalidInput:
+    """Return the fault with a constant that was given spelt as JSON spells it."""
+    return InvalidInput(fault.path, fault.required, _JSON_CONSTANTS.get(fault.given, fault.given))
 
 
 def _pointer(path: tuple[str | int, ...]) -> str:

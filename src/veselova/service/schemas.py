@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
 from veselova.mechanics.exact import exact_number, to_float
 from veselova.mechanics.times import uniform_times, validated_times
@@ -52,7 +53,9 @@ class ComparisonRequest(TorusRequest):
         list[str] | None,
         Field(min_length=1, max_length=_MOST_OUTPUTS, description="series of the system (GET /v1/systems); all when left out"),
     ] = None
-    digits: Annotated[int, Field(ge=15, le=15, description="15: a comparison has the digits of the numeric engine")] = 15
+    digits: Annotated[
+        int, Field(ge=FEWEST_DIGITS, le=FEWEST_DIGITS, description="a comparison has the digits of the numeric engine")
+    ] = FEWEST_DIGITS
 
     def time_grid(self) -> Any:
         """Return the times asked for, an array or the list given; raises InvalidInput located at ``times``."""
@@ -103,12 +106,14 @@ class TrajectoryRequest(ComparisonRequest):
     engine: Annotated[
         Literal["analytic", "numeric"] | None, Field(description="analytic where the system has a closed form, when left out")
     ] = None
-    digits: Annotated[int, Field(ge=15, le=1000, description="decimal digits; beyond 15, answers are decimal strings")] = 15
+    digits: Annotated[
+        int, Field(ge=FEWEST_DIGITS, le=MOST_DIGITS, description=f"beyond {FEWEST_DIGITS}, answers are decimal strings")
+    ] = FEWEST_DIGITS
     certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
 
     @property
     def _exact(self) -> bool:
-        return self.digits > 15 or self.certified
+        return beyond_double(self.digits, self.certified)
 
 
 _Model = TypeVar("_Model", bound=Request)
