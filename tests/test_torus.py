@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from draws import random_problem
 from problems import tagged
-from veselova import InvalidInput, Veselova, solve, torus
+from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Veselova, solve, torus
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -45,6 +45,21 @@ def test_phases_advance_by_the_frequencies() -> None:
     assert np.max(np.abs(np.mod(moved.phases - expected + 0.5, 1) - 0.5)) < 1e-13
     started = Veselova.from_torus(problem.A, found.energy, found.constants, expected, np.sign(later.q[0]).astype(int))
     assert np.allclose(started.q, later.q[0], atol=1e-13)
+
+
+def test_tori_of_neumanns_system_and_of_geodesics_move_their_phases(rng: np.random.Generator) -> None:
+    for n in (2, 3, 4, 5):
+        A, q, v = rng.uniform(1, 3, n), rng.normal(size=n), rng.normal(size=n)
+        point, geodesic = NeumannSystem(A, q, v, normalize=True), EllipsoidGeodesic(A, q, v, normalize=True)
+        later, farther = solve(point, [2.5]), solve(geodesic, [2.5])
+        moved = torus(NeumannSystem(A, later.q[0], later.q_prime[0], normalize=True))
+        shift = moved.phases - torus(point).phases - 2.5 * torus(point).frequencies_t
+        assert np.max(np.abs(np.mod(shift + 0.5, 1) - 0.5)) < 1e-12
+        assert np.allclose(torus(point).constants, point.integrals(point.start)["constants"][0], rtol=1e-12, atol=1e-13)
+        passed = torus(EllipsoidGeodesic(A, farther.X[0], farther.X_dot[0], normalize=True))
+        shift = passed.phases - torus(geodesic).phases - farther.tau1[0] * torus(geodesic).frequencies_tau1
+        assert np.max(np.abs(np.mod(shift + 0.5, 1) - 0.5)) < 1e-12
+        assert np.allclose(torus(geodesic).constants, 1 / geodesic.quadrics, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])

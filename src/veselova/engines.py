@@ -12,8 +12,8 @@ from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
-from veselova.mechanics.veselova import Veselova
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,8 +86,10 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
 
 def torus(problem: Problem) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the analytic engine does."""
-    if not isinstance(problem, Veselova):
+    if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+    if not isinstance(problem, TorusProblem):
+        raise InvalidInput(("problem",), "a system with a closed form: veselova, neumann, ellipsoid-geodesic", problem.system)
     from veselova.analytic.torus import torus as torus_of
 
     return torus_of(problem)

@@ -26,8 +26,8 @@ Values = NDArray[Any]
 #: A sum of waves as a function of angles.
 Sums = Callable[[Values], Values]
 
-#: Coefficients at the end of a series that show how far it has fallen; what it leaves out is their sum times this, where that
-#: is not bounded.
+#: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is taken for what it leaves out
+#: where that is not bounded.
 LAST_COEFFICIENTS, _TAIL = 3, 4
 
 

@@ -11,14 +11,14 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.solution import Solution
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.torus import Torus
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["torus"]
 
 Array = NDArray[np.float64]
 
 
-def torus(problem: Veselova) -> Torus:
+def torus(problem: TorusProblem) -> Torus:
     """Return the invariant torus on which a motion runs, and where it starts there.
 
     Directions that do not move belong to no torus: the curve is that of the moving part. Raises Unsolved at rest, and where
@@ -35,7 +35,8 @@ def torus(problem: Veselova) -> Torus:
         raise Unsolved(
             "beyond-floats", "periods of λ^k dλ/√R leave the range of a float at this scale of A; only ratios of A matter"
         )
-    constants = [float(c) / unit for c in solution.spectrum.constants[1:]] + [1 / float(a) for a in moving.frozen]
+    known = 0 if problem.time == "tau1" else 1  # c_1 = 0 goes without saying
+    constants = [float(c) / unit for c in solution.spectrum.constants[known:]] + [1 / float(a) for a in moving.frozen]
     return Torus(
         n=problem.n,
         energy=problem.energy,
@@ -56,9 +57,10 @@ def torus(problem: Veselova) -> Torus:
     )
 
 
-def _signs(problem: Veselova) -> NDArray[np.int64]:
+def _signs(problem: TorusProblem) -> NDArray[np.int64]:
     """Return the sign of each q_i at the start, of q̇_i where q_i = 0, and 0 where the coordinate rests in its plane."""
-    return np.sign(np.where(problem.q != 0, problem.q, problem.q_dot)).astype(np.int64)
+    pairs = zip(problem.exact.q, problem.exact.tangent, strict=True)
+    return np.array([(x > 0) - (x < 0) or (v > 0) - (v < 0) for x, v in pairs], dtype=np.int64)
 
 
 def _actions(periods: Periods) -> Array:

@@ -108,6 +108,11 @@ class EllipsoidGeodesic(TorusProblem):
         """Return the system and its dimension."""
         return f"{self.system}, n = {self.n}, J {self.joachimsthal:.12g}"
 
+    @property
+    def energy(self) -> float:
+        """Return ½, the energy of unit speed."""
+        return 0.5
+
     @cached_property
     def joachimsthal(self) -> float:
         """Return J = (V,A⁻¹V)(X,A⁻²X), which is constant along a geodesic with unit tangent V."""

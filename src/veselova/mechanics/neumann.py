@@ -89,7 +89,12 @@ class NeumannSystem(TorusProblem):
     @property
     def title(self) -> str:
         """Return the system, its dimension and its energy."""
-        return f"{self.system}, n = {self.n}, energy {float(self._energy(self.q, self.q_prime)):.12g}"
+        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+
+    @property
+    def energy(self) -> float:
+        """Return ½(q',q') + ½(A⁻¹q,q)."""
+        return float(self._energy(self.q, self.q_prime))
 
     @property
     def moves(self) -> bool:

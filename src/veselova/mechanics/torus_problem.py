@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +31,11 @@ class TorusProblem(Problem):
     axes: Array | None = None
 
     engines: ClassVar = {"analytic": ("theta", "angles"), "numeric": ("dop853", "taylor")}
+
+    @property
+    @abstractmethod
+    def energy(self) -> float:
+        """Return the energy that the motion conserves."""
 
     @property
     def n(self) -> int:
