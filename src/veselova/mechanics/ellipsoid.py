@@ -124,6 +124,11 @@ class EllipsoidGeodesic(TorusProblem):
         return read_only(1 / self._constants(self.frame[None])[0])
 
     @property
+    def semiaxes(self) -> Array:
+        """Return √A."""
+        return np.sqrt(self.A)
+
+    @property
     def turning(self) -> float:
         """Return |dq/ds|, the rate at which the normal turns at the start."""
         return float(np.linalg.norm(normal_velocity(self.A, self.frame[:, 0], self.X_dot)))

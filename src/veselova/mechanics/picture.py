@@ -75,13 +75,14 @@ def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) ->
 
 
 def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
-    """Draw the curve on its sphere and, where there is a frame, its vectors at six times, standing on the curve."""
+    """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six times, standing on the curve."""
     latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
     name = trajectory.problem.portrait
     curve = trajectory.series(name)
-    radius = float(np.max(np.linalg.norm(curve, axis=1)))
+    radii = trajectory.problem.semiaxes
+    a, b, c = np.full(3, np.max(np.linalg.norm(curve, axis=1))) if radii is None else radii
     x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)
-    axes.plot_wireframe(radius * x, radius * y, radius * z, color="0.85", linewidth=0.4)
+    axes.plot_wireframe(a * x, b * y, c * z, color="0.85", linewidth=0.4)
     axes.plot(*curve.T, color=_COLOURS[0], linewidth=1.2)
     title = f"{name}({trajectory.problem.time})"
     if "frame" in trajectory.problem.outputs:
@@ -89,7 +90,7 @@ def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
         for i in np.unique(np.linspace(0, trajectory.times.size - 1, 6).astype(int)):
             for k, colour in enumerate(_COLOURS[i] for i in (0, 1, 2)):
                 axes.quiver(*curve[i], *(0.3 * trajectory.frame[i, :, k]), color=colour, linewidth=1.4)
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_aspect("equal")
     axes.set_xlabel(f"{name}_1")
     axes.set_ylabel(f"{name}_2")
     axes.set_zlabel(f"{name}_3")

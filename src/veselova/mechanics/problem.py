@@ -75,6 +75,11 @@ class Problem(ABC):
         """Return whether anything moves; a problem at rest stays at its start."""
         return True
 
+    @property
+    def semiaxes(self) -> Array | None:
+        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to show one; None for a sphere."""
+        return None
+
     def derive(self, name: str, series: Series) -> Array:
         """Return one of the ``derived`` series."""
         raise KeyError(name)
