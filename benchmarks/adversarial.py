@@ -4,7 +4,7 @@
 
 Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-290, and exactly zero), equal A's, coordinate subspaces, A's
 over twelve orders of magnitude, speeds from 1e-140 to 1e140; one start in four to ten radians or twenty cycles of the fastest
-phase, the others to three tenths of that. Truth has 20 digits. Prints per class how many there were and how many could not be
+phase, the others to three tenths of that. Truth has 20 digits, and so many seconds of processor time. Prints per class how many there were and how many could not be
 solved, the largest true error of the frame, the largest reported one, and the largest true error over the one reported at the
 same time (the stated slack is 2); then the starts that broke a promise. Where the truth takes too long (theta sums of genus four
 and more near a separatrix, in balls) a start is counted as "without truth". Ctrl-C prints what has been seen.
@@ -50,8 +50,8 @@ def measured(i: int, seed: int, patience: int) -> tuple[int, str, int, Any]:
             found = vs.solve(problem, times)
     except Exception as error:
         return i, name, n, f"{type(error).__name__}: {error}"[:150]
-    signal.signal(signal.SIGALRM, _give_up)
-    signal.alarm(patience)
+    signal.signal(signal.SIGPROF, _give_up)
+    signal.setitimer(signal.ITIMER_PROF, patience)
     try:
         truth = vs.solve(problem, times, digits=DIGITS)
     except (TimeoutError, vs.Unsolved):
@@ -59,7 +59,7 @@ def measured(i: int, seed: int, patience: int) -> tuple[int, str, int, Any]:
     except Exception as error:
         return i, name, n, f"in balls, {type(error).__name__}: {error}"[:150]
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     error = np.max(np.abs(found.frame - truth.frame), axis=(1, 2))
     return i, name, n, (float(np.max(error)), float(np.max(found.error)), float(np.max(error / found.error)))
 

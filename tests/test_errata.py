@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from draws import random_problem
+from veselova import EllipsoidGeodesic, solve
 from veselova.analytic.solution import Solution
 from veselova.mechanics import integrals
+from veselova.mechanics.moser import lax_matrix, lax_partner
 from veselova.mechanics.spheroconic import to_spheroconic
 
 
@@ -90,3 +92,33 @@ def test_4_15_needs_its_second_weight_and_its_brackets(n: int, rng: np.random.Ge
     assert not np.allclose(across(printed), expected, rtol=1e-3)
     unbracketed = (A * q) @ q * ((A * v) @ v) / det - ((A * q) @ v) ** 2
     assert not np.isclose(unbracketed, 2 * problem.energy, rtol=1e-6)
+
+
+def _geodesic(rng: np.random.Generator, step: float) -> Any:
+    problem = EllipsoidGeodesic(rng.uniform(1, 3, 4), rng.normal(size=4), rng.normal(size=4), normalize=True)
+    return problem.A, solve(problem, [1 - step, 1.0, 1 + step], "numeric", "taylor")
+
+
+def test_knoerrers_time_change_is_printed_upside_down(rng: np.random.Generator) -> None:
+    """The normal obeys q'' = −A⁻¹q + λq in τ₁ only with dτ₁/ds = √((V,A⁻¹V)/(X,A⁻²X)): its speed gives F_0 = 0."""
+    A, found = _geodesic(rng, 1e-4)
+    q, V = found.frame[1, :, 0], found.X_dot[1]
+    dq = (found.frame[2, :, 0] - found.frame[0, :, 0]) / 2e-4
+    ratio = np.sqrt((V @ (V / A)) / np.sum((found.X[1] / A) ** 2))
+
+    def F0(rate: float) -> float:
+        v = dq / rate
+        return float((v @ (A * v)) * (q @ (A * q)) - (q @ (A * v)) ** 2 - q @ (A * q))
+
+    assert abs(F0(ratio)) < 1e-6
+    assert abs(F0(1 / ratio)) > 1e-2
+
+
+def test_mosers_parameter_runs_along_the_geodesic(rng: np.random.Generator) -> None:
+    A, found = _geodesic(rng, 1e-4)
+    before, middle, after = lax_matrix(A, found.X, found.X_dot)
+    B = lax_partner(A, found.X[1], found.X_dot[1])
+    rate = (after - before) / 2e-4 * np.sum((found.X[1] / A) ** 2)
+    commutator = middle @ B - B @ middle
+    assert np.allclose(rate, commutator, atol=1e-6)
+    assert np.max(np.abs(rate + commutator)) > 1e-2
