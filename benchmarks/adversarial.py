@@ -4,10 +4,11 @@
 
 Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-290, and exactly zero), equal A's, coordinate subspaces, A's
 over twelve orders of magnitude, speeds from 1e-140 to 1e140; one start in four to ten radians or twenty cycles of the fastest
-phase, the others to three tenths of that. Truth has 20 digits, and so many seconds of processor time. Prints per class how many there were and how many could not be
-solved, the largest true error of the frame, the largest reported one, and the largest true error over the one reported at the
-same time (the stated slack is 2); then the starts that broke a promise. Where the truth takes too long (theta sums of genus four
-and more near a separatrix, in balls) a start is counted as "without truth". Ctrl-C prints what has been seen.
+phase, the others to three tenths of that. Truth has 20 digits, and so many seconds of processor time. Prints per class how many
+there were and how many could not be solved, the largest true error of the frame, the largest reported one, and the largest true
+error over the one reported at the same time (the stated slack is 2); then the starts that broke a promise. Where the truth takes
+too long (theta sums of genus four and more near a separatrix, in balls) a start is counted as "without truth". Ctrl-C prints
+what has been seen.
 """
 
 from __future__ import annotations
