@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Arithmetic, Sums, Values
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
@@ -34,12 +33,32 @@ _LOST_DIGITS = 2
 _SETTLED = 8.0
 
 
+class AngleSeries(Protocol):
+    """What the map needs of periods: dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, and how narrow the gaps are."""
+
+    @property
+    def arithmetic(self) -> Arithmetic: ...
+    @property
+    def genus(self) -> int: ...
+    @property
+    def cut_series(self) -> tuple[Values, ...]: ...
+    @property
+    def angle_series(self) -> Values: ...
+    @property
+    def series_truncation(self) -> Values: ...
+    @property
+    def narrowest_gap(self) -> float: ...
+
+
+P = TypeVar("P", bound=AngleSeries)
+
+
 @dataclass(frozen=True)
-class AbelJacobi:
+class AbelJacobi(Generic[P]):
     """The map of one curve; ``coarse`` is the same map in double precision, from which a finer one starts."""
 
-    periods: Periods
-    coarse: AbelJacobi | None = None
+    periods: P
+    coarse: AbelJacobi[P] | None = None
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -109,14 +128,14 @@ class AbelJacobi:
             # A full step that no longer improves has met the rounding of the sums, which grows with their length.
             stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < 1e4 * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
-        gap = self.periods.curve.narrowest_gap
+        gap = self.periods.narrowest_gap
         if gap < NARROW_GAP:
             raise Unsolved(
                 "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
             )
         raise InternalContradiction(f"the Abel–Jacobi inversion left a residual of {np.max(np.abs(residual)):.2g}")
 
-    def _refine(self, z: Values, coarse: AbelJacobi) -> Values:
+    def _refine(self, z: Values, coarse: AbelJacobi[P]) -> Values:
         """Newton's method with the double-precision Jacobian: each step adds some fourteen digits."""
         xp = self.arithmetic
         start = coarse.invert(DOUBLE.array(z))
@@ -129,7 +148,7 @@ class AbelJacobi:
                 return np.asarray(psi)
         raise InternalContradiction("the Abel–Jacobi inversion did not settle in extended precision")
 
-    def _enclose(self, z: Values, coarse: AbelJacobi) -> Values:
+    def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
         """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the map has but one."""
         xp: Any = self.arithmetic
         centre = xp.midpoints(z)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,25 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.curve import Curve
 from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.periods import Periods
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
 __all__ = ["Clock", "ClockRate", "clock_rate"]
 
 Array = NDArray[np.float64]
+
+
+class Rate(Protocol):
+    """What the Fourier clock needs of a rate: its Fourier coefficients as determinants of one-variable integrals."""
+
+    @property
+    def inversion(self) -> AbelJacobi[Any]: ...
+    @property
+    def scale(self) -> Any: ...
+    @property
+    def mean(self) -> Any: ...
+    def columns(self, count: int) -> list[tuple[Values, Values]]: ...
 
 
 @dataclass(frozen=True)
@@ -33,12 +46,12 @@ class ClockRate:
     time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
     """
 
-    inversion: AbelJacobi
+    inversion: AbelJacobi[Periods]
     scale: Any
     time: str
 
     @classmethod
-    def of(cls, spectrum: Spectrum, inversion: AbelJacobi, time: str) -> ClockRate:
+    def of(cls, spectrum: Spectrum, inversion: AbelJacobi[Periods], time: str) -> ClockRate:
         """Return the rate whose scale follows from its value at the start."""
         curve, fine = inversion.periods.curve, spectrum.arithmetic
         product = fine.number(1)

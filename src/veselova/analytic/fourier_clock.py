@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.clock import Clock, ClockRate
+from veselova.analytic.clock import Clock, Rate
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
@@ -50,7 +50,7 @@ class FourierClock(Clock):
 
     name: ClassVar[str] = "fourier"
 
-    def __init__(self, rate: ClockRate, in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
+    def __init__(self, rate: Rate, in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
         self._in_tau1, self._in_time, self._mean = in_tau1, in_time, mean
         modes, coefficients = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
@@ -115,7 +115,7 @@ class FourierClock(Clock):
         return times / self._mean + delta, z
 
 
-def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
+def _significant_modes(rate: Rate) -> tuple[Array, Array]:
     """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
     columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
 
@@ -131,7 +131,7 @@ def _significant_modes(rate: ClockRate) -> tuple[Array, Array]:
 class ColumnsForModes:
     """``ClockRate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
 
-    def __init__(self, rate: ClockRate) -> None:
+    def __init__(self, rate: Rate) -> None:
         self._rate, self._longest = rate, max(series.shape[1] for series in rate.inversion.periods.cut_series)
         self._count, self._columns = 0, list[tuple[Values, Values]]()
 

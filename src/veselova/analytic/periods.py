@@ -49,6 +49,11 @@ class Periods:
         """Return the gaps s = 0…g−1."""
         return tuple(Interval(self.curve, 2 * s) for s in range(self.genus))
 
+    @property
+    def narrowest_gap(self) -> float:
+        """Return the curve's narrowest gap."""
+        return self.curve.narrowest_gap
+
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to the working precision.
 

@@ -1,0 +1,174 @@
+"""Motions in a separable potential in closed form: quadratures inverted in real angles, then position and velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.frame import Attitude
+from veselova.analytic.separated_curve import SeparableStart, SeparatedCut, separated_cuts
+from veselova.analytic.separated_periods import SeparatedPeriods
+
+__all__ = ["SeparableMotion", "SeparatedRate"]
+
+Array = NDArray[np.float64]
+
+
+class SeparableMotion:
+    """The motion of one start on its torus; angles φ_s as in SeparatedCut, of any sign, increasing in time.
+
+    Raises Unsolved as ``separated_cuts`` does, and where an angle series does not end.
+    """
+
+    def __init__(self, start: SeparableStart) -> None:
+        self.cuts = separated_cuts(start)
+        self.periods = SeparatedPeriods(self.cuts)
+        self.inversion = AbelJacobi(self.periods)
+        self._inverse = np.array([float(x) for x in start.inverse])
+        self._distances = [[float(abs(x - y)) for y in start.inverse] for x in start.inverse]
+        self.angles = np.array([_angle(cut, start, s) for s, cut in enumerate(self.cuts)])
+        self._own: dict[int, tuple[int, bool]] = {}
+        for s, cut in enumerate(self.cuts):
+            for axis, lower in zip(cut.axes, (True, False), strict=True):
+                if axis is not None:
+                    self._own[axis] = s, lower
+        self._signs = [self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))]
+
+    def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
+        """Return the constant sign of q_i against its root, which passes zero upwards at a lower end, downwards at an upper."""
+        if axis not in self._own:
+            return 1 if position > 0 else -1
+        s, lower = self._own[axis]
+        if position == 0:
+            return (1 if velocity > 0 else -1) * (1 if lower else -1)
+        return (1 if position > 0 else -1) * (1 if self.angles[s] >= 0 or not lower else -1)
+
+    def points(self, phi: Array) -> Array:
+        """Return λ_s at angles (N, g)."""
+        return np.stack([cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1)
+
+    def between(self, phi: Array) -> Array:
+        """Return |λ_s−λ_j|, one for s = j, shape (N, g, g), from the ends of the cuts."""
+        g = len(self.cuts)
+        result = np.ones((phi.shape[0], g, g))
+        for s in range(g):
+            for j in range(s + 1, g):
+                stretch = self.cuts[j].lower - self.cuts[s].lower - self.cuts[s].width
+                distance = self.cuts[s].point(phi[:, s])[1] + stretch + self.cuts[j].point(phi[:, j])[0]
+                result[:, s, j] = result[:, j, s] = distance
+        return result
+
+    def speeds(self, phi: Array) -> Array:
+        """Return dφ_s/dτ = 2√W_s/Π_{j≠s}|λ_s−λ_j|, shape (N, g)."""
+        roots = np.stack([cut.root(phi[:, s]) for s, cut in enumerate(self.cuts)], axis=1)
+        return np.asarray(2 * roots / np.prod(self.between(phi), axis=2))
+
+    def _offsets(self, phi: Array) -> Array:
+        """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
+        result = np.empty((*phi.shape, self._inverse.size))
+        for s, cut in enumerate(self.cuts):
+            below, above = cut.point(phi[:, s])
+            for i, x in enumerate(self._inverse):
+                result[:, s, i] = below + (cut.lower - x) if i <= s else -(above + (x - cut.lower - cut.width))
+                if self._own.get(i, (-1, True))[0] == s:
+                    result[:, s, i] = below if i <= s else -above
+        return result
+
+    def attitude(self, phi: Array) -> Attitude:
+        """Return q and, as its normals, the unit tangents m_1 … m_g of the coordinate lines, with (q', m_s), at angles (N, g).
+
+        (m_s)_i = q_i y_s/(λ_s−I_i), y_s = √(|Φ(λ_s)|/Π_{j≠s}|λ_s−λ_j|); the root of a cut's own end carries a sign, so that all
+        are analytic in φ and change sign with φ_s → φ_s + 2π as they do in time.
+        """
+        offsets, between = self._offsets(phi), self.between(phi)
+        own = np.ones_like(offsets)  # the signed root of |λ_s−I_i| where I_i is an end of cut s
+        for i, (s, lower) in self._own.items():
+            half = np.sin(phi[:, s] / 2) if lower else np.cos(phi[:, s] / 2)
+            own[:, s, i] = np.sqrt(self.cuts[s].width) * half
+        ends = np.array(
+            [[self._own.get(i, (-1, True))[0] == s for i in range(self._inverse.size)] for s in range(len(self.cuts))]
+        )
+        far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
+        scale = np.array([np.sqrt(np.prod([d for d in row if d])) for row in self._distances])
+        q_rest = np.array(self._signs) * np.prod(far, axis=1) / scale
+        y_rest = np.prod(far, axis=2) / np.sqrt(np.prod(between, axis=2))
+        q, y = q_rest * np.prod(own, axis=1), y_rest * np.prod(own, axis=2)
+        tangents = q[:, None, :] * y[:, :, None] / np.where(ends, 1.0, offsets)
+        for i, (s, lower) in self._own.items():  # the root stands in q_i and in y_s, and cancels the quotient
+            other = self.cuts[s].axes[1 if lower else 0]
+            mate = own[:, s, other] if other is not None else 1.0
+            tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
+        return Attitude(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.points(phi))
+
+    def _components(self, phi: Array, y_rest: Array) -> Array:
+        """Return (q', m_s) = λ_s'/(2y_s), y_s being y_rest times the half angles of the ends that are I's."""
+        speeds, result = self.speeds(phi), np.empty_like(phi)
+        for s, cut in enumerate(self.cuts):
+            # ½(b−a) sin φ = √(b−a) sin(φ/2) · √(b−a) cos(φ/2): an end that is an I takes its half angle away.
+            root = np.sqrt(cut.width)
+            lower = 1.0 if cut.axes[0] is not None else root * np.sin(phi[:, s] / 2)
+            upper = 1.0 if cut.axes[1] is not None else root * np.cos(phi[:, s] / 2)
+            result[:, s] = lower * upper * speeds[:, s] / (2 * y_rest[:, s])
+        return result
+
+    def turning(self, phi: Array) -> Array:
+        """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
+
+        From A⁻¹m_1 = λ_1m_1 + σ_1q, σ_1 = (A⁻¹m_1, q), it is σ_1(q',m_2)/(λ_2−λ_1).
+        """
+        at = self.attitude(phi)
+        sigma = np.sum(self._inverse * at.q * at.normals[:, :, 0], axis=1)
+        return np.asarray(sigma * at.components[:, 1] / self.between(phi)[:, 0, 1])
+
+
+def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
+    """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)²."""
+    if cut.width == 0:
+        return 0.0
+    angle = 2 * float(np.arctan2(np.sqrt(max(cut.below, 0.0)), np.sqrt(max(cut.above, 0.0))))
+    point, slope = start.spheroconic[s], Fraction(0)
+    for x, v, inverse in zip(start.q, start.q_dot, start.inverse, strict=True):
+        if point == inverse:
+            return angle
+        slope += x * v / (point - inverse)
+    return angle if slope >= 0 else -angle
+
+
+@dataclass(frozen=True)
+class SeparatedRate:
+    """dt/dτ = √(λ_1…λ_g) on the torus, with its Fourier coefficients as determinants; attributes as those of ClockRate."""
+
+    motion: SeparableMotion
+    scale: float = 1.0
+
+    @property
+    def inversion(self) -> AbelJacobi[SeparatedPeriods]:
+        """Return the Abel–Jacobi map."""
+        return self.motion.inversion
+
+    def at(self, phi: Array) -> Array:
+        """Return dt/dτ at angles of shape (N, g)."""
+        return np.asarray(np.sqrt(np.prod(self.motion.points(phi), axis=1)))
+
+    def columns(self, count: int) -> list[tuple[Array, Array]]:
+        """Return, per cut, (weights, shape (g, N); G_s at the nodes, shape (N, g)); see ClockRate.columns."""
+        periods, result = self.motion.periods, []
+        for s, cut in enumerate(self.motion.cuts):
+            phi: Any = periods.arithmetic.nodes(count)
+            angles = np.zeros((count, periods.genus))
+            angles[:, s] = phi
+            forms = periods.forms(s, phi) * np.sqrt(cut.lower + cut.point(phi)[0])
+            result.append((periods.inverse_cycles @ forms * (2 * np.pi / count), self.inversion.map(angles)))
+        return result
+
+    @cached_property
+    def mean(self) -> float:
+        """Return the mean of dt/dτ over the torus."""
+        count = max(series.shape[1] for series in self.motion.periods.cut_series)
+        return float(np.linalg.det(np.stack([np.sum(weights, axis=1) for weights, _ in self.columns(count)], axis=1)))

@@ -1,0 +1,110 @@
+"""Periods and angle series of the differentials p_k dλ/(2√R) on the cuts of a separable motion.
+
+The sum over k points on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all the same a diffeomorphism of
+the torus (Liouville), and is inverted as in analytic.abel_jacobi.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.precision import DOUBLE, Double
+from veselova.analytic.separated_curve import SeparatedCut
+from veselova.mechanics.errors import Unsolved
+
+__all__ = ["SeparatedPeriods"]
+
+Array = NDArray[np.float64]
+
+#: Nodes to begin with, and where a cut is too near another root.
+_FEWEST_NODES, _MOST_NODES = 16, 8192
+
+#: A series is complete when its last two coefficients are below this part of the largest.
+_RESOLVED = 1e-15
+
+
+@dataclass(frozen=True)
+class SeparatedPeriods:
+    """The period data of g cuts; attributes as those of analytic.periods.Periods."""
+
+    cuts: Sequence[SeparatedCut]
+    arithmetic: Double = DOUBLE
+
+    @property
+    def genus(self) -> int:
+        """Return g, the number of coordinates."""
+        return len(self.cuts)
+
+    @property
+    def narrowest_gap(self) -> float:
+        """Return the least gap between neighbouring cuts against the wider of both."""
+        ends = [(cut.lower, cut.lower + cut.width, cut.width) for cut in self.cuts]
+        ratios = ((c - b) / (c - b + max(width, other)) for (_, b, width), (c, _, other) in itertools.pairwise(ends))
+        return min(ratios, default=1.0)
+
+    def forms(self, s: int, phi: Array) -> Array:
+        """Return ∂z-forms p_k(λ)/(2√W) with their sign on cut s, shape (g, N); p_g = Π(λ−ζ_l), p_k = p_g/(λ−ζ_k), ζ_l mid-gap."""
+        g, cut = self.genus, self.cuts[s]
+        below, above = cut.point(phi)
+        factors = []
+        for l in range(g - 1):
+            end, begin = self.cuts[l].lower + self.cuts[l].width, self.cuts[l + 1].lower
+            half = (begin - end) / 2
+            # λ−ζ_l from the end of the cut that faces the gap.
+            factors.append(below + (cut.lower - begin) + half if s > l else -(above + (end - cut.lower - cut.width) + half))
+        one = np.ones_like(phi)
+        products = [np.prod([one, *factors[:k], *factors[k + 1 :]], axis=0) for k in range(g - 1)]
+        products.append(np.prod([one, *factors], axis=0))
+        return np.asarray((-1) ** (g - s - 1) * np.array(products) / (2 * cut.root(phi)))
+
+    @cached_property
+    def cut_series(self) -> tuple[Array, ...]:
+        """Return, per cut, the cosine coefficients of du_k/dφ (signs included), shape (g, N_s)."""
+        return tuple(self._series(s) for s in range(self.genus))
+
+    def _series(self, s: int) -> Array:
+        count = _FEWEST_NODES
+        while count <= _MOST_NODES:
+            coefficients = self.arithmetic.cosine_series(self.forms(s, self.arithmetic.nodes(count)))
+            size = np.max(np.abs(coefficients), axis=1, keepdims=True)
+            if np.all(np.abs(coefficients[:, -2:]) <= _RESOLVED * size):
+                significant = np.flatnonzero(np.any(np.abs(coefficients) > _RESOLVED / 4 * size, axis=0))
+                return np.asarray(coefficients[:, : max(2, int(significant[-1]) + 2)])
+            count *= 2
+        raise Unsolved("separatrix", "a turning point is nearly a double root: the series of its angle does not end")
+
+    @cached_property
+    def cycles(self) -> Array:
+        """Return a, shape (g, g)."""
+        return np.stack([2 * np.pi * series[:, 0] for series in self.cut_series], axis=1)
+
+    @cached_property
+    def inverse_cycles(self) -> Array:
+        """Return a⁻¹."""
+        return self.arithmetic.inverse(self.cycles)
+
+    @cached_property
+    def frequencies(self) -> Array:
+        """Return f = a⁻¹e_g, cycles per unit τ."""
+        return np.asarray(self.inverse_cycles[:, -1])
+
+    @cached_property
+    def series_truncation(self) -> Array:
+        """Return what the angle series leave out of z_k, about, shape (g,)."""
+        left_out = sum(_RESOLVED * np.max(np.abs(series), axis=1) for series in self.cut_series)
+        return np.asarray(np.abs(self.inverse_cycles) @ left_out)
+
+    @cached_property
+    def angle_series(self) -> Array:
+        """Return g_{ksm}, shape (g, g, M): dz_k/dφ_s = Σ_m g_{ksm} cos mφ_s."""
+        longest = max(series.shape[1] for series in self.cut_series)
+        padded = np.zeros((self.genus, self.genus, longest))
+        for s, series in enumerate(self.cut_series):
+            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
+        return padded
