@@ -30,11 +30,13 @@ if TYPE_CHECKING:
     from veselova.mechanics.errors import ServiceUnreachable as ServiceUnreachable
     from veselova.mechanics.errors import Unsolved as Unsolved
     from veselova.mechanics.errors import VeselovaError as VeselovaError
+    from veselova.mechanics.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
     from veselova.mechanics.torus import Torus as Torus
     from veselova.mechanics.trajectory import Provenance as Provenance
     from veselova.mechanics.trajectory import Trajectory as Trajectory
     from veselova.mechanics.veselova import Veselova as Veselova
+    from veselova.mechanics.veselova_so3 import VeselovaSO3 as VeselovaSO3
     from veselova.service.client import AsyncClient as AsyncClient
     from veselova.service.client import Client as Client
 
@@ -45,6 +47,7 @@ _HOMES = {
     "Client": "veselova.service.client",
     "Comparison": "veselova.mechanics.comparison",
     "EllipsoidGeodesic": "veselova.mechanics.ellipsoid",
+    "EulerPoisson": "veselova.mechanics.euler_poisson",
     "InternalContradiction": "veselova.mechanics.errors",
     "InvalidInput": "veselova.mechanics.errors",
     "InvalidRequest": "veselova.mechanics.errors",
@@ -58,6 +61,7 @@ _HOMES = {
     "Unsolved": "veselova.mechanics.errors",
     "Veselova": "veselova.mechanics.veselova",
     "VeselovaError": "veselova.mechanics.errors",
+    "VeselovaSO3": "veselova.mechanics.veselova_so3",
     "compare": "veselova.engines",
     "solve": "veselova.engines",
     "torus": "veselova.engines",

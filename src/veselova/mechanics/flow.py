@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.errors import InternalContradiction, Unsolved
+
 __all__ = ["FLOATS", "Flow", "Operations"]
 
 Array = NDArray[np.float64]
@@ -62,6 +64,19 @@ class Flow(ABC):
     @abstractmethod
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return series by name, in the problem's units, from states (N, m)."""
+
+    @property
+    def endless(self) -> bool:
+        """Return whether every motion goes on for ever; one that may end says so by ``clearance`` and ``ending``."""
+        return True
+
+    def clearance(self, state: Array) -> float:
+        """Return a number that is positive until the motion ends (at a collision, say), and negative beyond."""
+        return 1.0
+
+    def ending(self, time: float, state: Array) -> Unsolved:
+        """Return the named outcome of a motion that has ended at a scaled time, in this state."""
+        raise InternalContradiction(f"a motion without end has ended at {time:.6g}")
 
     def vector_field(self, _time: float, state: Array) -> Array:
         """Return the derivative of a state in floating point."""

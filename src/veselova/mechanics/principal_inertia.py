@@ -17,30 +17,33 @@ __all__ = ["positive_numbers", "principal_inertia"]
 Array = NDArray[np.float64]
 
 
-def positive_numbers(A: Any) -> tuple[Fraction, ...]:
-    """Return the entries of A, two or more numbers above zero, exactly."""
-    diagonal = exact_vector(A, ("A",))
+def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
+    """Return the entries of A, two or more numbers above zero, exactly; ``name`` is that of the argument."""
+    diagonal = exact_vector(A, (name,))
     if len(diagonal) < 2:
-        raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
+        raise InvalidInput((name,), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
     for i, value in enumerate(diagonal):
         if value <= 0 or float(value) == 0:
-            raise InvalidInput(("A", i), "a finite number greater than 0", shown(A[i]))
+            raise InvalidInput((name, i), "a finite number greater than 0", shown(A[i]))
     return diagonal
 
 
-def principal_inertia(A: Any) -> tuple[tuple[Fraction, ...], Array | None]:
-    """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix."""
+def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Array | None]:
+    """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix.
+
+    ``name``: of the argument, for its refusals.
+    """
     if not is_matrix(A):
-        return positive_numbers(A), None
+        return positive_numbers(A, name), None
     n = len(A)
     if n < 2:
-        raise InvalidInput(("A",), "at least 2 rows (n ≥ 2)", f"{n}")
-    matrix = to_float(exact_matrix(A, ("A",), n))
+        raise InvalidInput((name,), "at least 2 rows (n ≥ 2)", f"{n}")
+    matrix = to_float(exact_matrix(A, (name,), n))
     asymmetry = np.abs(matrix - matrix.T)
     if np.max(asymmetry) > INPUT_TOLERANCE * np.max(np.abs(matrix)):
         i, j = divmod(int(np.argmax(asymmetry)), n)
-        raise InvalidInput(("A", i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
+        raise InvalidInput((name, i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
     values, axes = np.linalg.eigh((matrix + matrix.T) / 2)
     if values[0] <= n * np.finfo(float).eps * values[-1]:
-        raise InvalidInput(("A",), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
+        raise InvalidInput((name,), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
     return tuple(map(Fraction, values.tolist())), axes

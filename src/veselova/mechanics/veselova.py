@@ -22,7 +22,7 @@ from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, require_on_sp
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
-__all__ = ["Veselova"]
+__all__ = ["Veselova", "admissible_frame"]
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class Veselova(TorusProblem):
         if given_frame is None:
             start_frame = refined(natural_frame(A_float, position, velocity), exact.A, exact.q, exact.tangent)
         else:
-            start_frame = _admissible_frame(given_frame, position)
+            start_frame = admissible_frame(given_frame, position)
         self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes)
         object.__setattr__(self, "exact", exact)
         given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
@@ -233,13 +233,13 @@ def _require_representable_energy(A: Array, q: Array, q_dot: Array) -> None:
         raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")
 
 
-def _admissible_frame(frame: Array, q: Array) -> Array:
+def admissible_frame(frame: Array, q: Array, name: str = "q") -> Array:
     """Return the given frame made exactly orthogonal with first column q; raises InvalidInput beyond the tolerance."""
     defect = float(np.max(np.abs(frame.T @ frame - np.eye(q.size))))
     if not defect <= INPUT_TOLERANCE:
         raise InvalidInput(("frame",), "an orthogonal matrix to 1e-9", f"one with |EᵀE − 1| up to {defect:.3g}")
     offset = float(np.max(np.abs(frame[:, 0] - q)))
     if offset > INPUT_TOLERANCE:
-        raise InvalidInput(("frame",), "first column e_1 equal to q to 1e-9", f"a difference of {offset:.3g}")
+        raise InvalidInput(("frame",), f"first column e_1 equal to {name} to 1e-9", f"a difference of {offset:.3g}")
     rest = frame[:, 1:] - np.outer(q, q @ frame[:, 1:])
     return orthonormalized(np.column_stack([q, rest]))

@@ -31,6 +31,8 @@ class Dop853(Integrator):
 
     def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
         """Return (states at the wanted times, state at stop)."""
+        if self._flow.clearance(state) <= 0:
+            raise self._flow.ending(start, state)
         outputs = wanted if wanted.size and wanted[-1] == stop else np.append(wanted, stop)
         answer = solve_ivp(
             self._flow.vector_field,
@@ -40,7 +42,10 @@ class Dop853(Integrator):
             t_eval=outputs,
             rtol=self._tolerance,
             atol=self._tolerance / 10,
+            events=None if self._flow.endless else _Ending(self._flow),
         )
+        if answer.status == 1:
+            raise self._flow.ending(float(answer.t_events[0][0]), answer.y_events[0][0])
         if not answer.success:
             raise Unsolved(
                 "integration-failed", f"DOP853 stopped between t = {start:.6g} and {stop:.6g} (scaled): {answer.message}"
@@ -53,3 +58,15 @@ class Dop853(Integrator):
     def steps(self) -> int:
         """Return the number of steps taken so far."""
         return self._steps
+
+
+class _Ending:
+    """The event that a motion ends, for ``solve_ivp``."""
+
+    terminal = True
+
+    def __init__(self, flow: Flow) -> None:
+        self._flow = flow
+
+    def __call__(self, _time: float, state: Array) -> float:
+        return self._flow.clearance(state)

@@ -34,14 +34,20 @@ class Taylor(Integrator):
     def __init__(self, flow: Flow, tolerance: float) -> None:
         self._integrator = copy.copy(_compiled(flow, tolerance))
         self._integrator.pars[:] = flow.parameters
+        self._flow = flow
         self._steps = 0
 
     def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
         """Return (states at the wanted times, state at stop)."""
+        if self._flow.clearance(state) <= 0:
+            raise self._flow.ending(start, state)
         integrator = self._integrator
         integrator.time = start
         integrator.state[:] = state
-        outcome, _, _, steps, dense, _ = integrator.propagate_until(stop, c_output=wanted.size > 0)
+        ending = None if self._flow.endless else self._goes_on
+        outcome, _, _, steps, dense, _ = integrator.propagate_until(stop, c_output=wanted.size > 0, callback=ending)
+        if "cb_stop" in str(outcome):
+            raise self._flow.ending(float(integrator.time), np.array(integrator.state))
         if "time_limit" not in str(outcome):
             raise Unsolved(
                 "integration-failed", f"the Taylor method stopped between t = {start:.6g} and {stop:.6g} (scaled): {outcome}"
@@ -49,6 +55,9 @@ class Taylor(Integrator):
         self._steps += steps
         states = np.array(dense(wanted)) if wanted.size else np.empty((0, state.size))
         return states, np.array(integrator.state)
+
+    def _goes_on(self, integrator: Any) -> bool:
+        return self._flow.clearance(integrator.state) > 0
 
     @property
     def steps(self) -> int:

@@ -13,9 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
 from veselova.mechanics.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.euler_poisson import EulerPoisson
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.veselova_so3 import VeselovaSO3
 
 __all__ = ["SYSTEMS", "ProblemModel", "Request", "Times"]
 
@@ -33,9 +35,36 @@ _UNIFORM = {
 }
 _TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
 
+_TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_SQUARE = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
+_TERM = {
+    "type": "object",
+    "properties": {
+        "coefficient": _NUMBER,
+        "powers": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
+    },
+    "required": ["coefficient", "powers"],
+    "additionalProperties": False,
+}
+_POTENTIAL = {
+    "type": "object",
+    "properties": {
+        "clebsch": _NUMBER,
+        "family": {"type": "array", "items": _NUMBER, "minItems": 5, "maxItems": 5},
+        "polynomial": {"type": "array", "items": _TERM, "minItems": 1},
+        "companion": {"type": "array", "items": _TERM, "minItems": 1},
+    },
+    "minProperties": 1,
+    "additionalProperties": False,
+}
+
 Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
 Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
 Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
+Triple = Annotated[Any, WithJsonSchema(_TRIPLE)]
+Tensor = Annotated[Any, WithJsonSchema({"anyOf": [_TRIPLE, _SQUARE]})]
+Attitude = Annotated[Any, WithJsonSchema({"anyOf": [_SQUARE, {"type": "null"}]})]
+PotentialData = Annotated[Any, WithJsonSchema({"anyOf": [_POTENTIAL, {"type": "null"}]})]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
 
@@ -109,11 +138,44 @@ class EllipsoidGeodesicModel(SystemModel):
     normalize: Annotated[bool, Field(description="scale X onto the ellipsoid, project and scale X_dot first")] = False
 
 
+class RigidBodyModel(SystemModel):
+    """A rigid body in a potential V(γ) and its state at t = 0."""
+
+    measured: ClassVar[str] = "inertia"
+
+    inertia: Annotated[Tensor, Field(description="3 positive principal moments, or a symmetric positive definite 3 × 3 matrix")]
+    gamma: Annotated[Triple, Field(description="unit vector e_1 = γ seen from the body")]
+    Omega: Annotated[Triple, Field(description="angular velocity in the body")]
+    potential: Annotated[PotentialData, Field(description="V(γ), the sum of the parts given; zero when left out")] = None
+    frame: Annotated[Attitude, Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out")] = None
+    normalize: Annotated[bool, Field(description="scale gamma to unit length first")] = False
+
+
+class VeselovaSO3Model(RigidBodyModel):
+    """The Veselova system on T SO(3), equations (3.1): (Ω,γ) = const in a potential V(γ) (Clebsch, (3.5), any polynomial)."""
+
+    problem_class: ClassVar[type[Problem]] = VeselovaSO3
+
+    system: Literal["veselova-so3"]
+
+
+class EulerPoissonModel(RigidBodyModel):
+    """The Euler–Poisson equations (3.4) of a free rigid body in a potential 𝒱(γ)."""
+
+    problem_class: ClassVar[type[Problem]] = EulerPoisson
+
+    system: Literal["euler-poisson"]
+
+
 #: The systems, by the name that tells them apart.
 SYSTEMS: Mapping[str, type[SystemModel]] = {
     "veselova": VeselovaModel,
     "neumann": NeumannModel,
     "ellipsoid-geodesic": EllipsoidGeodesicModel,
+    "veselova-so3": VeselovaSO3Model,
+    "euler-poisson": EulerPoissonModel,
 }
 
-ProblemModel = Annotated[VeselovaModel | NeumannModel | EllipsoidGeodesicModel, Field(discriminator="system")]
+ProblemModel = Annotated[
+    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | EulerPoissonModel, Field(discriminator="system")
+]

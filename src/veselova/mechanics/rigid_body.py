@@ -1,0 +1,177 @@
+"""What the Veselova system on T SO(3) and the Euler–Poisson equations share: a rigid body, its state, and a potential V(γ)."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plain, read_only, to_float
+from veselova.mechanics.integrals import unit_scale
+from veselova.mechanics.natural_frame import natural_frame
+from veselova.mechanics.potential import Potential
+from veselova.mechanics.principal_inertia import principal_inertia
+from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.rigid_body_flow import RigidBodyFlow, momentum
+from veselova.mechanics.sphere import INPUT_TOLERANCE, unit
+from veselova.mechanics.veselova import admissible_frame
+
+__all__ = ["RigidBody"]
+
+Array = NDArray[np.float64]
+
+#: What counts as (Ω,γ) = 0, relative to |Ω|: the rounding of a scalar product.
+_ROUNDING = 16 * np.finfo(float).eps
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class RigidBody(Problem):
+    """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 = γ, e_2, e_3, in body axes.
+
+    moments, axes  principal moments (3,), exact where given so, and the principal axes as columns where a matrix was given
+    inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0 · potential  V(γ)
+    linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
+    """
+
+    moments: tuple[Fraction, ...]
+    axes: Array | None
+    inertia: Array
+    inverse: Array
+    gamma: Array
+    Omega: Array
+    frame: Array
+    potential: Potential
+    linear: float
+    given: Mapping[str, Any]
+
+    #: Whether a multiplier keeps (Ω,γ) constant.
+    constrained: ClassVar[bool]
+    bounded: ClassVar[tuple[str, ...]] = ("frame",)
+    portrait: ClassVar[str] = "gamma"
+
+    def __init__(
+        self, inertia: Any, gamma: Any, Omega: Any, potential: Any = None, frame: Any = None, *, normalize: bool = False
+    ) -> None:
+        if not isinstance(normalize, bool):
+            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        moments, axes, tensor, inverse = _inertia(inertia)
+        direction = _direction(gamma, normalize)
+        velocity = to_float(exact_vector(Omega, ("Omega",), 3))
+        V = Potential.of(potential, tensor, inverse, dual=not self.constrained)
+        V.require_finite(direction)
+        across = direction if self.constrained else tensor @ direction
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below
+            linear, size = float(velocity @ across), float(np.linalg.norm(velocity) * np.linalg.norm(across))
+            if abs(linear) <= _ROUNDING * size:
+                velocity, linear = velocity - (linear / (direction @ across)) * direction, 0.0
+            squares = np.array([velocity @ velocity, velocity @ tensor @ velocity, np.sum((tensor @ velocity) ** 2)])
+        if not np.all(np.isfinite(squares)) or (np.any(velocity) and not np.all(squares)):
+            required = "an angular velocity whose energy and squared momentum are within the range of a float"
+            raise InvalidInput(("Omega",), required, f"squares of {', '.join(f'{x:.3g}' for x in squares)}")
+        principal = axes.T if axes is not None else np.eye(3)
+        if frame is None:
+            rate = principal @ np.cross(direction, velocity)
+            start = natural_frame(1 / to_float(moments), principal @ direction, rate)
+            start = principal.T @ start
+        else:
+            start = admissible_frame(to_float(exact_matrix(frame, ("frame",), 3)), direction, "gamma")
+        fields = {"moments": moments, "potential": V, "linear": linear}
+        arrays = {"axes": axes, "inertia": tensor, "inverse": inverse, "gamma": direction, "Omega": velocity, "frame": start}
+        fields |= {name: None if array is None else read_only(np.array(array)) for name, array in arrays.items()}
+        given = {"inertia": inertia, "gamma": gamma, "Omega": Omega, "frame": frame, "normalize": normalize}
+        kept = {name: plain(value) for name, value in given.items() if value is not None}
+        fields["given"] = kept if V.given is None else {**kept, "potential": dict(V.given)}
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        parts = (f"{name}={np.array2string(getattr(self, name), precision=6)}" for name in ("inertia", "gamma", "Omega"))
+        potential = "" if self.potential.given is None else f", potential={dict(self.potential.given)}"
+        return f"{type(self).__name__}({', '.join(parts)}{potential})".replace("\n", "")
+
+    @property
+    def title(self) -> str:
+        """Return the system, its linear constant and its energy."""
+        energy = float(self.integrals(self.start)["energy"][0])
+        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, energy {energy:.12g}"
+
+    @property
+    @abstractmethod
+    def _linear_name(self) -> str:
+        """Return what ``linear`` is."""
+
+    @property
+    def turning(self) -> float:
+        """Return |Ω| plus the rate √(2|V|/I) to which the potential can bring the body."""
+        lightest = min(float(moment) for moment in self.moments)
+        return float(np.linalg.norm(self.Omega) + np.sqrt(2 * self.potential.terms.size(self.gamma) / lightest))
+
+    @property
+    def moves(self) -> bool:
+        """Return whether anything moves: Ω or the torque γ×∂V/∂γ."""
+        return bool(np.any(self.Omega) or np.any(np.cross(self.gamma, self.potential.terms.gradient(self.gamma))))
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {"Omega": self.Omega[None], "frame": self.frame[None]}
+
+    def flow(self, formulation: str = "multiplier") -> RigidBodyFlow:
+        """Return the field in units of this problem; ``momentum`` is the formulation by the momentum in space."""
+        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+        rate, V = self.turning, self.potential
+        unit_of_energy = float(np.ldexp(rate, power) * rate)
+        companion = V.companion if self.linear == 0 or V.unconditional else None
+        return RigidBodyFlow(
+            inertia=np.ldexp(self.inertia, -power),
+            inverse=np.ldexp(self.inverse, power),
+            potential=V.terms.times(1 / unit_of_energy),
+            companion=None if companion is None else companion.times(float(np.ldexp(1 / unit_of_energy, -power))),
+            Omega=self.Omega / rate,
+            frame=self.frame,
+            time_unit=1 / rate,
+            constrained=self.constrained,
+            spatial=formulation == "momentum",
+        )
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return gamma, the first column of the frame, or the momentum."""
+        if name == "gamma":
+            return np.array(series["frame"][..., 0])
+        return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
+
+
+def _inertia(given: Any) -> tuple[tuple[Fraction, ...], Array | None, Array, Array]:
+    """Return the principal moments, the principal axes where a matrix is given, the tensor and its inverse."""
+    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
+    moments, axes = principal_inertia(given, "inertia")
+    if len(moments) != 3:
+        raise InvalidInput(("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}")
+    values = to_float(moments)
+    with np.errstate(over="ignore"):
+        reciprocals = 1 / values
+    if not np.all(np.isfinite(reciprocals)):
+        raise InvalidInput(("inertia",), "moments whose inverses are within the range of a float", f"{np.min(values):.3g}")
+    if axes is None:
+        return moments, None, np.diag(values), np.diag(reciprocals)
+    tensor = to_float(exact_matrix(given, ("inertia",), 3))
+    return moments, axes, (tensor + tensor.T) / 2, axes @ (reciprocals[:, None] * axes.T)
+
+
+def _direction(given: Any, normalize: bool) -> Array:
+    """Return the unit vector γ."""
+    exact = exact_vector(given, ("gamma",), 3)
+    if not any(exact):
+        raise InvalidInput(("gamma",), "a vector of unit length", "the zero vector")
+    largest = max(abs(x) for x in exact)
+    gamma = to_float([x / largest if normalize else x for x in exact])
+    length = float(np.linalg.norm(gamma / np.max(np.abs(gamma))) * np.max(np.abs(gamma)))
+    if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
+        raise InvalidInput(("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
+    return unit(gamma)
