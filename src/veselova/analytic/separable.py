@@ -120,11 +120,12 @@ class SeparableMotion:
     def turning(self, phi: Array) -> Array:
         """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
-        From A⁻¹m_1 = λ_1m_1 + σ_1q, σ_1 = (A⁻¹m_1, q), it is σ_1(q',m_2)/(λ_2−λ_1).
+        From A⁻¹m_s = λ_sm_s + σ_sq, σ_s = (A⁻¹m_s, q), it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1).
         """
         at = self.attitude(phi)
-        sigma = np.sum(self._inverse * at.q * at.normals[:, :, 0], axis=1)
-        return np.asarray(sigma * at.components[:, 1] / self.between(phi)[:, 0, 1])
+        sigma = np.sum((self._inverse * at.q)[:, :, None] * at.normals, axis=1)
+        mixed = np.sum(sigma * at.components[:, ::-1], axis=1)
+        return np.asarray(mixed / self.between(phi)[:, 0, 1])
 
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:

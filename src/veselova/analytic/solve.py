@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.body_motion import BodyMotion
 from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
-from veselova.analytic.precision import DOUBLE
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
@@ -21,6 +21,7 @@ from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.veselova_so3 import VeselovaSO3
 from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
@@ -38,7 +39,7 @@ _NO_DIGIT = 0.1
 
 
 def solve(
-    problem: TorusProblem,
+    problem: TorusProblem | VeselovaSO3,
     times: Any,
     *,
     method: str | None = None,
@@ -60,6 +61,8 @@ def solve(
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
+    if isinstance(problem, VeselovaSO3):
+        return _body_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
         return _Motion(problem, method, clock)(grid)
     if certified and method == "theta":
@@ -71,6 +74,15 @@ def solve(
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(times)
+
+
+def _body_motion(problem: VeselovaSO3, grid: Array, method: str | None, clock: str | None, beyond: bool) -> Trajectory:
+    """Return the motion of a body in a separable potential; it has one method, one choice of clocks and 15 digits."""
+    for field, given, allowed in (("method", method, (None, "angles")), ("clock", clock, (None,)), ("digits", beyond, (False,))):
+        if given not in allowed:
+            required = {"method": "angles", "clock": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
+            raise InvalidInput((field,), f"{required} for system {problem.system}", shown(given))
+    return BodyMotion(problem)(grid)
 
 
 @dataclass(frozen=True)
@@ -98,7 +110,10 @@ class _Motion:
         """Return the trajectory at times."""
         began, grid = time.perf_counter(), validated_times(times)
         if not self.problem.moves:
-            return self._resting(grid, began)
+            provenance = Provenance(
+                "analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"}
+            )
+            return Trajectory.at_rest(self.problem, grid, provenance, self)
         solution, route = self._solution, self.method or self._solution.default_method()
         clock = solution.clock(grid, self.clock)
         tau1, states, error = _evaluated(solution, clock, grid, route)
@@ -122,11 +137,6 @@ class _Motion:
         provenance = Provenance("analytic", route, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
         series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
         return Trajectory(self.problem, grid, self.problem.bound(series, error), series, provenance, dense=self)
-
-    def _resting(self, grid: Array, began: float) -> Trajectory:
-        series = {name: np.repeat(values, grid.size, axis=0) for name, values in self.problem.start.items()}
-        provenance = Provenance("analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"})
-        return Trajectory(self.problem, grid, np.full(grid.size, DOUBLE.epsilon), series, provenance, dense=self)
 
 
 def _evaluated(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:

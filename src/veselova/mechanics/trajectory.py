@@ -66,6 +66,12 @@ class Trajectory:
             array.setflags(write=False)
 
     @classmethod
+    def at_rest(cls, problem: Problem, times: Array, provenance: Provenance, dense: Callable[[Any], Trajectory]) -> Trajectory:
+        """Return the trajectory of a problem that does not move: its start, to rounding."""
+        arrays = {name: np.repeat(values, times.size, axis=0) for name, values in problem.start.items()}
+        return cls(problem, times, np.full(times.size, np.finfo(float).eps), arrays, provenance, dense)
+
+    @classmethod
     def of_decimals(
         cls,
         problem: Problem,

@@ -34,7 +34,8 @@ class VeselovaSO3(RigidBody):
 
     γ must have unit length to 1e-9; with ``normalize=True`` it is scaled first. Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations: ``multiplier``, (3.1) with
-    (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a).
+    (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a). Where (Ω,γ) = 0 and V is of (3.5) (``clebsch``,
+    ``family``), engine ``analytic`` has the motion by quadratures.
     """
 
     system: ClassVar[str] = "veselova-so3"
@@ -46,6 +47,7 @@ class VeselovaSO3(RigidBody):
         "multiplier": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "momentum", "multiplier")
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor"), "analytic": ("angles",)}
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
     constrained: ClassVar[bool] = True
 

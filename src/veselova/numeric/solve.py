@@ -66,17 +66,15 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
     chosen, began = formulation or problem.formulations[0], time.perf_counter()
-    if problem.moves:
-        series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
-        series = problem.completed(series)
-        error = problem.bound(series, error)
-    else:
-        series = {name: np.repeat(values, grid.size, axis=0) for name, values in problem.start.items()}
-        error, steps = np.full(grid.size, np.finfo(float).eps), 0
-    details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": steps, "projection_every": _SEGMENT}
-    provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
     again = partial(solve, problem, method=method, formulation=formulation)
-    return Trajectory(problem, grid, error, series, provenance, dense=again)
+    details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": 0, "projection_every": _SEGMENT}
+    if not problem.moves:
+        provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        return Trajectory.at_rest(problem, grid, provenance, again)
+    series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
+    series, details = problem.completed(series), {**details, "steps": steps}
+    provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+    return Trajectory(problem, grid, problem.bound(series, error), series, provenance, dense=again)
 
 
 def _integrate_twice(flow: Flow, bounded: tuple[str, ...], grid: Array, backend: type[Integrator]) -> tuple[Series, Array, int]:

@@ -1,0 +1,190 @@
+"""The Veselova system on T SO(3) with (Ω,γ) = 0 in the separable potentials (3.5), in closed form.
+
+γ and Ω come from the quadratures; e_2 and e_3 are carried along γ without turning about it, ė = −(γ∧γ̇)e, so they turn against the
+coordinate lines by one more integral along the orbit.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import Clock
+from veselova.analytic.fourier_clock import FourierClock
+from veselova.analytic.frame import slopes
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.panel_clock import PanelClock
+from veselova.analytic.panel_integral import PanelIntegral
+from veselova.analytic.precision import DOUBLE
+from veselova.analytic.separable import SeparableMotion, SeparatedRate
+from veselova.analytic.separated_curve import SeparableStart
+from veselova.mechanics.decimals import FEWEST_DIGITS
+from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.exact import exact_number, exact_vector
+from veselova.mechanics.times import validated_times
+from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.veselova_so3 import VeselovaSO3
+from veselova.version import __version__
+
+__all__ = ["BodyMotion"]
+
+Array = NDArray[np.float64]
+
+#: Equal moments are drawn apart by this part of themselves, far below any digit.
+_APART = Fraction(1, 10**30)
+
+#: Cycles from which the Fourier clock is cheaper, and those that the panels of the turning integral are willing to cover.
+_FOURIER_FROM, _MOST_CYCLES = 10.0, 5e4
+
+#: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
+_EVALUATION, _PHASE, _RATE = 32.0, 16.0, 8.0
+
+#: Points at which steepness is sampled; it is doubled for what lies between them.
+_SAMPLES, _BETWEEN = 48, 2.0
+
+#: Step of a difference quotient in a phase.
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or (Ω,γ) ≠ 0."""
+
+    problem: VeselovaSO3
+
+    @cached_property
+    def _order(self) -> NDArray[np.intp]:
+        """Return the principal axes by increasing moment."""
+        return np.array(sorted(range(3), key=lambda i: self.problem.moments[i]))
+
+    @cached_property
+    def _start(self) -> SeparableStart:
+        problem, order = self.problem, self._order
+        if problem.linear != 0:
+            raise Unsolved("not-separable", f"the closed form has (Ω,γ) = 0, here {problem.linear:.6g}; integrate numerically")
+        given = problem.potential.given or {}
+        if set(given) - {"clebsch", "family"}:
+            raise Unsolved(
+                "not-separable", "the closed form has the potentials (3.5), no polynomial of a user's; integrate numerically"
+            )
+        alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
+        alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
+        moments = [problem.moments[i] for i in order]
+        for i in (1, 2):
+            if moments[i] <= moments[i - 1]:
+                moments[i] = moments[i - 1] * (1 + _APART)
+        gamma, Omega = (self._principal(vector) for vector in (problem.gamma, problem.Omega))
+        x, w = ([Fraction(float(v[i])) for i in order] for v in (gamma, Omega))
+        handed = 1 if order[1] - order[0] in (1, -2) else -1  # whether the sorted axes keep the sense of rotation
+        velocity = [handed * (x[(i + 1) % 3] * w[(i + 2) % 3] - x[(i + 2) % 3] * w[(i + 1) % 3]) for i in range(3)]
+        first, second = sum(moments), moments[0] * moments[1] + moments[1] * moments[2] + moments[2] * moments[0]
+        quartic, quadratic = alphas[:2]
+        # v of (3.5): −α₁λ(λ²−σ₁λ+σ₂) + α₂λ(σ₁−λ)
+        v = (Fraction(0), quadratic * first - quartic * second, quartic * first - quadratic, -quartic)
+        return SeparableStart(tuple(moments), tuple(x), tuple(velocity), v, tuple(alphas[2 + i] for i in order))
+
+    def _principal(self, vector: Array) -> Array:
+        return vector if self.problem.axes is None else self.problem.axes.T @ vector
+
+    @cached_property
+    def _motion(self) -> SeparableMotion:
+        return SeparableMotion(self._start)
+
+    @cached_property
+    def _rate(self) -> SeparatedRate:
+        return SeparatedRate(self._motion)
+
+    @cached_property
+    def _in_tau(self) -> LinearFlow:
+        origin = self._motion.inversion.map(self._motion.angles[None, :])[0]
+        return LinearFlow.of(origin, self._motion.periods.frequencies)
+
+    @cached_property
+    def _in_time(self) -> LinearFlow:
+        return LinearFlow.of(self._in_tau.start, self._motion.periods.frequencies / self._rate.mean)
+
+    def _clock(self, grid: Array) -> Clock:
+        cycles = float(np.max(np.abs(self._in_time.rates)) * np.max(np.abs(grid)))
+        if not cycles <= _MOST_CYCLES:
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; the frame is integrated to {_MOST_CYCLES:.0e}")
+        if cycles > _FOURIER_FROM:
+            return FourierClock(self._rate, self._in_tau, self._in_time, self._rate.mean)
+        inversion = self._motion.inversion
+        return PanelClock(lambda z: self._rate.at(inversion.invert(z)), self._rate.mean, self._in_tau, grid[0], grid[-1])
+
+    @cached_property
+    def _sample(self) -> Array:
+        return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, 2))
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times."""
+        began, grid = time.perf_counter(), validated_times(times)
+        if not self.problem.moves:
+            provenance = Provenance(
+                "analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"}
+            )
+            return Trajectory.at_rest(self.problem, grid, provenance, self)
+        clock = self._clock(grid)
+        tau, z = clock.tau1(grid)
+        inversion, motion = self._motion.inversion, self._motion
+        largest = float(np.max(np.abs(motion.turning(inversion.invert(self._sample)))))
+        panels = PanelIntegral(
+            lambda z: motion.turning(inversion.invert(z)), self._in_tau, min(tau[0], 0.0), max(tau[-1], 0.0), largest
+        )
+        phi = inversion.invert(z)
+        at = motion.attitude(phi)
+        velocity = np.sum(at.normals * at.components[:, None, :], axis=2) / self._rate.at(phi)[:, None]
+        gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
+        turned = -panels.at(tau)
+        frame = self._frame(gamma, lines, turned)
+        error = self._error(tau, clock, panels)
+        series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
+        details = {"clock": clock.name, "clock_size": clock.size, "degree": len(self._start.factor) + 3}
+        provenance = Provenance("analytic", "angles", FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        return Trajectory(self.problem, grid, error, series, provenance, dense=self)
+
+    def _to_body(self, values: Array) -> Array:
+        """Return vectors (N, 3), or columns (N, 3, k), along sorted axes in those of the body."""
+        result = np.empty_like(values)
+        result[:, self._order] = values
+        axes = self.problem.axes
+        return result if axes is None else np.asarray(np.einsum("ij,nj...->ni...", axes, result))
+
+    def _frame(self, gamma: Array, lines: Array, turned: Array) -> Array:
+        """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
+        start = self._to_body(self._motion.attitude(self._motion.angles[None, :]).normals)[0]
+        cosine, sine = np.cos(turned), np.sin(turned)
+        turn = np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
+        rest = lines @ turn @ (start.T @ self.problem.frame[:, 1:])
+        return np.concatenate([gamma[:, :, None], rest], axis=2)
+
+    @cached_property
+    def _steepness(self) -> Array:
+        """Return the largest |∂/∂z_k| of γ, the coordinate lines and, over a cycle, their turning, shape (g,)."""
+        inversion, motion = self._motion.inversion, self._motion
+
+        def moved(z: Array) -> Any:
+            return motion.attitude(inversion.invert(z))
+
+        directions = np.broadcast_to(np.eye(2), (_SAMPLES, 2, 2))
+        by_phase = np.max(np.abs(slopes(moved, self._sample, directions)), axis=(0, 1))
+        here = motion.turning(inversion.invert(self._sample))
+        moves = [motion.turning(inversion.invert(self._sample + _STEP * e)) - here for e in np.eye(2)]
+        turning = [np.max(np.abs(move)) / _STEP for move in moves]
+        per_cycle = np.array(turning) / np.min(np.abs(self._in_tau.rates))
+        return np.asarray(_BETWEEN * (by_phase + per_cycle))
+
+    def _error(self, tau: Array, clock: Clock, panels: PanelIntegral) -> Array:
+        """Return a bound on every component of the frame: rounding, phases times steepness, and the turning integral's own."""
+        rates, elapsed = np.abs(self._in_tau.rates), np.abs(tau)
+        start = _PHASE * DOUBLE.epsilon + self._motion.periods.series_truncation
+        along = _RATE * DOUBLE.epsilon * elapsed + clock.error(tau)
+        phase = start + along[:, None] * rates
+        turning = panels.error(tau) + panels.mean_size * along
+        return np.asarray(_EVALUATION * DOUBLE.epsilon + phase @ self._steepness + turning)
