@@ -1,9 +1,4 @@
-"""One cut or gap of the curve in the elliptic angle of its four nearest branch points.
-
-On [b_1, b_2] with neighbours b_0 < b_1 and b_2 < b_3 (either may be infinite) substitute
-
-    sn²v = (b_2−b_0)(λ−b_1) / ((b_2−b_1)(λ−b_0)),   k² = (b_2−b_1)(b_3−b_0) / ((b_3−b_1)(b_2−b_0)),
-    dλ/√|Π_{0…3}(λ−b_i)| = 2dv/√((b_3−b_1)(b_2−b_0)).
+"""One cut or gap of the curve in the elliptic angle of its four nearest branch points (analytic.four_points).
 
 All other branch points then lie at distance K' from the real v-axis or farther, so sums over ψ = πv/K converge like
 e^(−2πN K'/K) however closely branch points cluster: a closing gap costs log(1/gap).
@@ -20,6 +15,7 @@ import numpy as np
 
 from veselova.analytic.curve import Curve
 from veselova.analytic.elliptic import Jacobi
+from veselova.analytic.four_points import FourPoints
 from veselova.analytic.precision import Values
 
 __all__ = ["Interval"]
@@ -33,53 +29,25 @@ class Interval:
     left: int
 
     @cached_property
-    def _widths(self) -> tuple[Any, Any, Any]:
-        """Return the widths (b_1−b_0, b_2−b_1, b_3−b_2), None for an infinite neighbour."""
+    def points(self) -> FourPoints:
+        """Return the interval with its neighbours b_0 and b_3."""
         d, j, last = self.curve.differences, self.left, 2 * self.curve.genus
-        return d[j - 1, j] if j > 0 else None, d[j, j + 1], d[j + 1, j + 2] if j + 2 <= last else None
+        before, after = d[j - 1, j] if j > 0 else None, d[j + 1, j + 2] if j + 2 <= last else None
+        return FourPoints(self.curve.arithmetic, before, d[j, j + 1], after)
 
-    @cached_property
+    @property
     def jacobi(self) -> Jacobi:
-        """Return the elliptic functions of this interval; k'² is a product of gap widths, never 1−k²."""
-        before, width, after = self._widths
-        if before is None:
-            return Jacobi(self.curve.arithmetic, width / (width + after), after / (width + after))
-        if after is None:
-            return Jacobi(self.curve.arithmetic, width / (width + before), before / (width + before))
-        # Ratios before products: the square of a width of 1e-200 is no float.
-        lower, upper = width + before, width + after
-        return Jacobi(self.curve.arithmetic, (width / lower) * ((before + upper) / upper), (before / lower) * (after / upper))
-
-    @cached_property
-    def density(self) -> Any:
-        """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|)."""
-        before, width, after = self._widths
-        factors = [width + neighbour for neighbour in (before, after) if neighbour is not None]
-        root = math.prod(self.curve.arithmetic.sqrt(factor) for factor in factors)
-        return self.jacobi.quarter / self.curve.arithmetic.pi / root
+        """Return the elliptic functions of this interval."""
+        return self.points.jacobi
 
     def roots(self, psi: Values) -> tuple[Values, Values]:
         """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate relative to itself."""
-        xp, (before, width, _) = self.curve.arithmetic, self._widths
-        sn, cn, _ = self.jacobi(psi)
-        root = xp.sqrt(width)
-        if before is None:
-            return root * sn, root * cn
-        denominator = before + width * cn * cn
-        return root * xp.sqrt(before / denominator) * sn, root * xp.sqrt((width + before) / denominator) * cn
+        return self.points.roots(psi)
 
     def distances(self, psi: Values) -> tuple[Values, Values]:
         """Return λ−b_1 and b_2−λ at angles ψ."""
         below, above = self.roots(psi)
         return below * below, above * above
-
-    def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
-        """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
-        before, _, _ = self._widths
-        # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
-        if before is not None:
-            above = above * (before / (before + self._widths[1]))
-        return below / (below + above), above / (below + above)
 
     def to_branch_points(self, below: Values, above: Values) -> Values:
         """Return |λ−b_i| for all i, shape (..., 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
@@ -92,7 +60,7 @@ class Interval:
         roots = xp.sqrt(self.to_branch_points(below, above))
         nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
         roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
-        return self.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1), roots[:, 2:-1:2] * roots[:, 3::2]
+        return self.points.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1), roots[:, 2:-1:2] * roots[:, 3::2]
 
     @cached_property
     def strip(self) -> float:
@@ -106,7 +74,7 @@ class Interval:
         There |sn²v| = 1/k, so λ, a Möbius function of sn²v, runs on a circle about the interval that meets the real axis
         at sn² = −1/k and 1/k, between b_0 and b_1, and between b_2 and b_3.
         """
-        before, width, _ = self._widths
+        before, width = self.points.before, self.points.width
         square = 1 / self.curve.arithmetic.sqrt(self.jacobi.k_squared)
         if before is None:
             return width * square, width * (square - 1)
@@ -119,7 +87,7 @@ class Interval:
         d, j, zeros, last = self.curve.differences, self.left, self.curve.midpoints, 2 * self.curve.genus
         outside = [d[i, j] - left for i in range(j - 1)] + [d[j + 1, i] - right for i in range(j + 3, last + 1)]
         factors = [max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l])) for l in range(zeros.shape[1])]
-        common = self.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
+        common = self.points.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
         return np.array([common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)], dtype=object)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:

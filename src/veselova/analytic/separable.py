@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class SeparableMotion:
-    """The motion of one start on its torus; angles φ_s as in SeparatedCut, of any sign, increasing in time.
+    """The motion of one start on its torus; elliptic angles φ_s as in SeparatedCut, of any sign, increasing in time.
 
     Raises Unsolved as ``separated_cuts`` does, and where an angle series does not end.
     """
@@ -65,9 +65,9 @@ class SeparableMotion:
         return result
 
     def speeds(self, phi: Array) -> Array:
-        """Return dφ_s/dτ = 2√W_s/Π_{j≠s}|λ_s−λ_j|, shape (N, g)."""
-        roots = np.stack([cut.root(phi[:, s]) for s, cut in enumerate(self.cuts)], axis=1)
-        return np.asarray(2 * roots / np.prod(self.between(phi), axis=2))
+        """Return dφ_s/dτ, from λ_s' = 2√R(λ_s)/Π_{j≠s}|λ_s−λ_j|, shape (N, g)."""
+        rates = np.stack([cut.speed(phi[:, s]) for s, cut in enumerate(self.cuts)], axis=1)
+        return np.asarray(2 * rates / np.prod(self.between(phi), axis=2))
 
     def _offsets(self, phi: Array) -> Array:
         """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
@@ -89,8 +89,7 @@ class SeparableMotion:
         offsets, between = self._offsets(phi), self.between(phi)
         own = np.ones_like(offsets)  # the signed root of |λ_s−I_i| where I_i is an end of cut s
         for i, (s, lower) in self._own.items():
-            half = np.sin(phi[:, s] / 2) if lower else np.cos(phi[:, s] / 2)
-            own[:, s, i] = np.sqrt(self.cuts[s].width) * half
+            own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
         ends = np.array(
             [[self._own.get(i, (-1, True))[0] == s for i in range(self._inverse.size)] for s in range(len(self.cuts))]
         )
@@ -107,14 +106,12 @@ class SeparableMotion:
         return Attitude(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.points(phi))
 
     def _components(self, phi: Array, y_rest: Array) -> Array:
-        """Return (q', m_s) = λ_s'/(2y_s), y_s being y_rest times the half angles of the ends that are I's."""
-        speeds, result = self.speeds(phi), np.empty_like(phi)
+        """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of the ends that are I's."""
+        result, products = np.empty_like(phi), np.prod(self.between(phi), axis=2)
         for s, cut in enumerate(self.cuts):
-            # ½(b−a) sin φ = √(b−a) sin(φ/2) · √(b−a) cos(φ/2): an end that is an I takes its half angle away.
-            root = np.sqrt(cut.width)
-            lower = 1.0 if cut.axes[0] is not None else root * np.sin(phi[:, s] / 2)
-            upper = 1.0 if cut.axes[1] is not None else root * np.cos(phi[:, s] / 2)
-            result[:, s] = lower * upper * speeds[:, s] / (2 * y_rest[:, s])
+            lower, upper = cut.points.roots(phi[:, s])
+            ends = (1.0 if cut.axes[0] is not None else lower) * (1.0 if cut.axes[1] is not None else upper)
+            result[:, s] = ends * cut.outer_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
         return result
 
     def turning(self, phi: Array) -> Array:
@@ -132,13 +129,12 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
     """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)²."""
     if cut.width == 0:
         return 0.0
-    angle = 2 * float(np.arctan2(np.sqrt(max(cut.below, 0.0)), np.sqrt(max(cut.above, 0.0))))
     point, slope = start.spheroconic[s], Fraction(0)
     for x, v, inverse in zip(start.q, start.q_dot, start.inverse, strict=True):
         if point == inverse:
-            return angle
+            return float(cut.points.angle(cut.below, cut.above, True))
         slope += x * v / (point - inverse)
-    return angle if slope >= 0 else -angle
+    return float(cut.points.angle(cut.below, cut.above, slope >= 0))
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.precision import extended
+from veselova.analytic.four_points import FourPoints
+from veselova.analytic.precision import DOUBLE, extended
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import Unsolved
 
@@ -109,10 +111,10 @@ class SeparableStart:
 
 @dataclass(frozen=True)
 class SeparatedCut:
-    """The interval [a, b] on which λ_s moves, R(λ) = (λ−a)(b−λ)W(λ): λ = a + (b−a) sin²(φ/2), dλ/√R = dφ/√W.
+    """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real roots of R next to them.
 
-    lower a · width b−a · left (…) a−r of the real roots r < a · right (…) r−b of those above · pairs (…, 2) a−Re r, Im r of
-    complex ones · leading |leading coefficient of R| · below, above: λ_s−a and b−λ_s at the start
+    lower a · width b−a · left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the nearest first
+    pairs (…, 2) a−Re r, Im r of complex ones · leading |leading coefficient of R| · below, above: λ_s−a and b−λ_s at the start
     axes: the numbers of the I's that are a and b, None where an end is none
     """
 
@@ -126,16 +128,32 @@ class SeparatedCut:
     above: float
     axes: tuple[int | None, int | None]
 
-    def point(self, phi: Array) -> tuple[Array, Array]:
-        """Return λ−a and b−λ at angles φ."""
-        return self.width * np.sin(phi / 2) ** 2, self.width * np.cos(phi / 2) ** 2
+    @cached_property
+    def points(self) -> FourPoints:
+        """Return the cut with its neighbours; λ = 0 is a root, so there always is one below."""
+        return FourPoints(DOUBLE, self.left[-1], self.width, self.right[0] if self.right.size else None)
 
-    def root(self, phi: Array) -> Array:
-        """Return √W at angles φ."""
-        below, above = (x[..., None] for x in self.point(phi))
-        real = np.prod(below + self.left, axis=-1) * np.prod(above + self.right, axis=-1)
+    def point(self, psi: Array) -> tuple[Array, Array]:
+        """Return λ−a and b−λ at angles ψ."""
+        below, above = self.points.roots(psi)
+        return below * below, above * above
+
+    def _factors(self, psi: Array) -> tuple[Array, Array]:
+        """Return |λ−r| for the neighbours, multiplied, and for all other roots."""
+        below, above = (x[..., None] for x in self.point(psi))
+        left, right = below + self.left, above + self.right
+        far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)
         complex_ones = np.prod((below + self.pairs[:, 0]) ** 2 + self.pairs[:, 1] ** 2, axis=-1)
-        return np.asarray(np.sqrt(self.leading * real * complex_ones))
+        return left[..., -1] * (right[..., 0] if self.right.size else 1.0), self.leading * far * complex_ones
+
+    def outer_root(self, psi: Array) -> Array:
+        """Return √(R/((λ−a)(b−λ))) at angles ψ."""
+        near, far = self._factors(psi)
+        return np.asarray(np.sqrt(near * far))
+
+    def speed(self, psi: Array) -> Array:
+        """Return √R dψ/dλ at angles ψ."""
+        return np.asarray(np.sqrt(self._factors(psi)[1]) / (2 * self.points.density))
 
 
 def separated_cuts(start: SeparableStart) -> list[SeparatedCut]:
@@ -180,8 +198,8 @@ def _cut(
     return SeparatedCut(
         lower=float(lower),
         width=float(width),
-        left=np.array([float(lower - x) for x in others if x < lower]),
-        right=np.array([float(x - upper) for x in others if x > upper]),
+        left=np.array([float(lower - x) for x in sorted(others) if x < lower]),
+        right=np.array([float(x - upper) for x in sorted(others) if x > upper]),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),
         leading=abs(float(R[-1])),
         below=float(point - lower),

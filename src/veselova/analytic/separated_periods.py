@@ -49,7 +49,7 @@ class SeparatedPeriods:
         return min(ratios, default=1.0)
 
     def forms(self, s: int, phi: Array) -> Array:
-        """Return ∂z-forms p_k(λ)/(2√W) with their sign on cut s, shape (g, N); p_g = Π(λ−ζ_l), p_k = p_g/(λ−ζ_k), ζ_l mid-gap."""
+        """Return du_k/dψ = ±p_k dλ/(2√R dψ) on cut s, shape (g, N): p_g = Π(λ−ζ_l) with ζ_l mid-gap, p_k = p_g/(λ−ζ_k)."""
         g, cut = self.genus, self.cuts[s]
         below, above = cut.point(phi)
         factors = []
@@ -61,7 +61,7 @@ class SeparatedPeriods:
         one = np.ones_like(phi)
         products = [np.prod([one, *factors[:k], *factors[k + 1 :]], axis=0) for k in range(g - 1)]
         products.append(np.prod([one, *factors], axis=0))
-        return np.asarray((-1) ** (g - s - 1) * np.array(products) / (2 * cut.root(phi)))
+        return np.asarray((-1) ** (g - s - 1) * np.array(products) / (2 * cut.speed(phi)))
 
     @cached_property
     def cut_series(self) -> tuple[Array, ...]:

@@ -33,7 +33,7 @@ def start(spectrum: Spectrum, curve: Curve, enclosed: Spectrum | None = None) ->
     ends = [value for value, _, _ in numbers.branch_points]
     increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
     angles = [
-        _angle(Interval(curve, 2 * s + 1), x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
+        Interval(curve, 2 * s + 1).points.angle(x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
         for s, x in enumerate(numbers.spheroconic)
     ]
     signs = []
@@ -57,20 +57,3 @@ def _direction(spectrum: Spectrum, point: Any) -> bool:
             return True
         slope += q * v / (point - inverse)
     return bool(slope >= 0)
-
-
-def _angle(cut: Interval, below: Any, above: Any, increasing: bool) -> Any:
-    """Return ψ in (−π, π]: v = F(am v, k) = sn·R_F(cn², dn², 1), and −v on the way back."""
-    xp = cut.curve.arithmetic
-    below, above = max(below, 0), max(above, 0)
-    sn_squared, cn_squared = cut.squares(xp.number(below), xp.number(above))
-    jacobi = cut.jacobi
-    dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
-    # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
-    if sn_squared <= cn_squared:
-        v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
-    else:  # sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn
-        reflected = jacobi.complement / dn_squared
-        v = jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))
-    psi = xp.pi * v / jacobi.quarter
-    return psi if increasing else -psi

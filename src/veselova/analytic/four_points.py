@@ -1,0 +1,79 @@
+"""An interval in the elliptic angle of its ends and of one further point on either side.
+
+On [b_1, b_2] with b_0 < b_1 and b_2 < b_3 (either may be infinite) substitute
+
+    sn²v = (b_2−b_0)(λ−b_1) / ((b_2−b_1)(λ−b_0)),   k² = (b_2−b_1)(b_3−b_0) / ((b_3−b_1)(b_2−b_0)),
+    dλ/√|Π_{0…3}(λ−b_i)| = 2dv/√((b_3−b_1)(b_2−b_0)),   ψ = πv/K.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from veselova.analytic.elliptic import Jacobi
+from veselova.analytic.precision import Arithmetic, Values
+
+__all__ = ["FourPoints"]
+
+
+@dataclass(frozen=True)
+class FourPoints:
+    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for both."""
+
+    arithmetic: Arithmetic
+    before: Any
+    width: Any
+    after: Any
+
+    @cached_property
+    def jacobi(self) -> Jacobi:
+        """Return the elliptic functions; k'² is a product of gap widths, never 1−k²."""
+        before, width, after = self.before, self.width, self.after
+        if before is None:
+            return Jacobi(self.arithmetic, width / (width + after), after / (width + after))
+        if after is None:
+            return Jacobi(self.arithmetic, width / (width + before), before / (width + before))
+        # Ratios before products: the square of a width of 1e-200 is no float.
+        lower, upper = width + before, width + after
+        return Jacobi(self.arithmetic, (width / lower) * ((before + upper) / upper), (before / lower) * (after / upper))
+
+    @cached_property
+    def density(self) -> Any:
+        """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|)."""
+        factors = [self.width + neighbour for neighbour in (self.before, self.after) if neighbour is not None]
+        root = math.prod(self.arithmetic.sqrt(factor) for factor in factors)
+        return self.jacobi.quarter / self.arithmetic.pi / root
+
+    def roots(self, psi: Values) -> tuple[Values, Values]:
+        """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate relative to itself."""
+        xp, before, width = self.arithmetic, self.before, self.width
+        sn, cn, _ = self.jacobi(psi)
+        root = xp.sqrt(width)
+        if before is None:
+            return root * sn, root * cn
+        denominator = before + width * cn * cn
+        return root * xp.sqrt(before / denominator) * sn, root * xp.sqrt((width + before) / denominator) * cn
+
+    def _squares(self, below: Any, above: Any) -> tuple[Any, Any]:
+        """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
+        # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
+        if self.before is not None:
+            above = above * (self.before / (self.before + self.width))
+        return below / (below + above), above / (below + above)
+
+    def angle(self, below: Any, above: Any, increasing: bool) -> Any:
+        """Return ψ in (−π, π] of such a point, on the way back negative: v = F(am v, k) = sn·R_F(cn², dn², 1)."""
+        xp, jacobi = self.arithmetic, self.jacobi
+        sn_squared, cn_squared = self._squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
+        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
+        # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
+        if sn_squared <= cn_squared:
+            v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
+        else:  # sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn
+            reflected = jacobi.complement / dn_squared
+            v = jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))
+        psi = xp.pi * v / jacobi.quarter
+        return psi if increasing else -psi

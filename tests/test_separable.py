@@ -1,0 +1,133 @@
+"""Separable potentials in closed form: the family (3.5) on T SO(3), against integration and exact identities."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from veselova import InvalidInput, Unsolved, VeselovaSO3, solve
+from veselova.analytic.separable import SeparableMotion, SeparatedRate
+from veselova.analytic.separated_curve import SeparableStart
+
+Generator = np.random.Generator
+
+TIMES = np.array([-20.0, -3.0, 0.0, 0.4, 5.0, 20.0])
+
+POTENTIALS: dict[str, Any] = {
+    "none": None,
+    "clebsch": {"clebsch": 0.5},
+    "clebsch-attracting": {"clebsch": -2.0},
+    "quartic": {"family": [0.3, 0, 0, 0, 0]},
+    "walls": {"family": [0, 0, 0.1, 0.05, 0.1]},
+    "one-wall": {"family": [0, 0, 0, 0.1, 0]},
+    "all": {"family": [-0.2, 0.5, "0.02", 0.05, 0.1]},
+    "sum": {"clebsch": "1/3", "family": [0.1, 0, 0, 0.3, 0]},
+}
+
+
+def drawn(rng: Generator, potential: Any, inertia: Any = None) -> VeselovaSO3:
+    moments = rng.uniform(0.3, 2, 3) if inertia is None else inertia
+    gamma = rng.normal(size=3)
+    gamma /= np.linalg.norm(gamma)
+    Omega = rng.normal(size=3)
+    return VeselovaSO3(moments, gamma, Omega - (Omega @ gamma) * gamma, potential)
+
+
+def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
+    closed, found = solve(problem, times, "analytic"), solve(problem, times, "numeric", "taylor")
+    difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
+    assert np.all(difference <= closed.error + found.error)
+    return closed
+
+
+@pytest.mark.parametrize("name", sorted(POTENTIALS))
+def test_the_closed_form_agrees_with_integration(name: str, rng: Generator) -> None:
+    for _ in range(4):
+        closed = agreement(drawn(rng, POTENTIALS[name]))
+        assert np.max(closed.error) < 1e-9
+        assert max(value for key, value in closed.drift.items() if key != "multiplier") < 1e-12
+
+
+def test_tensors_equal_moments_and_special_starts_are_served(rng: Generator) -> None:
+    gamma = np.array([0.6, 0.48, 0.64])
+    across = np.cross(gamma, [0.1, 0.5, 0.2])
+    tensor = [[1, 0.1, 0.05], [0.1, 1.5, 0.2], [0.05, 0.2, 0.7]]
+    agreement(VeselovaSO3(tensor, gamma, across, {"clebsch": 0.5}))
+    agreement(VeselovaSO3([1, 1, 2], gamma, across, {"clebsch": 0.5}))
+    agreement(VeselovaSO3([2, "1/2", 1], gamma, [0, 0, 0], {"clebsch": 0.5}))  # starts at rest: every coordinate turns
+    agreement(VeselovaSO3([0.5, 1, 2], [1, 0, 0], [0, 0.3, 0.5], {"clebsch": 0.5}))  # through an axis
+    agreement(VeselovaSO3([0.5, 1, 2], gamma, across, {"family": [0, 0, 1e-6, 0, 0]}))  # a wall that is nearly reached
+
+
+def test_far_away_the_closed_form_keeps_its_digits(rng: Generator) -> None:
+    problem = VeselovaSO3([0.5, 1, 2], [0.6, 0.48, 0.64], np.cross([0.6, 0.48, 0.64], [0.1, 0.5, 0.2]), POTENTIALS["all"])
+    closed = agreement(problem, np.array([1000.0, 3000.0]))
+    assert closed.provenance.details["clock"] == "fourier"
+    assert np.max(closed.error) < 1e-9
+
+
+def test_without_a_potential_it_is_the_rank_one_problem(rng: Generator) -> None:
+    problem = drawn(rng, None)
+    ours, theirs = solve(problem, TIMES, "analytic"), solve(problem.rank_one(), TIMES)
+    assert np.allclose(ours.frame, theirs.frame, atol=np.max(ours.error + theirs.error))
+    assert np.max(np.abs(ours.frame - theirs.frame)) < 1e-12
+
+
+def test_a_body_at_rest_in_a_critical_point_stays() -> None:
+    found = solve(VeselovaSO3([1, 2, 3], [1, 0, 0], [0, 0, 0], {"clebsch": 1.0}), TIMES, "analytic")
+    assert np.array_equal(found.gamma, np.tile([1.0, 0, 0], (TIMES.size, 1)))
+
+
+@pytest.mark.parametrize(
+    ("fields", "outcome"),
+    [
+        ({"Omega": [0.3, 0.1, 0.2]}, "not-separable"),
+        ({"potential": {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0]}]}}, "not-separable"),
+        ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),
+        ({"gamma": [0.6, 0, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}}, "separatrix"),
+    ],
+)
+def test_what_has_no_closed_form_is_a_named_outcome(fields: dict[str, Any], outcome: str) -> None:
+    gamma = np.array([0.6, 0.48, 0.64])
+    data = {"inertia": [0.5, 1, 2], "gamma": gamma, "Omega": np.cross(gamma, [0.1, 0.5, 0.2]), **fields}
+    with pytest.raises(Unsolved) as caught:
+        solve(VeselovaSO3(**data), TIMES, "analytic")
+    assert caught.value.outcome == outcome
+
+
+def test_methods_and_digits_that_it_has_not_are_refused(rng: Generator) -> None:
+    problem = drawn(rng, None)
+    for options, field in (({"method": "theta"}, "method"), ({"digits": 30}, "digits"), ({"certified": True}, "digits")):
+        with pytest.raises(InvalidInput) as caught:
+            solve(problem, TIMES, "analytic", **options)  # type: ignore[arg-type]
+        assert caught.value.field == field
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
+    """Position and velocity at the start, orthogonal coordinate lines, and q' as a difference along the torus."""
+    inverse = tuple(sorted(Fraction(int(x), 1000) for x in rng.choice(np.arange(300, 2000), n, replace=False)))
+    q = [Fraction(int(x), 1000) for x in rng.integers(200, 900, n)]
+    v = [Fraction(int(x), 1000) for x in rng.integers(-900, 900, n)]
+    along = sum(a * b for a, b in zip(q, v, strict=True)) / sum(a * a for a in q)
+    v = [b - along * a for a, b in zip(q, v, strict=True)]
+    walls = tuple(Fraction(int(x), 100) for x in rng.integers(0, 3, n))
+    polynomial = tuple(Fraction(0) for _ in range(n - 1)) + (Fraction(-1, 3),)
+    start = SeparableStart(inverse, tuple(q), tuple(v), polynomial, walls)
+    motion = SeparableMotion(start)
+    at = motion.attitude(motion.angles[None])
+    length = np.sqrt(float(sum(x * x for x in q)))
+    assert np.allclose(at.q[0], np.array([float(x) for x in q]) / length, atol=1e-13)
+    frame = np.column_stack([at.q[0], at.normals[0]])
+    assert np.allclose(frame.T @ frame, np.eye(n), atol=1e-12)
+    rate = SeparatedRate(motion).at(motion.angles[None])[0]
+    assert np.allclose(at.normals[0] @ at.components[0] / rate, np.array([float(x) for x in v]) / length, atol=1e-12)
+    # dq/dτ along the linear flow on the torus is q' itself: the whole inversion at once.
+    origin, step = motion.inversion.map(motion.angles[None])[0], 1e-5
+    z = origin + np.array([[0.7 - step], [0.7], [0.7 + step]]) * motion.periods.frequencies
+    along_flow = motion.attitude(motion.inversion.invert(z))
+    difference = (along_flow.q[2] - along_flow.q[0]) / (2 * step)
+    assert np.allclose(difference, along_flow.normals[1] @ along_flow.components[1], atol=1e-8)
