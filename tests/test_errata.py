@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from draws import random_problem
-from veselova import EllipsoidGeodesic, solve
+from veselova import EllipsoidGeodesic, EulerPoisson, VeselovaSO3, solve
 from veselova.analytic.solution import Solution
 from veselova.mechanics import integrals
 from veselova.mechanics.moser import lax_matrix, lax_partner
@@ -122,3 +122,83 @@ def test_mosers_parameter_runs_along_the_geodesic(rng: np.random.Generator) -> N
     commutator = middle @ B - B @ middle
     assert np.allclose(rate, commutator, atol=1e-6)
     assert np.max(np.abs(rate + commutator)) > 1e-2
+
+
+def rate_along(problem: Any, function: Any) -> float:
+    """The derivative of a function of (Ω, γ) along the field of a body in units of order one, by a complex step."""
+    flow = problem.flow()
+    rate = flow.vector_field(0.0, flow.initial) / flow.time_unit
+    Omega = problem.Omega + 1e-100j * rate[:3] / flow.time_unit
+    gamma = problem.gamma + 1e-100j * rate[3::3]
+    return float(np.imag(function(Omega, gamma)) / 1e-100)
+
+
+@pytest.mark.parametrize("member", range(5))
+def test_the_integral_of_3_5_has_the_square_of_the_momentum_and_its_moments_exchanged(
+    member: int, rng: np.random.Generator
+) -> None:
+    I, alpha, det = np.array([1.0, 1.7, 2.6]), np.eye(5)[member], 1.7 * 2.6
+    gamma = np.array([0.48, 0.6, 0.64])
+    problem = VeselovaSO3(I, gamma, np.cross(gamma, rng.normal(size=3)), {"family": alpha})
+
+    def integral(Omega: Any, gamma: Any, kinetic: Any, first: int, second: int) -> Any:
+        form, inverse, sq = gamma**2 @ I, gamma**2 @ (1 / I), gamma**2
+        F = kinetic - (I * Omega @ gamma) ** 2 / 2 + det * inverse * (alpha[0] * form - alpha[1])
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            pair = (I[j], I[k])
+            F = F + alpha[2 + i] * (pair[first] * sq[j] + pair[second] * sq[k]) / sq[i]
+        return F
+
+    def square(Omega: Any) -> Any:
+        return (I * Omega) @ (I * Omega) / 2
+
+    assert abs(rate_along(problem, lambda W, g: integral(W, g, square(W), 1, 0))) < 1e-13
+    assert abs(rate_along(problem, lambda W, g: integral(W, g, I * W @ W / 2, 1, 0))) > 1e-3  # as printed, (𝓘Ω,Ω)
+    if member >= 2:
+        assert abs(rate_along(problem, lambda W, g: integral(W, g, square(W), 0, 1))) > 1e-3  # as printed, I₂γ₂² + I₃γ₃²
+
+
+def test_the_condition_of_the_duality_lemma_has_the_vector_product_inside(rng: np.random.Generator) -> None:
+    """[γ×F_γ + 𝓘(V_γ×γ)]×γ = 0 for the Clebsch potential and its F; the printed 𝓘(V_γ)×γ leaves a remainder."""
+    I, gamma = np.array([1.0, 1.7, 2.6]), np.array([0.48, 0.6, 0.64])
+    V_slope, F_slope = 2 * I * gamma, -2 * np.prod(I) * gamma / I
+    problem = VeselovaSO3(I, gamma, np.cross(gamma, rng.normal(size=3)), {"clebsch": 1})
+    F = rate_along(problem, lambda W, g: (I * W) @ (I * W) / 2 - (I * W @ g) ** 2 / 2 - np.prod(I) * g**2 @ (1 / I))
+    assert abs(F) < 1e-13
+    assert np.allclose(np.cross(np.cross(gamma, F_slope) + I * np.cross(V_slope, gamma), gamma), 0, atol=1e-14)
+    assert np.max(np.abs(np.cross(np.cross(gamma, F_slope) + np.cross(I * V_slope, gamma), gamma))) > 0.1
+
+
+def test_the_geodesic_integral_has_the_square_of_the_momentum(rng: np.random.Generator) -> None:
+    """With dq/dτ for q̇ it is F_2, which is kept; the printed (𝓘Ω,Ω) for (𝓘Ω,𝓘Ω) is not."""
+    I, gamma = np.array([1.0, 1.7, 2.6]), np.array([0.48, 0.6, 0.64])
+    problem = VeselovaSO3(I, gamma, np.cross(gamma, rng.normal(size=3)))
+    along = lambda W, g: (I * W @ g) ** 2  # noqa: E731
+    assert abs(rate_along(problem, lambda W, g: ((I * W) @ (I * W) - along(W, g)) / 2)) < 1e-13
+    assert abs(rate_along(problem, lambda W, g: (I * W @ W - along(W, g)) / 2)) > 1e-3
+
+
+def test_the_energy_of_the_euler_poisson_equations_has_their_own_potential(rng: np.random.Generator) -> None:
+    """f_1 = ½(𝒥Ω,Ω) + 𝒱; the printed V is the potential of the dual system."""
+    I, gamma = np.array([1.0, 1.7, 2.6]), np.array([0.48, 0.6, 0.64])
+    problem = EulerPoisson(1 / I, gamma, rng.normal(size=3), {"family": [0, 1, 0, 0, 0]})
+
+    def energy(Omega: Any, gamma: Any, potential: Any) -> Any:
+        return (Omega / I) @ Omega / 2 + potential(gamma)
+
+    assert abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: -np.prod(I) * x**2 @ (1 / I)))) < 1e-13
+    assert abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: x**2 @ I))) > 1e-3
+
+
+def test_omega_is_minus_epsilon_times_the_angular_velocity(rng: np.random.Generator) -> None:
+    """γ̇ = γ×Ω is (Po), γ̇ = −ωγ, with ω_ij = −ε_ijk Ω_k, and then q∧q̇ is q̇×q; printed without the sign."""
+    Omega, gamma = rng.normal(size=3), rng.normal(size=3)
+    a, b, c = Omega
+    printed = np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
+    corrected = -1 * printed
+    assert np.allclose(-corrected @ gamma, np.cross(gamma, Omega))
+    assert not np.allclose(-printed @ gamma, np.cross(gamma, Omega))
+    q, q_dot = gamma, Omega
+    x, y, z = np.cross(q_dot, q)
+    assert np.allclose(np.outer(q, q_dot) - np.outer(q_dot, q), -np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]]))

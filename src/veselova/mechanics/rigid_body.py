@@ -125,14 +125,11 @@ class RigidBody(Problem):
     def flow(self, formulation: str = "multiplier") -> RigidBodyFlow:
         """Return the field in units of this problem; ``momentum`` is the formulation by the momentum in space."""
         _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
-        rate, V = self.turning, self.potential
-        unit_of_energy = float(np.ldexp(rate, power) * rate)
-        companion = V.companion if self.linear == 0 or V.unconditional else None
+        rate = self.turning
         return RigidBodyFlow(
             inertia=np.ldexp(self.inertia, -power),
             inverse=np.ldexp(self.inverse, power),
-            potential=V.terms.times(1 / unit_of_energy),
-            companion=None if companion is None else companion.times(float(np.ldexp(1 / unit_of_energy, -power))),
+            potential=self.potential.terms.times(float(np.ldexp(1 / rate, -power)) / rate),
             Omega=self.Omega / rate,
             frame=self.frame,
             time_unit=1 / rate,

@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 #: roundings of the time, and the rest of the way does not show in the seven digits of the time that is named.
 _LEFT = 1e-8
 
-#: Invariants whose gradients turn into each other by less than this (near steady rotations, at rest) are not restored separately:
-#: the step would be their defect divided by it.
-_PARALLEL = 1e-2
+#: Constants whose gradients turn into each other by less than this (near steady rotations, at rest) are not restored separately:
+#: the step, their defect divided by it, would do more harm than good.
+_PARALLEL = 0.1
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,6 @@ class RigidBodyFlow(Flow):
     """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E = [e_1 e_2 e_3], e_1 = γ.
 
     inertia, inverse  the tensor and its inverse, (3, 3) · potential  V(γ) · Omega, frame  the start, all in scaled units
-    companion    F(γ) where ½(𝔪,𝔪) + F is an integral of this motion, else None
     constrained  whether a multiplier λγ keeps (Ω,γ) constant
     spatial      states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of (Ω, E): with V = 0 the
                  equation is one of first order on the group alone, and in any potential m_1 = (𝔪,γ) does not move
@@ -44,7 +43,6 @@ class RigidBodyFlow(Flow):
     inertia: Array
     inverse: Array
     potential: LaurentPolynomial
-    companion: LaurentPolynomial | None
     Omega: Array
     frame: Array
     time_unit: float
@@ -95,8 +93,9 @@ class RigidBodyFlow(Flow):
     def project(self, state: Array) -> Array:
         """Return states (..., 12) with orthonormal frames; where they hold Ω, also with the constants of the start.
 
-        These are (Ω,γ) (free: (𝓘Ω,γ)), the energy and ½(𝔪,𝔪) + F, restored by the shortest step in Ω and the attitude. With the
-        momentum in space the constraint holds by itself, and the others are left as a check.
+        These are (Ω,γ) (free: (𝓘Ω,γ)) and the energy, restored by the shortest step in Ω and the attitude. With the momentum in
+        space the constraint holds by itself, and the energy is left as a check. The additional integral is always left: near
+        separatrices it hardly differs from the energy, and restoring it cost a digit there.
         """
         first, E = state[..., :3], orthonormalized(_frames(state))
         if not self.spatial:
@@ -114,25 +113,20 @@ class RigidBodyFlow(Flow):
         return self._constants(self.Omega, self.frame)[0]
 
     def _constants(self, Omega: Array, E: Array) -> tuple[Array, Array]:
-        """Return the constants (..., k) and their derivatives by Ω and by a rotation x → x + x×δ of the frame, (..., k, 6)."""
+        """Return the constants (..., 2) and their derivatives by Ω and by a rotation x → x + x×δ of the frame, (..., 2, 6)."""
         gamma, M, across = E[..., 0], Omega @ self.inertia, E[..., 0] @ self.inertia
-        m = momentum(self.inertia, Omega, gamma, self.constrained)
-        kinetic, square = _dot(Omega, M) / 2, _dot(m, m) / 2
+        energy, by_Omega, by_gamma = _dot(Omega, M) / 2 + self.potential.value(gamma), M, self.potential.gradient(gamma)
         if self.constrained:
-            along, linear, lead, excess = _dot(M, gamma), _dot(Omega, gamma), _dot(m, gamma), _dot(M - Omega, gamma)
-            rows = [
-                (linear, gamma, Omega),
-                (kinetic - linear * along, M - _by(along, gamma) - _by(linear, across), -_by(along, Omega) - _by(linear, M)),
-                (square, m @ self.inertia - _by(lead, across - gamma), -_by(lead, M - Omega) - _by(excess, m)),
-            ]
+            linear, along = _dot(Omega, gamma), _dot(M, gamma)
+            energy = energy - linear * along
+            by_Omega = by_Omega - _by(along, gamma) - _by(linear, across)
+            by_gamma = by_gamma - _by(along, Omega) - _by(linear, M)
+            rows = [(gamma, Omega), (by_Omega, by_gamma)]
         else:
-            rows = [(_dot(M, gamma), across, M), (kinetic, M, 0 * M), (square, m @ self.inertia, 0 * M)]
-        functions = [None, self.potential, self.companion]
-        kept = [(row, f) for i, (row, f) in enumerate(zip(rows, functions, strict=True)) if i == 0 or f is not None]
-        values = [row[0] if f is None else row[0] + f.value(gamma) for row, f in kept]
-        by_gamma = [row[2] if f is None else row[2] + f.gradient(gamma) for row, f in kept]
-        slopes = [np.concatenate([row[1], np.cross(force, gamma)], axis=-1) for (row, _), force in zip(kept, by_gamma)]
-        return np.stack(values, axis=-1), np.stack(slopes, axis=-2)
+            linear = _dot(M, gamma)
+            rows = [(across, M), (by_Omega, by_gamma)]
+        slopes = [np.concatenate([row, np.cross(force, gamma)], axis=-1) for row, force in rows]
+        return np.stack([linear, energy], axis=-1), np.stack(slopes, axis=-2)
 
     def _on_constraint(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω with the start's value of the linear constant, to the last bit."""
