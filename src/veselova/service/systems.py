@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.stiefel import StiefelFlow
 from veselova.mechanics.veselova import Veselova
 
 __all__ = ["SYSTEMS", "ProblemModel", "Request", "Times"]
@@ -32,9 +33,19 @@ _UNIFORM = {
 }
 _TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
 
+_COLUMNS = {"type": "array", "items": {"type": "array", "items": _NUMBER, "minItems": 1}, "minItems": 2}
+_BODY_INERTIA = {
+    "anyOf": [
+        {"type": "object", "properties": {name: form}, "required": [name], "additionalProperties": False}
+        for name, form in (("special", _VECTOR), ("matrix", _COLUMNS))
+    ]
+}
+
 Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
 Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
 Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
+Columns = Annotated[Any, WithJsonSchema(_COLUMNS)]
+BodyInertia = Annotated[Any, WithJsonSchema(_BODY_INERTIA)]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
 
@@ -95,7 +106,27 @@ class NeumannModel(SystemModel):
     normalize: Annotated[bool, Field(description="scale q to unit length and project q_prime on its tangent space first")] = False
 
 
-#: The systems, by the name that tells them apart.
-SYSTEMS: Mapping[str, type[SystemModel]] = {"veselova": VeselovaModel, "neumann": NeumannModel}
+class StiefelModel(SystemModel):
+    """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the constraints of rank r."""
 
-ProblemModel = Annotated[VeselovaModel | NeumannModel, Field(discriminator="system")]
+    problem_class: ClassVar[type[Problem]] = StiefelFlow
+    measured: ClassVar[str] = "X"
+
+    system: Literal["stiefel"]
+    inertia: Annotated[
+        BodyInertia,
+        Field(
+            description='{"special": n positive numbers A} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …}, symmetric '
+            "and positive definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order"
+        ),
+    ]
+    X: Annotated[Columns, Field(description="n rows of r numbers, the columns e_1 … e_r orthonormal; 1 ≤ r ≤ n")]
+    P: Annotated[Columns, Field(description="its momentum, n rows of r numbers, XᵀP skew; either this or X_dot")] = None
+    X_dot: Annotated[Columns, Field(description="its velocity, n rows of r numbers, XᵀẊ skew; either this or P")] = None
+    normalize: Annotated[bool, Field(description="make X orthonormal and project P or X_dot on its tangent space first")] = False
+
+
+#: The systems, by the name that tells them apart.
+SYSTEMS: Mapping[str, type[SystemModel]] = {"veselova": VeselovaModel, "neumann": NeumannModel, "stiefel": StiefelModel}
+
+ProblemModel = Annotated[VeselovaModel | NeumannModel | StiefelModel, Field(discriminator="system")]
