@@ -151,20 +151,6 @@ def test_traces_are_those_of_the_matrix_polynomial(n: int, r: int, rng: np.rando
     assert np.allclose(powers, [2 * (-1) ** k * np.sum(ad_invariants(momentum) ** (2 * k)) for k in range(1, 4)])
 
 
-@pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_symplectic_leaf_has_twice_the_dimension_of_the_stiefel_variety(n: int, r: int, rng: np.random.Generator) -> None:
-    """The coadjoint orbit of so(n) ⋉ (Rⁿ)^r through (Φ*, e_1 … e_r): δ𝓜 = [𝓜,ξ] + Σ e_k∧a_k, δe = −ξe."""
-    X = random_columns(rng, n, r)
-    momentum = momentum_map(X, tangent_part(X, rng.normal(size=(n, r))))
-    moves = []
-    for c in np.eye(n * (n - 1) // 2):
-        xi = skew(c, n)
-        moves.append(np.concatenate([coefficients(momentum @ xi - xi @ momentum), (-xi @ X).ravel()]))
-    for k in range(r):
-        moves += [np.concatenate([coefficients(wedge(X[:, k], a)), np.zeros(n * r)]) for a in np.eye(n)]
-    assert np.linalg.matrix_rank(np.array(moves), tol=1e-9) == 2 * dimension(n, r)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), (4, 2), (5, 3), (6, 4)])
 def test_both_formulations_keep_the_integrals_and_agree(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
