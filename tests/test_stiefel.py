@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,9 @@ from veselova.mechanics.stiefel_geometry import (
     tangent_part,
     trace_integrals,
 )
+from veselova.service.documents import trajectory_of
 from veselova.service.systems import SYSTEMS
+from veselova.service.tasks import answer
 
 RANKS = [(n, r) for n in range(2, 6) for r in range(1, n + 1)]
 SLACK = 2.0
@@ -272,6 +275,20 @@ def test_the_json_of_a_problem_gives_the_problem_back(rng: np.random.Generator) 
         assert np.array_equal(again.start["P"], problem.start["P"])
         assert "stiefel, n = 3, r = 2" in problem.title
         assert "StiefelFlow(X=" in repr(problem)
+
+
+def test_the_service_answers_and_its_answer_is_the_trajectory() -> None:
+    problem = {"system": "stiefel", "inertia": A, "X": X, "P": P}
+    request = {"problem": problem, "times": [0, 1.5], "outputs": ["X", "P", "omega"], "formulation": "momentum"}
+    document = json.loads(answer("trajectory", request))
+    direct = solve(StiefelFlow(A, X, P), [0, 1.5], formulation="momentum")
+    again = trajectory_of(StiefelFlow(A, X, P), document)
+    for name in ("X", "P", "omega"):
+        assert np.array_equal(again.series(name), direct.series(name))
+        assert np.array_equal(document["series"][name], direct.series(name))
+    assert set(document["integrals"]) == {"energy", "X_X", "X_P", "P_P", "traces", "invariants"}
+    assert {"X_1_1", "P_3_2", "omega_1_3"} < set(direct.columns())
+    assert len(direct.plot().axes) == 2
 
 
 X = [[1, 0], [0, 1], [0, 0]]
