@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 
 from draws import random_problem
+from stiefel_chart import Chart, slopes
+from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, VeselovaSO3, solve
 from veselova.analytic.solution import Solution
-from veselova.mechanics import integrals
+from veselova.mechanics import integrals, rank_one
+from veselova.mechanics.body_inertia import body_inertia, coefficients, skew
 from veselova.mechanics.moser import lax_matrix, lax_partner
+from veselova.mechanics.multiplier import ChaplyginMultiplier
 from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.stiefel_geometry import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
 
 
 @pytest.mark.parametrize("N", range(2, 7))
@@ -202,3 +207,85 @@ def test_omega_is_minus_epsilon_times_the_angular_velocity(rng: np.random.Genera
     q, q_dot = gamma, Omega
     x, y, z = np.cross(q_dot, q)
     assert np.allclose(np.outer(q, q_dot) - np.outer(q_dot, q), -np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]]))
+
+
+@pytest.mark.parametrize("n", range(2, 6))
+def test_the_dirac_bracket_subtracts_its_second_term(n: int, rng: np.random.Generator) -> None:
+    """With the printed plus sign φ₁ = (q,q) and φ₂ = (q,p) are no Casimir functions."""
+    q, p = rng.normal(size=n), rng.normal(size=n)
+    standard = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
+    corrected = rank_one.dirac_tensor(q, p)
+    printed = 2 * standard - corrected
+    for gradient in (np.concatenate([2 * q, 0 * q]), np.concatenate([p, q])):
+        assert np.allclose(corrected @ gradient, 0, atol=1e-13)
+        assert np.linalg.norm(printed @ gradient) > 1.0
+
+
+@pytest.mark.parametrize("n", range(2, 6))
+def test_the_force_of_the_bracket_form_is_orthogonal_to_q(n: int, rng: np.random.Generator) -> None:
+    """ṗ = {p,Ĥ}_* − π̂ as printed does not keep (q,p): its derivative is −(q,π̂) = −2h. Without that part it is (extended)."""
+    problem = random_problem(rng, n, 5.0)
+    A, q = problem.A, problem.q
+    p = integrals.momentum(A, q, problem.q_dot)
+    q_dot, corrected = rank_one.bracket_field(A, q, p)
+    printed = corrected - (q @ rank_one.nonholonomic_force(A, q, q_dot)) * q
+    assert np.isclose(q_dot @ p + q @ corrected, 0, atol=1e-12 * problem.energy)
+    assert np.isclose(q_dot @ p + q @ printed, -2 * problem.energy, rtol=1e-10)
+    assert np.allclose(corrected, rank_one.extended_field(A, q, p)[1], rtol=1e-10, atol=1e-13 * np.max(np.abs(p)))
+
+
+@pytest.mark.parametrize(("n", "r"), [(3, 2), (4, 2), (5, 3), (4, 4)])
+def test_mom_has_no_third_term_for_the_momentum_that_is_defined(n: int, r: int, rng: np.random.Generator) -> None:
+    """P = ∂L/∂Ẋ by differences, as (dotX->P) defines it; pr_𝓓 𝓘ω = XPᵀ − PXᵀ. For r = 1 both forms agree."""
+    inertia, X = body_inertia(random_inertia(rng, n, "matrix"), n), random_columns(rng, n, r)
+    X_dot = tangent_part(X, rng.normal(size=(n, r)))
+
+    def lagrangian(velocity: Any) -> float:
+        omega = angular_velocity(X, velocity)
+        return float(product(inertia.apply(omega), omega)) / 2
+
+    units = np.eye(n * r).reshape(-1, n, r)
+    P = np.reshape([(lagrangian(X_dot + e) - lagrangian(X_dot - e)) / 2 for e in units], (n, r))
+    true = admissible_part(X, inertia.apply(angular_velocity(X, X_dot)))
+    assert np.allclose(X.T @ P + P.T @ X, 0, atol=1e-12)
+    assert np.allclose(momentum_map(X, P), true, atol=1e-12)
+    printed = momentum_map(X, P) + X @ (X.T @ P - P.T @ X) @ X.T / 2
+    assert not np.allclose(printed, true, atol=1e-3)
+    of_normal_metric = P + X @ X.T @ P
+    printed = angular_velocity(X, of_normal_metric)
+    assert np.allclose(printed, true, atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "r"), [(n, r) for n in range(2, 6) for r in range(1, n + 1)])
+def test_the_symplectic_leaf_has_twice_the_dimension_of_the_stiefel_variety(n: int, r: int, rng: np.random.Generator) -> None:
+    """The coadjoint orbit of so(n) ⋉ (Rⁿ)^r through (Φ*, e_1 … e_r): δ𝓜 = [𝓜,ξ] + Σ e_k∧a_k, δe = −ξe. It is 2N."""
+    X = random_columns(rng, n, r)
+    momentum = momentum_map(X, tangent_part(X, rng.normal(size=(n, r))))
+    turned = [np.concatenate([coefficients(momentum @ xi - xi @ momentum), (-xi @ X).ravel()]) for xi in _basis(n)]
+    moved = [np.concatenate([coefficients(np.outer(e, a) - np.outer(a, e)), np.zeros(n * r)]) for e in X.T for a in np.eye(n)]
+    rank = np.linalg.matrix_rank(np.array(turned + moved), tol=1e-9)
+    assert rank == 2 * dimension(n, r)
+    assert rank != r * n - r * (r + 1) // 2
+
+
+def _basis(n: int) -> Any:
+    return skew(np.eye(n * (n - 1) // 2), n)
+
+
+def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(rng: np.random.Generator) -> None:
+    """ṗ = −∇H* − 𝒩⁻¹(∇𝒩,Gp)p with H* = ½𝒩⁻²(Gp̃,p̃), on the rank-one flow of Theorem main in canonical coordinates."""
+    inertia: Any = body_inertia({"special": [1.0, 2.0, 1.0, 0.5]}, 4)  # det A = 1: the units are those of the operator
+    chart, multiplier = Chart(inertia, random_columns(rng, 4, 1)), ChaplyginMultiplier(inertia, 1)
+    N, z = chart.N, rng.normal(size=6) * np.array([0.3] * 3 + [1.0] * 3)
+    u, p = z[:N], z[N:]
+    rate = multiplier.value(chart.point(u)[0])
+
+    def gradient(power: int) -> Any:
+        """∇_q of 𝒩^power·H(q,p̃) at fixed p̃ = 𝒩p."""
+        return slopes(lambda y: multiplier.value(chart.point(y)[0]) ** power * chart.hamiltonian(y, rate * p), u)
+
+    u_dot, p_dot = np.split(chart.field(z), [N])
+    growth = slopes(lambda y: np.log(multiplier.value(chart.point(y)[0])), u) @ u_dot
+    assert np.allclose(p_dot, -gradient(-2) - growth * p, atol=1e-7)
+    assert not np.allclose(p_dot, -gradient(-2) - rate * growth * p, atol=1e-3)
+    assert not np.allclose(p_dot, -gradient(2) - growth * p, atol=1e-3)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.errors import VeselovaError as VeselovaError
     from veselova.mechanics.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
+    from veselova.mechanics.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.torus import Torus as Torus
     from veselova.mechanics.trajectory import Provenance as Provenance
     from veselova.mechanics.trajectory import Trajectory as Trajectory
@@ -56,6 +57,7 @@ _HOMES = {
     "Provenance": "veselova.mechanics.trajectory",
     "ServiceError": "veselova.mechanics.errors",
     "ServiceUnreachable": "veselova.mechanics.errors",
+    "StiefelFlow": "veselova.mechanics.stiefel",
     "Torus": "veselova.mechanics.torus",
     "Trajectory": "veselova.mechanics.trajectory",
     "Unsolved": "veselova.mechanics.errors",

@@ -18,22 +18,27 @@ from numpy.typing import NDArray
 
 from veselova.analytic.four_points import FourPoints
 from veselova.analytic.precision import DOUBLE, extended
+from veselova.analytic.rational_polynomial import (
+    NEAR,
+    Polynomial,
+    monic,
+    product,
+    quotient,
+    remainder,
+    roots,
+    total,
+    trimmed,
+    value,
+)
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "separated_cuts"]
 
 Array = NDArray[np.float64]
-Polynomial = list[Fraction]
 
 #: Digits of λ_s at the start, and of the roots: a start on a coordinate axis is one where a difference of them is zero.
 _DIGITS = 60
-
-#: A coordinate within this part of the largest I of a root starts on it.
-_AT_ROOT = Fraction(1, 10**40)
-
-#: Newton steps on the roots, from sixteen digits or from six where two are near each other; the bits kept in them.
-_STEPS, _BITS = 12, 256
 
 #: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a separatrix.
 _SEPARATRIX = 1e-12
@@ -53,50 +58,50 @@ class SeparableStart:
     polynomial: tuple[Fraction, ...]
     centrifugal: tuple[Fraction, ...]
 
-    @property
+    @cached_property
     def q_squared(self) -> list[Fraction]:
         """Return q_i² for |q| = 1."""
-        total = sum((x * x for x in self.q), Fraction())
-        return [x * x / total for x in self.q]
+        size = sum((x * x for x in self.q), Fraction())
+        return [x * x / size for x in self.q]
 
-    @property
+    @cached_property
     def conics(self) -> Polynomial:
         """Return U(λ) = Σ q_i² Π_{k≠i}(λ−I_k) = Π(λ−λ_s)."""
-        parts = [[square * c for c in _monic(_without(self.inverse, i))] for i, square in enumerate(self.q_squared)]
-        return _total(parts)
+        parts = [[square * c for c in monic(_without(self.inverse, i))] for i, square in enumerate(self.q_squared)]
+        return total(parts)
 
-    @property
+    @cached_property
     def constants(self) -> Polynomial:
         """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U]."""
-        total = sum((x * x for x in self.q), Fraction())
+        size = sum((x * x for x in self.q), Fraction())
         pairs = list(itertools.combinations(range(len(self.q)), 2))
-        wedges = {(i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / total) ** 2 for i, j in pairs}
+        wedges = {(i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2 for i, j in pairs}
         # (dt/dτ)² = (q,Aq)/det A, and T = ½Σ (q∧q̇)²_ij Π_{k≠i,j} I_k.
         rest = {(i, j): math.prod(_without(self.inverse, i, j)) for i, j in pairs}
         kinetic = sum((rest[pair] * wedges[pair] for pair in pairs), Fraction()) / 2
         rate = sum((x / a for x, a in zip(self.q_squared, self.inverse, strict=True)), Fraction()) * math.prod(self.inverse)
-        parts = [[rate * wedges[i, j] / 2 * c for c in _monic(_without(self.inverse, i, j))] for i, j in pairs]
+        parts = [[rate * wedges[i, j] / 2 * c for c in monic(_without(self.inverse, i, j))] for i, j in pairs]
         conics = self.conics
-        shifted = _total([*parts, [kinetic * c for c in conics]])
-        remainder = _remainder(list(self.polynomial), conics)
+        shifted = total([*parts, [kinetic * c for c in conics]])
+        rest_of_v = remainder(list(self.polynomial), conics)
         for i, beta in enumerate(self.centrifugal):
             if beta:  # 1/(λ−I_i) mod U = (U(I_i) − U(λ))/((λ−I_i)U(I_i)), and U(I_i) = q_i²Φ'(I_i)
-                remainder = _total([remainder, [beta / self.q_squared[i] * c for c in _divided(conics, self.inverse[i])]])
-        return _total([shifted[1:], remainder])
+                rest_of_v = total([rest_of_v, [beta / self.q_squared[i] * c for c in quotient(conics, self.inverse[i])]])
+        return total([shifted[1:], rest_of_v])
 
-    @property
+    @cached_property
     def factor(self) -> Polynomial:
         """Return S(λ) with R = 2λ Π_{β_i=0}(λ−I_i) S(λ): what is left to find roots of."""
         walls = [x for x, beta in zip(self.inverse, self.centrifugal, strict=True) if beta]
-        excess = _total([list(self.polynomial), [-c for c in self.constants]])
-        parts = [_product(_monic(walls), excess)]
+        excess = total([list(self.polynomial), [-c for c in self.constants]])
+        parts = [product(monic(walls), excess)]
         for i, beta in enumerate(self.centrifugal):
             if beta:
                 slope = math.prod(self.inverse[i] - x for x in _without(self.inverse, i))
-                parts.append([-beta * slope * c for c in _monic([x for x in walls if x != self.inverse[i]])])
-        return _trimmed(_total(parts))
+                parts.append([-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])])
+        return trimmed(total(parts))
 
-    @property
+    @cached_property
     def spheroconic(self) -> list[Fraction]:
         """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits."""
         digits = _DIGITS
@@ -159,11 +164,11 @@ class SeparatedCut:
 def separated_cuts(start: SeparableStart) -> list[SeparatedCut]:
     """Return the cuts of a start; raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``)."""
     factor = start.factor
-    found = _roots(factor)
+    found = roots(factor)
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
     real = sorted([Fraction(0), *free, *(x for x, y in found if y == 0)])
     pairs = [(x, y) for x, y in found if y > 0]
-    R = [2 * c for c in _product([Fraction(0), Fraction(1)], _product(_monic(free), factor))]
+    R = [2 * c for c in product([Fraction(0), Fraction(1)], product(monic(free), factor))]
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
 
 
@@ -173,14 +178,14 @@ def _cut(
     low, high = start.inverse[s], start.inverse[s + 1]
     scale = start.inverse[-1]
     marks = [x for x in real if low <= x <= high]
-    at = next((x for x in marks if abs(x - point) <= _AT_ROOT * scale), None)
+    at = next((x for x in marks if abs(x - point) <= NEAR * scale), None)
     before = [x for x in marks if x < point and x != at]
     after = [x for x in marks if x > point and x != at]
     if at is None:
         ends = (before[-1] if before else None), (after[0] if after else None)
     else:  # it starts at a turning point, and moves to where R > 0; where that is nowhere, it stays
-        up = bool(after) and _value(R, (at + after[0]) / 2) > 0
-        down = bool(before) and _value(R, (at + before[-1]) / 2) > 0
+        up = bool(after) and value(R, (at + after[0]) / 2) > 0
+        down = bool(before) and value(R, (at + before[-1]) / 2) > 0
         ends = (at, after[0]) if up else (before[-1], at) if down else (at, at)
         point = at
     lower, upper = ends
@@ -208,47 +213,6 @@ def _cut(
     )
 
 
-def _roots(polynomial: Polynomial) -> list[tuple[Fraction, Fraction]]:
-    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair: Newton from double precision."""
-    if len(polynomial) == 1:
-        return []
-    largest = max(abs(c) for c in polynomial)
-    roots = np.polynomial.polynomial.polyroots([float(c / largest) for c in polynomial])
-    polished = [_polished(polynomial, complex(root)) for root in roots]
-    for (a, b), (c, d) in itertools.combinations(polished, 2):
-        if abs(a - c) + abs(b - d) <= _AT_ROOT * (1 + abs(a)):
-            raise Unsolved("clustered-roots", "two roots of R could not be told apart: the motion is near a separatrix")
-    return [(x, y) for x, y in polished if y >= 0]
-
-
-def _polished(polynomial: Polynomial, root: complex) -> tuple[Fraction, Fraction]:
-    x, y = Fraction(root.real), Fraction(root.imag)
-    scale = 1 + abs(x)
-    for _ in range(_STEPS):
-        value, slope = (Fraction(), Fraction()), (Fraction(), Fraction())
-        for c in reversed(polynomial):
-            slope = _times(slope, (x, y))
-            slope = slope[0] + value[0], slope[1] + value[1]
-            value = _times(value, (x, y))
-            value = value[0] + c, value[1]
-        size = slope[0] ** 2 + slope[1] ** 2
-        if not size:
-            raise Unsolved("clustered-roots", "R has a double root: the motion is on a separatrix, or at rest in one coordinate")
-        step = _times(value, (slope[0] / size, -slope[1] / size))
-        x, y = _rounded(x - step[0]), _rounded(y - step[1])
-        if abs(step[0]) + abs(step[1]) <= scale / 2 ** (_BITS - 16):
-            break
-    return x, y if abs(y) > _AT_ROOT * scale else Fraction(0)
-
-
-def _times(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _rounded(x: Fraction) -> Fraction:
-    return Fraction(round(x * 2**_BITS), 2**_BITS)
-
-
 def _rational(x: object) -> Fraction:
     mantissa, exponent = x.man_exp  # type: ignore[attr-defined]
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
@@ -256,49 +220,3 @@ def _rational(x: object) -> Fraction:
 
 def _without(values: Sequence[Fraction], *omitted: int) -> list[Fraction]:
     return [x for i, x in enumerate(values) if i not in omitted]
-
-
-def _monic(roots: Sequence[Fraction]) -> Polynomial:
-    result: Polynomial = [Fraction(1)]
-    for root in roots:
-        result = _total([[Fraction(0), *result], [-root * c for c in result]])
-    return result
-
-
-def _total(parts: Sequence[Sequence[Fraction]]) -> Polynomial:
-    return [sum(column, Fraction()) for column in itertools.zip_longest(*parts, fillvalue=Fraction())]
-
-
-def _product(a: Sequence[Fraction], b: Sequence[Fraction]) -> Polynomial:
-    return _total([[Fraction(0)] * i + [c * d for d in b] for i, c in enumerate(a)])
-
-
-def _divided(polynomial: Polynomial, root: Fraction) -> Polynomial:
-    """Return the quotient by λ − root."""
-    quotient, carry = [], Fraction()
-    for c in reversed(polynomial[1:]):
-        carry = carry * root + c
-        quotient.append(carry)
-    return quotient[::-1]
-
-
-def _remainder(polynomial: Polynomial, monic: Polynomial) -> Polynomial:
-    rest, degree = list(polynomial), len(monic) - 1
-    while len(rest) > degree:
-        lead = rest.pop()
-        for i in range(degree):
-            rest[len(rest) - degree + i] -= lead * monic[i]
-    return rest
-
-
-def _trimmed(polynomial: Polynomial) -> Polynomial:
-    while len(polynomial) > 1 and polynomial[-1] == 0:
-        polynomial = polynomial[:-1]
-    return polynomial
-
-
-def _value(polynomial: Polynomial, x: Fraction) -> Fraction:
-    result = Fraction()
-    for c in reversed(polynomial):
-        result = result * x + c
-    return result

@@ -99,13 +99,17 @@ def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fr
     return tuple(exact_number(item, (*path, i)) for i, item in enumerate(items))
 
 
-def exact_matrix(values: Any, path: Path, size: int) -> tuple[tuple[Fraction, ...], ...]:
-    """Return the rows of a square matrix as exact rationals; raises InvalidInput when it is not size by size."""
-    required = f"{size} rows of {size} numbers"
+def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the rows of a matrix as exact rationals; raises InvalidInput when it has not ``size`` rows and as many columns.
+
+    ``columns`` is their number where the matrix is not square.
+    """
+    width = size if columns is None else columns
+    required = f"{size} rows of {width} numbers"
     rows = _items(values, path, required)
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
-    return tuple(exact_vector(row, (*path, i), size) for i, row in enumerate(rows))
+    return tuple(exact_vector(row, (*path, i), width) for i, row in enumerate(rows))
 
 
 def plain(value: Any) -> Any:

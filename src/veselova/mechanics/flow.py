@@ -22,13 +22,15 @@ class Operations:
     """What a field may do besides + − × ÷, in floating point or with the symbols of a Taylor integrator.
 
     dot: the matrix product ``a @ b`` of arrays of one or two dimensions
+    solve: the solution of ``a @ x = b`` for a symmetric positive definite ``a``
     """
 
     sqrt: Callable[[Any], Any]
     dot: Callable[[Any, Any], Any]
+    solve: Callable[[Any, Any], Any]
 
 
-FLOATS = Operations(np.sqrt, np.matmul)
+FLOATS = Operations(np.sqrt, np.matmul, np.linalg.solve)
 
 
 class Flow(ABC):

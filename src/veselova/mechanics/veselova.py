@@ -15,6 +15,7 @@ from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, plain, read_only, to_float
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
+from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.principal_inertia import principal_inertia
 from veselova.mechanics.problem import Series
 from veselova.mechanics.reduced_flow import ReducedFlow
@@ -112,6 +113,15 @@ class Veselova(TorusProblem):
 
         q, q_dot = start_on_torus(A, energy, constants, phases, signs)
         return cls(A, q, q_dot, frame, normalize=True)
+
+    def neumann(self) -> NeumannSystem:
+        """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the principal axes; F_0 = 0.
+
+        q' = q̇ √((Aq,q)/(2h det A)); ``NeumannSystem.veselova`` is the way back. Raises InvalidInput for a body at rest.
+        """
+        if not self.moves:
+            raise InvalidInput(("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector")
+        return NeumannSystem(self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True)
 
     def _set(self, **arrays: Array | None) -> None:
         for name, value in arrays.items():

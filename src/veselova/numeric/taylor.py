@@ -17,8 +17,9 @@ __all__ = ["Taylor"]
 
 Array = NDArray[np.float64]
 
-#: From this many equations on the compact mode: it compiles in 0.2 s where unrolled code takes seconds, and runs up to 2× slower.
-_COMPACT_FROM = 20
+#: From this many operations in the field (shared ones counted wherever they occur) the compact mode: it compiles in a second
+#: where unrolled code takes minutes, and runs up to 2× slower.
+_COMPACT_FROM = 3000
 
 #: Compiled fields that are kept.
 _MOST_COMPILED = 64
@@ -81,13 +82,14 @@ def _compiled(flow: Flow, tolerance: float) -> Any:
         variables = hy.make_vars(*[f"x{i}" for i in range(flow.initial.size)])
         parameters = [hy.par[i] for i in range(flow.parameters.size)]
         derivatives = flow.field(np.array(variables, dtype=object), np.array(parameters, dtype=object), _symbols(hy))
+        equations = [hy.expression(dx) if isinstance(dx, float) else dx for dx in derivatives]
         if len(_known) >= _MOST_COMPILED:
             _known.clear()
         _known[key] = hy.taylor_adaptive(
-            [(x, hy.expression(dx) if isinstance(dx, float) else dx) for x, dx in zip(variables, derivatives, strict=True)],
+            list(zip(variables, equations, strict=True)),
             np.ones(len(variables)),
             tol=tolerance,
-            compact_mode=len(variables) >= _COMPACT_FROM,
+            compact_mode=sum(len(dx) for dx in equations) >= _COMPACT_FROM,
             pars=np.ones(len(parameters)),
         )
     return _known[key]
@@ -104,4 +106,17 @@ def _symbols(hy: Any) -> Operations:
         flat = product.reshape(a.shape[:-1] + b.shape[1:])
         return flat[()] if flat.ndim == 0 else flat
 
-    return Operations(hy.sqrt, dot)
+    def solve(a: Any, b: Any) -> Any:
+        lower, inverse = np.array(a), []
+        right = np.array(b).reshape(len(a), -1)
+        for k in range(len(lower)):  # a definite matrix needs no pivots
+            inverse.append(1.0 / lower[k, k])
+            factors = lower[k + 1 :, k] * inverse[k]
+            lower[k + 1 :, k + 1 :] = lower[k + 1 :, k + 1 :] - np.outer(factors, lower[k, k + 1 :])
+            right[k + 1 :] = right[k + 1 :] - np.outer(factors, right[k])
+        for k in reversed(range(len(lower))):
+            right[k] = right[k] * inverse[k]
+            right[:k] = right[:k] - np.outer(lower[:k, k], right[k])
+        return right.reshape(b.shape)
+
+    return Operations(hy.sqrt, dot, solve)

@@ -16,6 +16,7 @@ from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.euler_poisson import EulerPoisson
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.stiefel import StiefelFlow
 from veselova.mechanics.veselova import Veselova
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
@@ -57,6 +58,13 @@ _POTENTIAL = {
     "minProperties": 1,
     "additionalProperties": False,
 }
+_COLUMNS = {"type": "array", "items": {"type": "array", "items": _NUMBER, "minItems": 1}, "minItems": 2}
+_BODY_INERTIA = {
+    "anyOf": [
+        {"type": "object", "properties": {name: form}, "required": [name], "additionalProperties": False}
+        for name, form in (("special", _VECTOR), ("matrix", _COLUMNS))
+    ]
+}
 
 Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
 Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
@@ -65,6 +73,8 @@ Triple = Annotated[Any, WithJsonSchema(_TRIPLE)]
 Tensor = Annotated[Any, WithJsonSchema({"anyOf": [_TRIPLE, _SQUARE]})]
 Attitude = Annotated[Any, WithJsonSchema({"anyOf": [_SQUARE, {"type": "null"}]})]
 PotentialData = Annotated[Any, WithJsonSchema({"anyOf": [_POTENTIAL, {"type": "null"}]})]
+Columns = Annotated[Any, WithJsonSchema(_COLUMNS)]
+BodyInertia = Annotated[Any, WithJsonSchema(_BODY_INERTIA)]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
 
@@ -167,15 +177,37 @@ class EulerPoissonModel(RigidBodyModel):
     system: Literal["euler-poisson"]
 
 
+class StiefelModel(SystemModel):
+    """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the constraints of rank r."""
+
+    problem_class: ClassVar[type[Problem]] = StiefelFlow
+    measured: ClassVar[str] = "X"
+
+    system: Literal["stiefel"]
+    inertia: Annotated[
+        BodyInertia,
+        Field(
+            description='{"special": n positive numbers A} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …}, symmetric '
+            "and positive definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order"
+        ),
+    ]
+    X: Annotated[Columns, Field(description="n rows of r numbers, the columns e_1 … e_r orthonormal; 1 ≤ r ≤ n")]
+    P: Annotated[Columns, Field(description="its momentum, n rows of r numbers, XᵀP skew; either this or X_dot")] = None
+    X_dot: Annotated[Columns, Field(description="its velocity, n rows of r numbers, XᵀẊ skew; either this or P")] = None
+    normalize: Annotated[bool, Field(description="make X orthonormal and project P or X_dot on its tangent space first")] = False
+
+
 #: The systems, by the name that tells them apart.
 SYSTEMS: Mapping[str, type[SystemModel]] = {
     "veselova": VeselovaModel,
     "neumann": NeumannModel,
     "ellipsoid-geodesic": EllipsoidGeodesicModel,
     "veselova-so3": VeselovaSO3Model,
+    "stiefel": StiefelModel,
     "euler-poisson": EulerPoissonModel,
 }
 
 ProblemModel = Annotated[
-    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | EulerPoissonModel, Field(discriminator="system")
+    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | StiefelModel | EulerPoissonModel,
+    Field(discriminator="system"),
 ]
