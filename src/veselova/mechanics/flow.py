@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,40 @@ __all__ = ["FLOATS", "Flow", "Operations"]
 Array = NDArray[np.float64]
 
 
+def _eliminated(a: Any, b: Any) -> Any:
+    """Return the solution of a @ x = b by elimination with + − × ÷ alone; a positive definite a needs no pivots."""
+    rows, x = [list(row) for row in a], list(b)
+    for k, pivot in enumerate(rows):
+        for i in range(k + 1, len(rows)):
+            factor = rows[i][k] / pivot[k]
+            for j in range(k + 1, len(rows)):
+                rows[i][j] = rows[i][j] - factor * pivot[j]
+            x[i] = x[i] - factor * x[k]
+    for k in reversed(range(len(rows))):
+        for j in range(k + 1, len(rows)):
+            x[k] = x[k] - rows[k][j] * x[j]
+        x[k] = x[k] / rows[k][k]
+    return np.array(x, dtype=object)
+
+
 @dataclass(frozen=True)
 class Operations:
     """What a field may do besides + − × ÷, in floating point or with the symbols of a Taylor integrator.
 
     dot: the matrix product ``a @ b`` of arrays of one or two dimensions
+    solve: the solution x of a @ x = b, for a symmetric positive definite a and one vector b (or a stack of each)
     """
 
     sqrt: Callable[[Any], Any]
     dot: Callable[[Any, Any], Any]
+    solve: Callable[[Any, Any], Any] = field(default=_eliminated)
 
 
-FLOATS = Operations(np.sqrt, np.matmul)
+def _solved(a: Any, b: Any) -> Any:
+    return np.linalg.solve(a, b[..., None])[..., 0]
+
+
+FLOATS = Operations(np.sqrt, np.matmul, _solved)
 
 
 class Flow(ABC):
