@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from veselova.mechanics.errors import Unsolved as Unsolved
     from veselova.mechanics.errors import VeselovaError as VeselovaError
     from veselova.mechanics.euler_poisson import EulerPoisson as EulerPoisson
+    from veselova.mechanics.group import MatrixGroup as MatrixGroup
+    from veselova.mechanics.lr_system import LRSystem as LRSystem
     from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
     from veselova.mechanics.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.torus import Torus as Torus
@@ -52,6 +54,8 @@ _HOMES = {
     "InternalContradiction": "veselova.mechanics.errors",
     "InvalidInput": "veselova.mechanics.errors",
     "InvalidRequest": "veselova.mechanics.errors",
+    "LRSystem": "veselova.mechanics.lr_system",
+    "MatrixGroup": "veselova.mechanics.group",
     "NeumannSystem": "veselova.mechanics.neumann",
     "ProblemResponse": "veselova.mechanics.errors",
     "Provenance": "veselova.mechanics.trajectory",

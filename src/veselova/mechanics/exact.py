@@ -19,7 +19,17 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
 
-__all__ = ["Number", "exact_matrix", "exact_number", "exact_vector", "is_matrix", "plain", "read_only", "to_float"]
+__all__ = [
+    "Number",
+    "exact_matrix",
+    "exact_number",
+    "exact_vector",
+    "is_matrix",
+    "plain",
+    "read_only",
+    "to_float",
+    "whole_number",
+]
 
 Number = int | float | str | Fraction | Decimal
 
@@ -110,6 +120,13 @@ def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None)
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
     return tuple(exact_vector(row, (*path, i), width) for i, row in enumerate(rows))
+
+
+def whole_number(value: Any, path: Path, least: int, most: int) -> int:
+    """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0 included."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise InvalidInput(path, f"a whole number from {least} to {most}", shown(value))
+    return int(value)
 
 
 def plain(value: Any) -> Any:

@@ -22,7 +22,7 @@ class Operations:
     """What a field may do besides + − × ÷, in floating point or with the symbols of a Taylor integrator.
 
     dot: the matrix product ``a @ b`` of arrays of one or two dimensions
-    solve: the solution of ``a @ x = b`` for a symmetric positive definite ``a``
+    solve: the solution of ``a @ x = b`` for symmetric positive definite ``a`` and columns ``b`` (or a stack of each)
     """
 
     sqrt: Callable[[Any], Any]

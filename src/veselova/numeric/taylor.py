@@ -17,9 +17,10 @@ __all__ = ["Taylor"]
 
 Array = NDArray[np.float64]
 
-#: From this many operations in the field (shared ones counted wherever they occur) the compact mode: it compiles in a second
-#: where unrolled code takes minutes, and runs up to 2× slower.
-_COMPACT_FROM = 3000
+#: From this many equations, or operations in them (shared ones counted wherever they occur), on the compact mode: it compiles
+#: in a second where unrolled code takes minutes, and runs up to 2× slower.
+_COMPACT_FROM = 20
+_COMPACT_OPERATIONS = 3000
 
 #: Compiled fields that are kept.
 _MOST_COMPILED = 64
@@ -34,7 +35,8 @@ class Taylor(Integrator):
 
     def __init__(self, flow: Flow, tolerance: float) -> None:
         self._integrator = copy.copy(_compiled(flow, tolerance))
-        self._integrator.pars[:] = flow.parameters
+        used = len(self._integrator.pars)  # the last ones may have dropped out of the field
+        self._integrator.pars[:] = flow.parameters[:used]
         self._flow = flow
         self._steps = 0
 
@@ -85,11 +87,12 @@ def _compiled(flow: Flow, tolerance: float) -> Any:
         equations = [hy.expression(dx) if isinstance(dx, float) else dx for dx in derivatives]
         if len(_known) >= _MOST_COMPILED:
             _known.clear()
+        compact = len(equations) >= _COMPACT_FROM or sum(len(dx) for dx in equations) >= _COMPACT_OPERATIONS
         _known[key] = hy.taylor_adaptive(
             list(zip(variables, equations, strict=True)),
             np.ones(len(variables)),
             tol=tolerance,
-            compact_mode=sum(len(dx) for dx in equations) >= _COMPACT_FROM,
+            compact_mode=compact,
             pars=np.ones(len(parameters)),
         )
     return _known[key]

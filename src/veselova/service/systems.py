@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from veselova.mechanics.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.euler_poisson import EulerPoisson
+from veselova.mechanics.lr_system import LRSystem
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.stiefel import StiefelFlow
@@ -33,6 +34,31 @@ _UNIFORM = {
     "properties": {"start": _NUMBER, "stop": _NUMBER, "count": {"type": "integer", "minimum": 1}},
     "required": ["start", "stop", "count"],
     "additionalProperties": False,
+}
+_WHOLE = {"type": "integer", "minimum": 1}
+_INERTIA_OPERATOR = {
+    "anyOf": [
+        {
+            "type": "object",
+            "properties": {name: schema},
+            "required": [name],
+            "additionalProperties": False,
+        }
+        for name, schema in (
+            ("special", {**_VECTOR, "description": "A_1 … A_n > 0 of (4.5): 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j"}),
+            ("matrix", {"type": "array", "items": {"type": "array", "items": _NUMBER}, "minItems": 1}),
+        )
+    ],
+}
+_MONOMIAL = {
+    "type": "object",
+    "properties": {
+        "coefficient": _NUMBER,
+        "powers": {"type": "array", "items": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3}},
+    },
+    "required": ["coefficient", "powers"],
+    "additionalProperties": False,
+    "description": "c Π g_ij^p for powers [[i, j, p], …], i and j from 1",
 }
 _TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
 
@@ -75,6 +101,10 @@ Attitude = Annotated[Any, WithJsonSchema({"anyOf": [_SQUARE, {"type": "null"}]})
 PotentialData = Annotated[Any, WithJsonSchema({"anyOf": [_POTENTIAL, {"type": "null"}]})]
 Columns = Annotated[Any, WithJsonSchema(_COLUMNS)]
 BodyInertia = Annotated[Any, WithJsonSchema(_BODY_INERTIA)]
+Whole = Annotated[Any, WithJsonSchema(_WHOLE)]
+InertiaOperator = Annotated[Any, WithJsonSchema(_INERTIA_OPERATOR)]
+Matrix = Annotated[Any, WithJsonSchema(_MATRIX)]
+Potential = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "array", "items": _MONOMIAL, "minItems": 1}, {"type": "null"}]})]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
 
@@ -197,6 +227,28 @@ class StiefelModel(SystemModel):
     normalize: Annotated[bool, Field(description="make X orthonormal and project P or X_dot on its tangent space first")] = False
 
 
+class LRModel(SystemModel):
+    """An LR system on SO(n): any inertia, ⟨ω, e_p∧e_q⟩ = const for r < p < q ≤ n, a potential, and its state at t = 0."""
+
+    problem_class: ClassVar[type[Problem]] = LRSystem
+    measured: ClassVar[str] = "n"
+
+    system: Literal["lr"]
+    n: Annotated[Whole, Field(description="dimension of the body, n ≥ 2")]
+    rank: Annotated[Whole, Field(description="r of D_r, from 1 to n − 1 (no constraints)")]
+    inertia: Annotated[
+        InertiaOperator, Field(description="special, or symmetric positive definite on the basis E_i∧E_j, i < j, lexicographic")
+    ]
+    omega: Annotated[Matrix, Field(description="angular velocity g⁻¹ġ in the body, skew n × n")]
+    g: Annotated[
+        Frame, Field(description="attitude, body to space, orthogonal n × n, frame = gᵀ; the identity when left out")
+    ] = None
+    potential: Annotated[Potential, Field(description="v(g) as a sum of monomials in the entries of g")] = None
+    homogeneous: Annotated[
+        bool, Field(description="require ⟨ω, e_p∧e_q⟩ = 0 and project ω on it; else they are what ω gives")
+    ] = False
+
+
 #: The systems, by the name that tells them apart.
 SYSTEMS: Mapping[str, type[SystemModel]] = {
     "veselova": VeselovaModel,
@@ -205,9 +257,10 @@ SYSTEMS: Mapping[str, type[SystemModel]] = {
     "veselova-so3": VeselovaSO3Model,
     "stiefel": StiefelModel,
     "euler-poisson": EulerPoissonModel,
+    "lr": LRModel,
 }
 
 ProblemModel = Annotated[
-    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | StiefelModel | EulerPoissonModel,
+    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | StiefelModel | EulerPoissonModel | LRModel,
     Field(discriminator="system"),
 ]
