@@ -7,7 +7,6 @@ Coefficients are those of the basis E_i∧E_j, i < j, in lexicographic order.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,11 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, to_float
 from veselova.mechanics.flow import Operations
+from veselova.mechanics.inertia import Inertia
 from veselova.mechanics.integrals import unit_scale
-from veselova.mechanics.sphere import INPUT_TOLERANCE
 
 __all__ = ["BodyInertia", "MatrixInertia", "SpecialInertia", "body_inertia", "coefficients", "skew"]
 
@@ -186,31 +183,6 @@ class MatrixInertia(BodyInertia):
 
 
 def body_inertia(inertia: Any, n: int) -> BodyInertia:
-    """Return the operator of {"special": [A_1 … A_n]} or {"matrix": m × m numbers}, m = n(n−1)/2.
-
-    Raises InvalidInput for anything else, for A's that are not positive, and for a matrix that is not symmetric and positive
-    definite.
-    """
-    if not isinstance(inertia, Mapping) or len(inertia) != 1 or next(iter(inertia)) not in ("special", "matrix"):
-        raise InvalidInput(("inertia",), 'an object with one field, "special" or "matrix"', shown(inertia))
-    if "special" in inertia:
-        return SpecialInertia.of(_positive(inertia["special"], n))
-    m, path = n * (n - 1) // 2, ("inertia", "matrix")
-    matrix = to_float(exact_matrix(inertia["matrix"], path, m))
-    largest = float(np.max(np.abs(matrix)))
-    asymmetry = np.abs(matrix / (largest or 1.0) - matrix.T / (largest or 1.0))
-    if np.max(asymmetry) > INPUT_TOLERANCE:
-        i, j = divmod(int(np.argmax(asymmetry)), m)
-        raise InvalidInput((*path, i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
-    values = np.linalg.eigvalsh((matrix / (largest or 1.0) + matrix.T / (largest or 1.0)) / 2)
-    if values[0] <= m * np.finfo(float).eps * values[-1]:
-        raise InvalidInput(path, "a positive definite matrix", f"one with eigenvalue {values[0] * largest:.3g}")
-    return MatrixInertia.of(matrix / 2 + matrix.T / 2, n)
-
-
-def _positive(values: Any, n: int) -> Array:
-    A = exact_vector(values, ("inertia", "special"), n)
-    for i, value in enumerate(A):
-        if value <= 0 or float(value) == 0:
-            raise InvalidInput(("inertia", "special", i), "a finite number greater than 0", shown(values[i]))
-    return to_float(A)
+    """Return the operator of {"special": [A_1 … A_n]} or {"matrix": m × m numbers}, m = n(n−1)/2; raises InvalidInput."""
+    stated = Inertia.of(inertia, n)
+    return MatrixInertia.of(stated.matrix, n) if stated.A is None else SpecialInertia.of(stated.A)
