@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
 
 from draws import random_problem
+from lr_draws import random_lr
 from stiefel_chart import Chart, slopes
 from stiefel_draws import random_columns, random_inertia
-from veselova import EllipsoidGeodesic, EulerPoisson, VeselovaSO3, solve
+from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
 from veselova.analytic.solution import Solution
-from veselova.mechanics import integrals, rank_one
+from veselova.mechanics import integrals, measure, rank_one
 from veselova.mechanics.body_inertia import body_inertia, coefficients, skew
+from veselova.mechanics.flow import FLOATS
 from veselova.mechanics.moser import lax_matrix, lax_partner
 from veselova.mechanics.multiplier import ChaplyginMultiplier
+from veselova.mechanics.reduction import ChaplyginReduction
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.stiefel_geometry import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
 
@@ -289,3 +293,74 @@ def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(rng: 
     assert np.allclose(p_dot, -gradient(-2) - growth * p, atol=1e-7)
     assert not np.allclose(p_dot, -gradient(-2) - rate * growth * p, atol=1e-3)
     assert not np.allclose(p_dot, -gradient(2) - growth * p, atol=1e-3)
+
+
+@pytest.mark.parametrize(("n", "rank"), [(3, 2), (4, 2), (5, 3), (6, 2)])
+def test_there_are_more_g_invariant_functions_than_independent_ones_in_the_algebra(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """T*Q = G ×_H 𝔡, so its G-invariant functions are the H-invariant ones on 𝔡; 𝒜 holds those that come from 𝔤."""
+    system = random_lr(rng, n, rank)
+    group, distribution = system.distribution.group, system.distribution
+    w, h = distribution.space[: distribution.rank], distribution.space[distribution.rank :]
+    xi = rng.normal(size=len(w)) @ w
+    orbit = np.linalg.matrix_rank(group.bracket(h, np.broadcast_to(xi, h.shape))) if len(h) else 0
+    in_algebra = ChaplyginReduction(system).independent_invariants
+    powers = [np.linalg.matrix_power(group.element(xi), 2 * k - 1) for k in range(1, n // 2 + 1)]
+    slopes = [group.coordinates(power / np.linalg.norm(power)) @ w.T for power in powers]
+    assert np.linalg.matrix_rank(np.array(slopes), tol=1e-7) == in_algebra
+    assert len(w) - orbit > in_algebra
+    symmetric = ChaplyginReduction(random_lr(rng, n, 1))  # for the sphere both numbers are one
+    assert symmetric.independent_invariants == 1
+
+
+@pytest.mark.parametrize(("n", "rank"), [(4, 2), (5, 3)])
+def test_the_index_ranges_of_im3_belong_to_the_other_letters(n: int, rank: int, rng: np.random.Generator) -> None:
+    """⟨e_i∧e_p, 𝓘(e_j∧e_q)⟩ over p ≤ r and all i, as printed, has the row e_p∧e_p = 0: the determinant vanishes."""
+    system = random_lr(rng, n, rank)
+    group, frame = system.distribution.group, system.g
+
+    def determinant(pairs: list[tuple[int, int]]) -> float:
+        rows = [np.outer(frame[i], frame[p]) - np.outer(frame[p], frame[i]) for i, p in pairs]
+        return float(measure.restricted_determinant(system.inertia, group.coordinates(np.array(rows))))
+
+    true = float(measure.momentum_density(system.inertia, system.distribution.seen(frame)[0])) ** 2
+    assert np.isclose(determinant([(i, p) for i in range(rank) for p in range(i + 1, n)]), true)
+    assert abs(determinant([(i, p) for p in range(rank) for i in range(n)])) < 1e-12 * true
+    assert not np.isclose(determinant([(i, p) for p in range(rank) for i in range(p)]), true, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("n", "rank"), [(4, 1), (5, 2), (5, 3)])
+def test_the_expansion_in_the_proof_of_im_a_runs_over_j(n: int, rank: int, rng: np.random.Generator) -> None:
+    A, g = np.exp(rng.normal(size=n)), np.linalg.qr(rng.normal(size=(n, n)))[0]
+    rest = g[rank:].T
+    true = np.linalg.det(rest.T @ (rest / A[:, None]))
+    squares = measure.plucker_coordinates(rest) ** 2
+    J = list(combinations(range(n), n - rank))
+    I = [[i for i in range(n) if i not in indices] for indices in J]  # complementary, as at the end of the proof
+    assert np.isclose(sum(x / np.prod(A[list(j)]) for x, j in zip(squares, J, strict=True)), true)
+    assert not np.isclose(sum(x / np.prod(A[i]) for x, i in zip(squares, I, strict=True)), true, rtol=1e-3)
+
+
+def test_the_angular_velocity_in_three_dimensions_has_the_other_sign(rng: np.random.Generator) -> None:
+    """(nh3.46) for n = 3, r = 1 is 𝓘Ω̇ = 𝓘Ω×Ω + λγ, γ̇ = γ×Ω for ω_ij = −ε_ijkΩ_k; with +ε both signs of Ω are turned."""
+    A = np.exp(rng.normal(size=3))
+    draw = random_lr(rng, 3, 1)
+    group = draw.distribution.group
+    system = LRSystem(3, 1, {"special": A}, draw.g, group.element(draw.omega))
+    flow = system.flow("multipliers")
+    rate = flow.field(flow.initial, flow.parameters, FLOATS) / flow.time_unit
+    gamma, gamma_dot = system.g[0], rate[3:].reshape(3, 3)[0]
+
+    def vector(coordinates: Any) -> Any:
+        X = group.element(coordinates)
+        return np.array([X[1, 2], X[2, 0], X[0, 1]])  # X_ij = ε_ijk x_k
+
+    def mismatch(sign: int) -> float:
+        Omega, Omega_dot = sign * vector(system.omega), sign * vector(rate[:3]) / flow.time_unit
+        force = Omega_dot / A - np.cross(Omega / A, Omega)  # 𝓘 = A⁻¹
+        first = np.linalg.norm(force - (force @ gamma) * gamma) / np.linalg.norm(np.cross(Omega / A, Omega))
+        return float(max(first, np.linalg.norm(gamma_dot - np.cross(gamma, Omega))))
+
+    assert mismatch(-1) < 1e-12
+    assert mismatch(1) > 1e-3

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from conftest import Server
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on, random_potential
-from veselova import InvalidInput, LRSystem, MatrixGroup, Veselova, solve
+from veselova import InvalidInput, LRSystem, MatrixGroup, Unsolved, Veselova, solve
 from veselova.mechanics.distribution import Distribution
 from veselova.mechanics.flow import FLOATS
 
@@ -259,6 +259,19 @@ def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(rn
     assert np.ptp(system._jacobi(*system._taken_apart(trajectory.arrays))) > 1e-3
     still = LRSystem(3, 1, {"special": [3, 2, 1]}, None, np.zeros((3, 3)), potential)
     assert "energy" in solve(still, [0, 1]).integrals  # all constants are zero
+
+
+@pytest.mark.parametrize("formulation", LRSystem.formulations)
+@pytest.mark.parametrize("method", ["dop853", "taylor"])
+def test_collisions_with_a_singular_potential_are_named(formulation: str, method: str) -> None:
+    attracting = LRSystem(**GOOD, potential=monomial([1, 1, -2], coefficient=-0.1))
+    assert np.all(np.isfinite(solve(attracting, [1.0], method=method, formulation=formulation).frame))
+    with pytest.raises(Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.059035,"):
+        solve(attracting, [0.5, 1.2], method=method, formulation=formulation)
+    repelling = LRSystem(**GOOD, potential=monomial([1, 1, -2], coefficient=0.1))
+    trajectory = solve(repelling, [0.0, 3.0], method=method, formulation=formulation)
+    assert trajectory.frame[1, 0, 0] > 0
+    assert trajectory.drift["energy"] < DRIFT
 
 
 def test_momentum_is_kept_along_what_leaves_the_potential_alone(rng: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""Sweeps over fifty random LR systems for every n ≤ 6 and rank, over t = 100. Minutes: run with ./check --sweep."""
+"""Sweeps over three hundred random LR systems, n ≤ 6, every rank, over t = 100. Minutes: run with ./check --sweep."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def hold(system: LRSystem) -> None:
 
 @pytest.mark.parametrize("homogeneous", [True, False])
 @pytest.mark.parametrize(("n", "rank"), RANKS)
-def test_fifty_systems_of_each_rank(n: int, rank: int, homogeneous: bool) -> None:
+def test_twenty_systems_of_each_rank(n: int, rank: int, homogeneous: bool) -> None:
     rng = np.random.default_rng([n, rank, homogeneous])
-    for k in range(25):
+    for k in range(10):
         hold(random_lr(rng, n, rank, homogeneous=homogeneous, special=k % 2 == 0))
 
 

@@ -84,6 +84,16 @@ class GroupPotential:
         pulled = ops.dot(np.swapaxes(g, -1, -2), self.slope(g, self.coefficients if coefficients is None else coefficients))
         return group.covector(pulled, ops)
 
+    @property
+    def singular_entries(self) -> tuple[tuple[int, int], ...]:
+        """Return the entries (i, j) that occur with a negative power, so that v is infinite where g_ij = 0."""
+        return tuple(sorted({(i, j) for factors in self.powers for i, j, p in factors if p < 0}))
+
+    def singular_part(self, entry: tuple[int, int]) -> GroupPotential:
+        """Return the monomials with a negative power of an entry."""
+        kept = [k for k, factors in enumerate(self.powers) if any((i, j) == entry and p < 0 for i, j, p in factors)]
+        return GroupPotential(self.coefficients[kept], tuple(self.powers[k] for k in kept))
+
     def strength(self, g: Array) -> float:
         """Return a bound on the slope of v: Σ |c_k| Σ|p| Π|g_ij|^p, with |g_ij| = 1 under positive powers."""
         total = 0.0

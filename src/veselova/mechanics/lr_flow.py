@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.distribution import Distribution, combined
+from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.flow import FLOATS, Flow, Operations
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia, applied
@@ -25,6 +26,9 @@ _LARGEST_SYMBOLIC = 66
 
 #: The energy is restored along its gradient where that is at least this part of |ω||𝓘ω|: near a steady rotation it vanishes.
 _STEEP = 1e-2
+
+#: An attracting zero of g_ij is taken for reached when it is this near, in units of time at the speed of approach.
+_LEFT = 1e-8
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -103,6 +107,39 @@ class LRFlow(Flow):
         along, across = (x * kick for x, kick in zip((self.along, self.across), kicks, strict=True))
         side = distance * float(np.linalg.norm(self.along)) * rng.normal(size=along.size) / np.sqrt(max(along.size, 1))
         return replace(self, g=g, along=along + side, across=across)
+
+    @property
+    def endless(self) -> bool:
+        """Return whether the potential is finite everywhere."""
+        return not self._singular
+
+    @cached_property
+    def _singular(self) -> dict[tuple[int, int], GroupPotential]:
+        """Return, for each entry of g that v is infinite at the zero of, the monomials that are."""
+        return {entry: self.potential.singular_part(entry) for entry in self.potential.singular_entries} if self.potential else {}
+
+    def _approach(self, state: Array) -> tuple[Array, Array]:
+        """Return the entries of g, positive on the side of the start, and their derivatives."""
+        g, omega = (part[0] for part in self.motion(state[None]))
+        side = np.sign(self.g)
+        return g * side, g @ self.distribution.group.element(omega) * side
+
+    def clearance(self, state: Array) -> float:
+        """Return the distance |g_ij| to the nearest singular zero, less what an attracting one makes good at once."""
+        distance, speed = self._approach(state)
+        g = distance * np.sign(self.g)
+        left = (distance[e] - _LEFT * abs(speed[e]) * (float(v.value(g)) < 0) for e, v in self._singular.items())
+        return float(min(left, default=1.0))
+
+    def ending(self, time: float, state: Array) -> Unsolved:
+        """Return what happened at the nearest singular zero: a collision, or a barrier that was stepped over."""
+        distance, speed = self._approach(state)
+        i, j = min(self._singular, key=lambda entry: distance[entry])
+        arrival = (time - distance[i, j] / speed[i, j]) * self.time_unit
+        place = f"g_{i + 1}{j + 1} = 0 at about t = {arrival:.7g}, where the potential is infinite"
+        if self._singular[i, j].value(np.abs(distance) * np.sign(self.g)) < 0:
+            return Unsolved("collision", f"the motion runs into {place}; ask for earlier times")
+        return Unsolved("thin-barrier", f"the motion turns back nearer than the integration resolves to {place}")
 
     @abstractmethod
     def motion(self, states: Array) -> tuple[Array, Array]:
