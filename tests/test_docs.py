@@ -28,12 +28,14 @@ def blocks(text: str, language: str) -> list[str]:
 def test_the_python_of_the_readme_runs(server: Server) -> None:
     scope: dict[str, Any] = {}
     sources = blocks(README, "python")
-    assert len(sources) == 3
+    assert len(sources) == 4
     for source in sources:
         exec(source.replace("http://127.0.0.1:8000", server.url), scope)
     assert scope["comparison"].agrees
     assert scope["torus"].n == 4
     assert scope["certified"].certified
+    assert scope["geodesic"].quadrics.shape == (1,)
+    assert scope["body"].system == "veselova-so3"
 
 
 def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:
