@@ -51,7 +51,7 @@ _CHECKPOINTS = 32
 def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: str | None = None) -> Trajectory:
     """Return the motion at the given times by integrating the problem's flow; the start is at time zero.
 
-    ``method``: ``dop853`` (SciPy, relative tolerance 1e-13) or ``taylor`` (heyoka, to rounding). ``formulation``: one of the
+    ``method``: ``dop853`` (SciPy, relative tolerance 2e-14) or ``taylor`` (heyoka, to rounding). ``formulation``: one of the
     problem's ``formulations``, equations of motion that differ and agree; None takes the first.
     The error is measured: a second integration, at a looser tolerance and from a start a few roundings away; the estimate
     is four times the running maximum of the difference in the bounded outputs, plus the rounding that both may share. Raises
