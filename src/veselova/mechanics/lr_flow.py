@@ -54,27 +54,12 @@ class LRFlow(Flow):
         return self.potential.coefficients if self.potential else np.empty(0)
 
     @property
-    def _steady(self) -> Array:
-        """Return the constants of the constraints that are no parameters: all, where they are zero."""
-        return np.empty(0) if not np.any(self.across) else self.across
-
-    @property
     def structure(self) -> Hashable | None:
         """Return what the compiled field depends on besides its parameters."""
         if self.distribution.group.dimension > _LARGEST_SYMBOLIC:
             return None
         powers = self.potential.powers if self.potential else None
-        return type(self), self.distribution.key, powers, self.inertia.operator.ndim, self._steady.size
-
-    def _offset(self, parameters: Any) -> Any:
-        """Return the constants of the constraints, from the first parameters where there are any."""
-        return parameters[: self._steady.size] if self._steady.size else np.zeros(self.across.size)
-
-    def _operator(self, parameters: Any) -> Any:
-        """Return the operator among the parameters that follow, a matrix or a diagonal."""
-        shape = self.inertia.operator.shape
-        first = self._steady.size
-        return parameters[first : first + int(np.prod(shape))].reshape(shape)
+        return type(self), self.distribution.key, powers, self.parameters.size
 
     def _matrix(self, flat: Any) -> Any:
         N = self.distribution.group.size
@@ -87,10 +72,15 @@ class LRFlow(Flow):
         coefficients = parameters[parameters.size - self._coefficients.size :]
         return -self.potential.gradient(self.distribution.group, g, coefficients, ops)
 
+    @property
+    def _operator(self) -> Array:
+        """Return what (mom) is solved with: 𝓘 or its inverse."""
+        return self.inertia.inverse if self.distribution.uses_inverse else self.inertia.operator
+
     def omega(self, g: Array, along: Array) -> Array:
         """Return ω from m_k and the group elements, in coordinates (…, D)."""
-        operator = self.inertia.inverse if self.distribution.uses_inverse else self.inertia.operator
-        return np.asarray(self.distribution.velocity(operator, *self.distribution.seen(g), along, self.across), dtype=np.float64)
+        W, F = self.distribution.seen(g)
+        return np.asarray(self.distribution.velocity(self._operator, W, F, along, self.across), dtype=np.float64)
 
     def jacobi(self, g: Array, omega: Array) -> Array:
         """Return the Jacobi–Painlevé integral ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v, shape (…)."""
@@ -168,9 +158,9 @@ class MomentumFlow(LRFlow):
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
-        """Return the constants c, the operator (𝓘 or its inverse, whichever (mom) is solved with), and m or the potential's."""
-        operator = self.inertia.inverse if self.distribution.uses_inverse else self.inertia.operator
-        return np.concatenate([self._steady, operator.ravel(), self._coefficients if self.potential else self.along])
+        """Return the operator that (mom) is solved with, the constants c unless all are zero, and m or the potential's."""
+        constants = self.across if np.any(self.across) else np.empty(0)
+        return np.concatenate([self._operator.ravel(), constants, self._coefficients if self.potential else self.along])
 
     def _split(self, state: Any) -> tuple[Any, Any]:
         area = self.g.size
@@ -180,8 +170,10 @@ class MomentumFlow(LRFlow):
         """Return (gω, m_k' = −⟨y(v), 𝒲_k⟩)."""
         g, along = self._split(state)
         W, F = self.distribution.seen(g, ops)
-        m = along if self.potential else parameters[parameters.size - self.along.size :]
-        omega = self.distribution.velocity(self._operator(parameters), W, F, m, self._offset(parameters), ops)
+        operator, rest = np.split(parameters, [self._operator.size])
+        m = along if self.potential else rest[rest.size - self.along.size :]
+        c = rest[: self.across.size] if np.any(self.across) else self.across
+        omega = self.distribution.velocity(operator.reshape(self._operator.shape), W, F, m, c, ops)
         g_dot = ops.dot(g, self.distribution.group.element(omega, ops)).ravel()
         if self.potential is None:
             return g_dot
@@ -235,10 +227,6 @@ class MultiplierFlow(LRFlow):
     def parameters(self) -> Array:  # type: ignore[override]
         """Return 𝓘⁻¹, 𝓘 and the potential's coefficients."""
         return np.concatenate([self.inertia.inverse.ravel(), self.inertia.operator.ravel(), self._coefficients])
-
-    @property
-    def _steady(self) -> Array:
-        return np.empty(0)
 
     def _split(self, state: Any) -> tuple[Any, Any]:
         D = self.distribution.group.dimension

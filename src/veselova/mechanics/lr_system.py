@@ -42,6 +42,7 @@ class LRSystem(Problem):
     potential  None, or v as a list of monomials {"coefficient": c, "powers": [[i, j, p], …]}: c Π g_ij^p, i and j from 1
     homogeneous  True: ω must satisfy the constraints with c = 0 to 1e-9, and is projected; False: c is what ω gives
 
+    Attributes: ``g`` on the group, ``omega`` (D,) in coordinates, ``constraint`` (m,) the c_s, ``distribution``, ``inertia``.
     Raises InvalidInput, which names the field, what was required and what was given.
     """
 
