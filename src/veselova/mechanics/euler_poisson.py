@@ -47,7 +47,7 @@ class EulerPoisson(RigidBody):
 
     @property
     def _linear_name(self) -> str:
-        return "(𝒥Ω,γ)"
+        return "i2"
 
     @property
     def vanishing(self) -> frozenset[str]:
