@@ -325,6 +325,13 @@ def test_without_constraints_all_of_the_momentum_is_kept(rng: np.random.Generato
 
 
 @pytest.mark.parametrize("formulation", LRSystem.formulations)
+def test_in_the_plane_the_inertia_drops_out_of_the_field(formulation: str) -> None:
+    system = LRSystem(2, 1, {"special": [3, 2]}, None, [[0, 2], [-2, 0]])
+    frame = solve(system, [1.5], method="taylor", formulation=formulation).frame[0]
+    assert np.allclose(frame, [[np.cos(3), -np.sin(3)], [np.sin(3), np.cos(3)]], atol=1e-14)
+
+
+@pytest.mark.parametrize("formulation", LRSystem.formulations)
 def test_a_reflected_frame_is_taken_and_obeys_the_same_equations(formulation: str, rng: np.random.Generator) -> None:
     system = random_lr(rng, 3, 1)
     group = system.distribution.group

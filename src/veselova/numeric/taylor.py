@@ -88,13 +88,8 @@ def _compiled(flow: Flow, tolerance: float) -> Any:
         if len(_known) >= _MOST_COMPILED:
             _known.clear()
         compact = len(equations) >= _COMPACT_FROM or sum(len(dx) for dx in equations) >= _COMPACT_OPERATIONS
-        _known[key] = hy.taylor_adaptive(
-            list(zip(variables, equations, strict=True)),
-            np.ones(len(variables)),
-            tol=tolerance,
-            compact_mode=compact,
-            pars=np.ones(len(parameters)),
-        )
+        system = list(zip(variables, equations, strict=True))
+        _known[key] = hy.taylor_adaptive(system, np.ones(len(variables)), tol=tolerance, compact_mode=compact)
     return _known[key]
 
 
