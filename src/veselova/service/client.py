@@ -95,11 +95,13 @@ def _trajectory_call(
     *,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
+    formulation: str | None = None,
     budget_s: float = 10.0,
 ) -> _Call[Trajectory]:
     """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
     asked = _problem(problem)
-    body = {"engine": engine, "digits": digits, "certified": certified, **_motion(asked, times, method, budget_s)}
+    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
+    body = {**chosen, **_motion(asked, times, method, budget_s)}
     return _Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
 
 

@@ -1,0 +1,149 @@
+"""Every system through every door: the same problem in Python, JSON, HTTP, the client, files and pictures."""
+
+from __future__ import annotations
+
+import csv
+import pickle
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import numpy as np
+import orjson
+import pytest
+
+from conftest import Server
+from veselova import Client, InvalidInput, InvalidRequest, compare, solve
+from veselova.service.documents import encoded, stored_outputs, trajectory_document, trajectory_of
+from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
+from veselova.service.systems import SYSTEMS
+
+TIMES = [-1.0, 0.0, 0.5, 2.0]
+
+PROBLEMS: dict[str, dict[str, Any]] = {
+    "veselova": {"A": [3, "3/2", 1], "q": ["0.6", 0, "0.8"], "q_dot": [0, 1, 0]},
+    "neumann": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_prime": [0, 1, 0]},
+    "ellipsoid-geodesic": {"A": [3, 2, 1], "X": [1, 1, 1], "X_dot": [1, -1, 0], "normalize": True},
+    "veselova-so3": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"], "potential": {"clebsch": 1}},
+    "euler-poisson": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]},
+    "lr": {"n": 3, "rank": 1, "inertia": {"special": [3, 2, 1]}, "omega": [[0, 1, "0.5"], [-1, 0, 0], ["-0.5", 0, 0]]},
+    "stiefel": {"inertia": {"special": [3, 2, 1]}, "X": [[1, 0], [0, 1], [0, 0]], "P": [[0, 1], [-1, 0], ["0.5", 2]]},
+}
+
+
+def document(name: str) -> dict[str, Any]:
+    return {"system": name, **PROBLEMS[name]}
+
+
+def problem_of(name: str) -> Any:
+    return read_request(TorusRequest, {"problem": document(name)}).problem.problem()
+
+
+def test_every_system_is_in_the_table() -> None:
+    assert set(PROBLEMS) == set(SYSTEMS)
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -> None:
+    problem = problem_of(name)
+    again = read_request(TorusRequest, orjson.loads(orjson.dumps({"problem": problem.as_dict()}))).problem.problem()
+    assert again.as_dict() == problem.as_dict()
+    found = solve(problem, TIMES)
+    assert found.provenance.engine == next(iter(problem.engines))
+    back = trajectory_of(again, orjson.loads(encoded(trajectory_document(found, stored_outputs(problem)))))
+    for output, axes in problem.outputs.items():
+        assert np.array_equal(back.series(output), found.series(output))
+        assert found.series(output).ndim == 1 + len(axes)
+    assert {key: value.tolist() for key, value in back.integrals.items()} == {k: v.tolist() for k, v in found.integrals.items()}
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_the_start_is_at_time_zero_and_dense_answers_agree(name: str) -> None:
+    problem = problem_of(name)
+    found = solve(problem, TIMES, "numeric")
+    for output, values in problem.start.items():
+        assert np.allclose(found.series(output)[1], values[0], atol=1e-12)
+    assert np.allclose(found.at([2.0]).series(problem.portrait), found.series(problem.portrait)[3:], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_every_formulation_and_engine_agrees(name: str) -> None:
+    problem = problem_of(name)
+    motions = [solve(problem, TIMES, "numeric", formulation=formulation) for formulation in problem.formulations]
+    if "analytic" in problem.engines:
+        motions.append(solve(problem, TIMES, "analytic"))
+        assert compare(problem, TIMES).agrees
+    for other in motions[1:]:
+        for output in problem.bounded:
+            difference = np.abs(other.series(output) - motions[0].series(output)).reshape(len(TIMES), -1).max(axis=1)
+            assert np.all(difference <= other.error + motions[0].error)
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path) -> None:
+    problem = problem_of(name)
+    found = solve(problem, TIMES)
+    found.to_csv(tmp_path / "x.csv")
+    with (tmp_path / "x.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row[problem.time]) for row in rows] == TIMES
+    found.to_npz(tmp_path / "x.npz")
+    with np.load(tmp_path / "x.npz") as stored:
+        assert all(np.array_equal(stored[output], found.series(output)) for output in problem.outputs)
+    assert set(found.to_xarray().data_vars) == {*problem.outputs, "error"}
+    found.plot().savefig(tmp_path / "x.png")
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.series(problem.portrait), found.series(problem.portrait))
+    assert name in repr(found)
+    assert name in found._repr_html_()
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
+    body = {"problem": document(name), "times": TIMES}
+    response = httpx2.post(f"{server.url}/v1/trajectories", json=body)
+    assert response.status_code == 200, response.text
+    problem = problem_of(name)
+    assert list(response.json()["series"]) == list(problem.outputs)
+    with Client(server.url) as client:
+        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1])
+    expected = solve(problem, TIMES, "numeric", formulation=problem.formulations[-1])
+    assert np.array_equal(found.series(problem.portrait), expected.series(problem.portrait))
+    assert found.provenance.details["formulation"] == problem.formulations[-1]
+    listed = {item["system"]: item for item in httpx2.get(f"{server.url}/v1/systems").json()["systems"]}
+    assert listed[name]["outputs"] == list(problem.outputs)
+    assert set(listed[name]["fields"]) >= set(PROBLEMS[name])
+
+
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
+def test_every_field_refuses_what_is_no_number(name: str) -> None:
+    """NaN, booleans, texts, objects, ragged lists, wrong lengths wherever a number may stand: named faults, nothing else."""
+    for field, value in PROBLEMS[name].items():
+        if isinstance(value, bool):
+            continue
+        for wrong in (float("nan"), True, "x", {"a": 1}, [[1], [1, 2]], [], None, [1, float("inf"), 2], 10**400):
+            problem = {**document(name), field: wrong}
+            if wrong is None and field in ("potential", "g"):
+                continue
+            with pytest.raises((InvalidInput, InvalidRequest)) as caught:
+                read_request(TorusRequest, {"problem": problem}).problem.problem()
+            # X of another shape makes another dimension, which the inertia then has not.
+            assert f"problem.{'inertia' if (name, field) == ('stiefel', 'X') and wrong == [[1], [1, 2]] else field}" in str(
+                caught.value
+            )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"formulation": "none"}, "formulation: required one of momentum, multipliers; given none."),
+        ({"outputs": ["q"]}, "outputs[0]: required one of omega, frame, momentum, multipliers; given q."),
+        ({"engine": "analytic"}, "engine: required one of numeric for system lr; given analytic."),
+    ],
+)
+def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], message: str) -> None:
+    from veselova.service.tasks import requested_trajectory
+
+    with pytest.raises((InvalidInput, InvalidRequest)) as caught:
+        requested_trajectory(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
+    assert message in str(caught.value)
