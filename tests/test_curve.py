@@ -158,7 +158,7 @@ def test_distances_are_sums_of_positive_parts(rng: np.random.Generator) -> None:
         below, above = cut.distances(psi)
         width = curve.differences[cut.left, cut.left + 1]
         assert np.allclose(below + above, width, rtol=1e-13)
-        squares = cut.squares(below, above)
+        squares = cut.points.squares(below, above)
         assert np.allclose(squares[0], sn**2, atol=1e-13)
         assert np.allclose(squares[1], cn**2, atol=1e-13)
         point = curve.branch_points[cut.left] + below

@@ -214,7 +214,7 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
                 below = width * square if before is None else width * before * square / (before + width * (1 - square))
                 point = points[left] + below
                 far = [p for i, p in enumerate(points) if not left - 1 <= i <= left + 2]
-                density = float(interval.density) / abs(np.prod([point - p for p in far])) ** 0.5
+                density = float(interval.points.density) / abs(np.prod([point - p for p in far])) ** 0.5
                 zeros = [(points[j] + points[j + 1]) / 2 for j in range(2, 2 * curve.genus, 2)]
                 forms = [np.prod([point - z for i, z in enumerate(zeros) if i != l]) for l in range(len(zeros) + 1)]
                 largest = np.maximum(largest, density * np.abs(forms))

@@ -57,7 +57,7 @@ class FourPoints:
         denominator = before + width * cn * cn
         return root * xp.sqrt(before / denominator) * sn, root * xp.sqrt((width + before) / denominator) * cn
 
-    def _squares(self, below: Any, above: Any) -> tuple[Any, Any]:
+    def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
         """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
         # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
         if self.before is not None:
@@ -67,7 +67,7 @@ class FourPoints:
     def angle(self, below: Any, above: Any, increasing: bool) -> Any:
         """Return ψ in (−π, π] of such a point, on the way back negative: v = F(am v, k) = sn·R_F(cn², dn², 1)."""
         xp, jacobi = self.arithmetic, self.jacobi
-        sn_squared, cn_squared = self._squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
+        sn_squared, cn_squared = self.squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
         dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
         # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
         if sn_squared <= cn_squared:
