@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from veselova import InvalidInput, Unsolved, VeselovaSO3, solve
+from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
 from veselova.analytic.separable import SeparableMotion, SeparatedRate
 from veselova.analytic.separated_curve import SeparableStart
 
@@ -131,3 +131,77 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     along_flow = motion.attitude(motion.inversion.invert(z))
     difference = (along_flow.q[2] - along_flow.q[0]) / (2 * step)
     assert np.allclose(difference, along_flow.normals[1] @ along_flow.components[1], atol=1e-8)
+
+
+PARTS: list[Any] = [
+    None,
+    {"quadratic": 0.4},
+    {"quartic": 0.2, "quadratic": "1/3"},
+    {"centrifugal": "walls"},
+    {"quartic": -0.1, "quadratic": 0.3, "centrifugal": "one"},
+]
+
+
+def point(rng: Generator, n: int, parts: Any) -> SeparableVeselova:
+    q, walls = rng.uniform(0.3, 1, n), {"walls": rng.uniform(0.005, 0.02, n), "one": [0.01] + [0] * (n - 1)}
+    potential = None if parts is None else {name: walls.get(str(value), value) for name, value in parts.items()}
+    return SeparableVeselova(rng.uniform(0.6, 2.5, n), q, 0.6 * rng.normal(size=n), potential, normalize=True)
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_points_in_separable_potentials_are_served_in_any_dimension(n: int, rng: Generator) -> None:
+    for parts in PARTS:
+        problem = point(rng, n, parts)
+        closed, found = solve(problem, TIMES / 2), solve(problem, TIMES / 2, "numeric", "taylor")
+        assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+        assert np.allclose(closed.q_dot, found.q_dot, atol=1e-9)
+        assert max(closed.drift.values()) < 1e-12
+        assert np.max(closed.error) < 1e-10
+
+
+def test_integrated_points_keep_their_integrals(rng: Generator) -> None:
+    for n in range(2, 7):
+        assert max(solve(point(rng, n, PARTS[4]), np.linspace(0, 100, 11), "numeric").drift.values()) < 1e-11
+
+
+def test_without_a_potential_points_are_the_rank_one_problem(rng: Generator) -> None:
+    problem = point(rng, 4, None)
+    body = Veselova(problem.A, problem.q, problem.q_dot, normalize=True)
+    assert np.max(np.abs(solve(problem, TIMES).q - solve(body, TIMES).q)) < 1e-12
+
+
+def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) -> None:
+    body = drawn(rng, POTENTIALS["all"])
+    betas, velocity = [0.02, 0.05, 0.1], np.cross(body.gamma, body.Omega)
+    inertia = np.diag(body.inertia)
+    # A = 𝓘⁻¹ has the inertia A_iA_j/det A = 𝓘_k, so that both count the same energy.
+    problem = SeparableVeselova(
+        1 / inertia, body.gamma, velocity, {"quartic": -0.2, "quadratic": 0.5, "centrifugal": betas}, normalize=True
+    )
+    ours, theirs = solve(problem, TIMES), solve(body, TIMES, "analytic")
+    assert np.all(np.abs(ours.q - theirs.gamma) <= (ours.error + theirs.error)[:, None])
+    assert np.isclose(problem.energy, theirs.integrals["energy"][0] + 0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        ({"A": [1, 2, 2]}, "A[2]"),
+        ({"potential": {"cubic": 1}}, "potential"),
+        ({"potential": {"quartic": "x"}}, "potential.quartic"),
+        ({"potential": {"centrifugal": [1, 2]}}, "potential.centrifugal"),
+        ({"potential": {"centrifugal": [0, 1, 0]}, "q": [0.6, 0, 0.8], "q_dot": [0, 1, 0]}, "potential.centrifugal[1]"),
+        ({"q_dot": [1, 0, 0]}, "q_dot"),
+    ],
+)
+def test_bad_points_are_refused_by_field(change: dict[str, Any], path: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        SeparableVeselova(**{"A": [1, 2, 3], "q": [0.6, 0.8, 0], "q_dot": [0, 0, 1], "potential": {"quartic": 1}, **change})
+    assert caught.value.field == path
+
+
+def test_attracting_planes_end_a_motion_by_name() -> None:
+    problem = SeparableVeselova([1, 2, 3], [0.6, 0.48, 0.64], [0, 0.64, -0.48], {"centrifugal": [-0.1, 0, 0]})
+    for options in ({}, {"engine": "numeric"}, {"engine": "numeric", "method": "taylor"}):
+        with pytest.raises(Unsolved, match="collision"):
+            solve(problem, [0.0, 50.0], **options)  # type: ignore[arg-type]

@@ -27,6 +27,12 @@ PROBLEMS: dict[str, dict[str, Any]] = {
     "veselova-so3": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"], "potential": {"clebsch": 1}},
     "euler-poisson": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]},
     "lr": {"n": 3, "rank": 1, "inertia": {"special": [3, 2, 1]}, "omega": [[0, 1, "0.5"], [-1, 0, 0], ["-0.5", 0, 0]]},
+    "separable": {
+        "A": [3, "3/2", 1],
+        "q": ["0.6", "0.48", "0.64"],
+        "q_dot": ["0.8", "-0.36", "-0.48"],
+        "potential": {"quadratic": 1, "centrifugal": [0, "0.01", 0]},
+    },
     "stiefel": {"inertia": {"special": [3, 2, 1]}, "X": [[1, 0], [0, 1], [0, 0]], "P": [[0, 1], [-1, 0], ["0.5", 2]]},
 }
 

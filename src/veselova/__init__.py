@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.group import MatrixGroup as MatrixGroup
     from veselova.mechanics.lr_system import LRSystem as LRSystem
     from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
+    from veselova.mechanics.separable_veselova import SeparableVeselova as SeparableVeselova
     from veselova.mechanics.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.torus import Torus as Torus
     from veselova.mechanics.trajectory import Provenance as Provenance
@@ -59,6 +60,7 @@ _HOMES = {
     "NeumannSystem": "veselova.mechanics.neumann",
     "ProblemResponse": "veselova.mechanics.errors",
     "Provenance": "veselova.mechanics.trajectory",
+    "SeparableVeselova": "veselova.mechanics.separable_veselova",
     "ServiceError": "veselova.mechanics.errors",
     "ServiceUnreachable": "veselova.mechanics.errors",
     "StiefelFlow": "veselova.mechanics.stiefel",

@@ -15,14 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.clock import Clock
-from veselova.analytic.fourier_clock import FourierClock
-from veselova.analytic.frame import slopes
-from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.panel_integral import PanelIntegral
-from veselova.analytic.precision import DOUBLE
-from veselova.analytic.separable import SeparableMotion, SeparatedRate
+from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart
 from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import Unsolved
@@ -39,15 +33,6 @@ Array = NDArray[np.float64]
 #: Equal moments are drawn apart by this part of themselves, far below any digit.
 _APART = Fraction(1, 10**30)
 
-#: Cycles from which the Fourier clock is cheaper, and those that the panels of the turning integral are willing to cover.
-_FOURIER_FROM, _MOST_CYCLES = 10.0, 5e4
-
-#: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
-_EVALUATION, _PHASE, _RATE = 32.0, 16.0, 8.0
-
-#: Points at which steepness is sampled; it is doubled for what lies between them.
-_SAMPLES, _BETWEEN = 48, 2.0
-
 #: Step of a difference quotient in a phase.
 _STEP = 1e-6
 
@@ -57,6 +42,9 @@ class BodyMotion:
     """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or (Ω,γ) ≠ 0."""
 
     problem: VeselovaSO3
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"problem": self.problem}  # what was computed stays behind when it is pickled
 
     @cached_property
     def _order(self) -> NDArray[np.intp]:
@@ -93,34 +81,8 @@ class BodyMotion:
         return vector if self.problem.axes is None else self.problem.axes.T @ vector
 
     @cached_property
-    def _motion(self) -> SeparableMotion:
-        return SeparableMotion(self._start)
-
-    @cached_property
-    def _rate(self) -> SeparatedRate:
-        return SeparatedRate(self._motion)
-
-    @cached_property
-    def _in_tau(self) -> LinearFlow:
-        origin = self._motion.inversion.map(self._motion.angles[None, :])[0]
-        return LinearFlow.of(origin, self._motion.periods.frequencies)
-
-    @cached_property
-    def _in_time(self) -> LinearFlow:
-        return LinearFlow.of(self._in_tau.start, self._motion.periods.frequencies / self._rate.mean)
-
-    def _clock(self, grid: Array) -> Clock:
-        cycles = float(np.max(np.abs(self._in_time.rates)) * np.max(np.abs(grid)))
-        if not cycles <= _MOST_CYCLES:
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; the frame is integrated to {_MOST_CYCLES:.0e}")
-        if cycles > _FOURIER_FROM:
-            return FourierClock(self._rate, self._in_tau, self._in_time, self._rate.mean)
-        inversion = self._motion.inversion
-        return PanelClock(lambda z: self._rate.at(inversion.invert(z)), self._rate.mean, self._in_tau, grid[0], grid[-1])
-
-    @cached_property
-    def _sample(self) -> Array:
-        return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, 2))
+    def _orbit(self) -> SeparableOrbit:
+        return SeparableOrbit(self._start)
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times."""
@@ -130,22 +92,25 @@ class BodyMotion:
                 "analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"}
             )
             return Trajectory.at_rest(self.problem, grid, provenance, self)
-        clock = self._clock(grid)
+        orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
+        clock = orbit.clock(grid)
         tau, z = clock.tau1(grid)
-        inversion, motion = self._motion.inversion, self._motion
-        largest = float(np.max(np.abs(motion.turning(inversion.invert(self._sample)))))
-        panels = PanelIntegral(
-            lambda z: motion.turning(inversion.invert(z)), self._in_tau, min(tau[0], 0.0), max(tau[-1], 0.0), largest
-        )
+        largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
+        low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
+        panels = PanelIntegral(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
         phi = inversion.invert(z)
         at = motion.attitude(phi)
-        velocity = np.sum(at.normals * at.components[:, None, :], axis=2) / self._rate.at(phi)[:, None]
+        velocity = np.sum(at.normals * at.components[:, None, :], axis=2) / orbit.rate.at(phi)[:, None]
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
-        turned = -panels.at(tau)
-        frame = self._frame(gamma, lines, turned)
-        error = self._error(tau, clock, panels)
+        frame = self._frame(gamma, lines, -panels.at(tau))
+        error, along = orbit.error(tau, clock, self._turning_steepness)
+        error = error + panels.error(tau) + panels.mean_size * along
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
-        details = {"clock": clock.name, "clock_size": clock.size, "degree": len(self._start.factor) + 3}
+        details = {
+            "clock": clock.name,
+            "clock_size": clock.size,
+            "degree": len(self._start.factor) + self._start.centrifugal.count(0),
+        }
         provenance = Provenance("analytic", "angles", FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
         return Trajectory(self.problem, grid, error, series, provenance, dense=self)
 
@@ -158,33 +123,17 @@ class BodyMotion:
 
     def _frame(self, gamma: Array, lines: Array, turned: Array) -> Array:
         """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
-        start = self._to_body(self._motion.attitude(self._motion.angles[None, :]).normals)[0]
+        start = self._to_body(self._orbit.motion.attitude(self._orbit.motion.angles[None, :]).normals)[0]
         cosine, sine = np.cos(turned), np.sin(turned)
         turn = np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
         rest = lines @ turn @ (start.T @ self.problem.frame[:, 1:])
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
-    def _steepness(self) -> Array:
-        """Return the largest |∂/∂z_k| of γ, the coordinate lines and, over a cycle, their turning, shape (g,)."""
-        inversion, motion = self._motion.inversion, self._motion
-
-        def moved(z: Array) -> Any:
-            return motion.attitude(inversion.invert(z))
-
-        directions = np.broadcast_to(np.eye(2), (_SAMPLES, 2, 2))
-        by_phase = np.max(np.abs(slopes(moved, self._sample, directions)), axis=(0, 1))
-        here = motion.turning(inversion.invert(self._sample))
-        moves = [motion.turning(inversion.invert(self._sample + _STEP * e)) - here for e in np.eye(2)]
-        turning = [np.max(np.abs(move)) / _STEP for move in moves]
-        per_cycle = np.array(turning) / np.min(np.abs(self._in_tau.rates))
-        return np.asarray(_BETWEEN * (by_phase + per_cycle))
-
-    def _error(self, tau: Array, clock: Clock, panels: PanelIntegral) -> Array:
-        """Return a bound on every component of the frame: rounding, phases times steepness, and the turning integral's own."""
-        rates, elapsed = np.abs(self._in_tau.rates), np.abs(tau)
-        start = _PHASE * DOUBLE.epsilon + self._motion.periods.series_truncation
-        along = _RATE * DOUBLE.epsilon * elapsed + clock.error(tau)
-        phase = start + along[:, None] * rates
-        turning = panels.error(tau) + panels.mean_size * along
-        return np.asarray(_EVALUATION * DOUBLE.epsilon + phase @ self._steepness + turning)
+    def _turning_steepness(self) -> Array:
+        """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), doubled for what lies between the samples."""
+        orbit, motion = self._orbit, self._orbit.motion
+        here = motion.turning(orbit.inversion.invert(orbit.sample))
+        moves = [motion.turning(orbit.inversion.invert(orbit.sample + _STEP * e)) - here for e in np.eye(2)]
+        largest = np.array([np.max(np.abs(move)) for move in moves]) / _STEP
+        return np.asarray(2 * largest / np.min(np.abs(orbit.in_tau.rates)))

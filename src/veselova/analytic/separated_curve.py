@@ -48,8 +48,8 @@ _SEPARATRIX = 1e-12
 class SeparableStart:
     """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all exact; (q,q̇) = 0, |q| any.
 
-    inverse (n,) distinct I's, increasing · q, q_dot (n,) along these axes, q̇ for |q| = 1 scaled as q is · polynomial: the v_m ·
-    centrifugal (n,) the β_i, none of them at q_i = 0
+    inverse (n,) distinct I's, increasing · q, q_dot (n,) along these axes · polynomial: the v_m · centrifugal (n,) the β_i,
+    none of them at q_i = 0 · size: 1 where q̇ is scaled as q is, (q,q) where it is the velocity of the unit vector
     """
 
     inverse: tuple[Fraction, ...]
@@ -57,6 +57,7 @@ class SeparableStart:
     q_dot: tuple[Fraction, ...]
     polynomial: tuple[Fraction, ...]
     centrifugal: tuple[Fraction, ...]
+    size: Fraction = Fraction(1)
 
     @cached_property
     def q_squared(self) -> list[Fraction]:
@@ -75,7 +76,7 @@ class SeparableStart:
         """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U]."""
         size = sum((x * x for x in self.q), Fraction())
         pairs = list(itertools.combinations(range(len(self.q)), 2))
-        wedges = {(i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2 for i, j in pairs}
+        wedges = {(i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2 * self.size for i, j in pairs}
         # (dt/dτ)² = (q,Aq)/det A, and T = ½Σ (q∧q̇)²_ij Π_{k≠i,j} I_k.
         rest = {(i, j): math.prod(_without(self.inverse, i, j)) for i, j in pairs}
         kinetic = sum((rest[pair] * wedges[pair] for pair in pairs), Fraction()) / 2

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from veselova.analytic.body_motion import BodyMotion
 from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
+from veselova.analytic.point_motion import PointMotion
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
@@ -39,7 +41,7 @@ _NO_DIGIT = 0.1
 
 
 def solve(
-    problem: TorusProblem | VeselovaSO3,
+    problem: TorusProblem | VeselovaSO3 | SeparableVeselova,
     times: Any,
     *,
     method: str | None = None,
@@ -61,8 +63,8 @@ def solve(
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
-    if isinstance(problem, VeselovaSO3):
-        return _body_motion(problem, grid, method, clock, beyond_double(digits, certified))
+    if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
+        return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
         return _Motion(problem, method, clock)(grid)
     if certified and method == "theta":
@@ -76,13 +78,15 @@ def solve(
     return EnclosedMotion(problem, digits, certified, method)(times)
 
 
-def _body_motion(problem: VeselovaSO3, grid: Array, method: str | None, clock: str | None, beyond: bool) -> Trajectory:
-    """Return the motion of a body in a separable potential; it has one method, one choice of clocks and 15 digits."""
+def _separable_motion(
+    problem: VeselovaSO3 | SeparableVeselova, grid: Array, method: str | None, clock: str | None, beyond: bool
+) -> Trajectory:
+    """Return the motion in a separable potential; it has one method, one choice of clocks and 15 digits."""
     for field, given, allowed in (("method", method, (None, "angles")), ("clock", clock, (None,)), ("digits", beyond, (False,))):
         if given not in allowed:
             required = {"method": "angles", "clock": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
             raise InvalidInput((field,), f"{required} for system {problem.system}", shown(given))
-    return BodyMotion(problem)(grid)
+    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem))(grid)
 
 
 @dataclass(frozen=True)

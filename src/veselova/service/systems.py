@@ -17,6 +17,7 @@ from veselova.mechanics.euler_poisson import EulerPoisson
 from veselova.mechanics.lr_system import LRSystem
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.stiefel import StiefelFlow
 from veselova.mechanics.veselova import Veselova
 from veselova.mechanics.veselova_so3 import VeselovaSO3
@@ -84,6 +85,12 @@ _POTENTIAL = {
     "minProperties": 1,
     "additionalProperties": False,
 }
+_SEPARABLE = {
+    "type": "object",
+    "properties": {"quartic": _NUMBER, "quadratic": _NUMBER, "centrifugal": _VECTOR},
+    "minProperties": 1,
+    "additionalProperties": False,
+}
 _COLUMNS = {"type": "array", "items": {"type": "array", "items": _NUMBER, "minItems": 1}, "minItems": 2}
 _BODY_INERTIA = {
     "anyOf": [
@@ -105,6 +112,7 @@ Whole = Annotated[Any, WithJsonSchema(_WHOLE)]
 InertiaOperator = Annotated[Any, WithJsonSchema(_INERTIA_OPERATOR)]
 Matrix = Annotated[Any, WithJsonSchema(_MATRIX)]
 Potential = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "array", "items": _MONOMIAL, "minItems": 1}, {"type": "null"}]})]
+SeparableData = Annotated[Any, WithJsonSchema({"anyOf": [_SEPARABLE, {"type": "null"}]})]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
 
@@ -249,6 +257,20 @@ class LRModel(SystemModel):
     ] = False
 
 
+class SeparableModel(SystemModel):
+    """The reduced rank-one system in n dimensions, in the potentials of (3.5), and its state at t = 0."""
+
+    problem_class: ClassVar[type[Problem]] = SeparableVeselova
+    measured: ClassVar[str] = "A"
+
+    system: Literal["separable"]
+    A: Annotated[Vector, Field(description="n positive numbers, no two equal; n ≥ 2")]
+    q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
+    q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
+    potential: Annotated[SeparableData, Field(description="α₁ (quartic), α₂ (quadratic), β_1 … β_n (centrifugal)")] = None
+    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
+
+
 #: The systems, by the name that tells them apart.
 SYSTEMS: Mapping[str, type[SystemModel]] = {
     "veselova": VeselovaModel,
@@ -258,9 +280,17 @@ SYSTEMS: Mapping[str, type[SystemModel]] = {
     "stiefel": StiefelModel,
     "euler-poisson": EulerPoissonModel,
     "lr": LRModel,
+    "separable": SeparableModel,
 }
 
 ProblemModel = Annotated[
-    VeselovaModel | NeumannModel | EllipsoidGeodesicModel | VeselovaSO3Model | StiefelModel | EulerPoissonModel | LRModel,
+    VeselovaModel
+    | NeumannModel
+    | EllipsoidGeodesicModel
+    | VeselovaSO3Model
+    | StiefelModel
+    | EulerPoissonModel
+    | LRModel
+    | SeparableModel,
     Field(discriminator="system"),
 ]

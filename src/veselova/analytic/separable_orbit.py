@@ -1,0 +1,85 @@
+"""One orbit of a separable motion: its clock, phases, and what rounding of them does to positions."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import Clock
+from veselova.analytic.fourier_clock import FourierClock
+from veselova.analytic.frame import slopes
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.panel_clock import PanelClock
+from veselova.analytic.precision import DOUBLE
+from veselova.analytic.separable import SeparableMotion, SeparatedRate
+from veselova.analytic.separated_curve import SeparableStart
+from veselova.mechanics.errors import Unsolved
+
+__all__ = ["SeparableOrbit"]
+
+Array = NDArray[np.float64]
+
+#: Cycles from which the Fourier clock is cheaper, to genus three; and those that panels are willing to cover.
+_FOURIER_FROM, _FOURIER_GENUS = 10.0, 3
+_MOST_CYCLES = 5e4
+
+#: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
+_EVALUATION, _PHASE, _RATE = 32.0, 16.0, 8.0
+
+#: Points at which steepness is sampled; it is doubled for what lies between them.
+_SAMPLES, _BETWEEN = 48, 2.0
+
+
+class SeparableOrbit:
+    """The orbit of a start. Raises Unsolved as SeparableMotion does."""
+
+    def __init__(self, start: SeparableStart) -> None:
+        self.motion = SeparableMotion(start)
+        self.rate = SeparatedRate(self.motion)
+        self.inversion = self.motion.inversion
+        origin = self.inversion.map(self.motion.angles[None, :])[0]
+        self.in_tau = LinearFlow.of(origin, self.motion.periods.frequencies)
+
+    @cached_property
+    def in_time(self) -> LinearFlow:
+        """Return the uniform part of the phases in physical time."""
+        return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
+
+    def clock(self, grid: Array) -> Clock:
+        """Return a clock for the given times, by cost; raises Unsolved (``too-far``)."""
+        cycles = float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
+        if not cycles <= _MOST_CYCLES:
+            raise Unsolved(
+                "too-far", f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to {_MOST_CYCLES:.0e}"
+            )
+        if cycles > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
+            return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
+        return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+
+    @cached_property
+    def sample(self) -> Array:
+        """Return points of the torus at which steepness is looked at, phases modulo 2."""
+        genus = self.motion.periods.genus
+        return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
+
+    @cached_property
+    def steepness(self) -> Array:
+        """Return the largest |∂/∂z_k| of q and the coordinate lines, shape (g,)."""
+
+        def moved(z: Array) -> Any:
+            return self.motion.attitude(self.inversion.invert(z))
+
+        genus = self.motion.periods.genus
+        directions = np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus))
+        return np.asarray(_BETWEEN * np.max(np.abs(slopes(moved, self.sample, directions)), axis=(0, 1)))
+
+    def error(self, tau: Array, clock: Clock, further: Array | float = 0.0) -> tuple[Array, Array]:
+        """Return a bound on the error of q and the lines, (N,), and that of τ; ``further`` is added to the steepness."""
+        rates, elapsed = np.abs(self.in_tau.rates), np.abs(tau)
+        start = _PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation
+        along = _RATE * DOUBLE.epsilon * elapsed + clock.error(tau)
+        phase = start + along[:, None] * rates
+        return np.asarray(_EVALUATION * DOUBLE.epsilon + phase @ (self.steepness + further)), np.asarray(along)

@@ -1,0 +1,141 @@
+"""The reduced flow on T*Sⁿ⁻¹ in the potentials of (3.5), in n dimensions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.flow import FLOATS, Flow, Operations
+from veselova.mechanics.integrals import sliding_velocity, unit_scale
+
+__all__ = ["SeparableFlow"]
+
+Array = NDArray[np.float64]
+
+#: A coordinate with an attracting wall is followed to this part of its start: beyond, the speed grows like its inverse.
+_NEAREST = 1e-3
+
+
+@dataclass(frozen=True)
+class SeparableFlow(Flow):
+    """The extended system (extended) for q and p with the tangential force of V = α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
+
+    Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det A, in units of time.
+    """
+
+    parameters: Array
+    time_unit: float
+    initial: Array
+
+    @classmethod
+    def of(cls, A: Array, q: Array, q_dot: Array, potential: tuple[float, float, Array], turning: float) -> SeparableFlow:
+        """Return the flow of a start (q, q̇) in the potential (α₁, α₂, β)."""
+        scaled, k = unit_scale(A)
+        n, inverse = A.size, 1 / scaled
+        p = scaled * sliding_velocity(scaled, q, q_dot / turning) * (q @ (scaled * q))
+        # T is A²/det A; V in its units, with I in units of 2^−k.
+        unit = float(np.prod(scaled)) * 2.0 ** (k * (n - 2)) / turning**2
+        quartic, quadratic, betas = potential
+        forces = [betas * unit, [quartic * unit * 4.0**-k, quadratic * unit * 2.0**-k]]
+        return cls(np.concatenate([scaled, inverse, *forces]), 1 / turning, np.concatenate([q, p]))
+
+    @property
+    def _n(self) -> int:
+        return (self.parameters.size - 2) // 3
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return (q̇, ṗ): (extended), and −∂V/∂q along the sphere."""
+        n = self._n
+        q, p = state[:n], state[n:]
+        A, inverse = parameters[:n], parameters[n : 2 * n]
+        p_inverse = inverse * p
+        qAq, qq, along, pp, pq = (ops.dot(a, b) for a, b in ((q, A * q), (q, q), (p_inverse, q), (p, p_inverse), (p, q)))
+        force = self._force(q, parameters, ops)
+        derivative = np.empty_like(state)
+        derivative[:n] = (p_inverse - (along / qq) * q) / qAq
+        derivative[n:] = (-(pp * qq - pq * along) / (qAq * qq * qq)) * q + force - (ops.dot(force, q) / qq) * q
+        return derivative
+
+    def _force(self, q: Any, parameters: Any, ops: Operations) -> Any:
+        n = self._n
+        inverse, betas = parameters[n : 2 * n], parameters[2 * n : 3 * n]
+        quartic, quadratic = parameters[3 * n], parameters[3 * n + 1]
+        moment = ops.dot(inverse * q, q)
+        force = (-2.0 * quartic) * (inverse * inverse * q) + (4.0 * quartic * moment - 2.0 * quadratic) * (inverse * q)
+        walls = np.zeros(n, dtype=q.dtype)
+        for i in np.flatnonzero(self._walls):
+            walls[i] = 2.0 * betas[i] / (q[i] * q[i] * q[i])
+        return force + walls
+
+    @property
+    def _walls(self) -> Array:
+        return self.parameters[2 * self._n : 3 * self._n]
+
+    @property
+    def structure(self) -> Any:
+        """Return the dimension and where there are walls."""
+        return type(self), self._n, tuple(np.flatnonzero(self._walls))
+
+    def _energy(self, q: Array, p: Array) -> float:
+        n, parameters = self._n, self.parameters
+        A, inverse, betas = parameters[:n], parameters[n : 2 * n], self._walls
+        moment, live = inverse @ (q * q), betas != 0
+        potential = parameters[3 * n] * ((inverse * inverse) @ (q * q) - moment * moment) + parameters[3 * n + 1] * moment
+        return float(p @ (inverse * p) / (2 * (q @ (A * q))) + potential + np.sum(betas[live] / q[live] ** 2))
+
+    def _on_sphere(self, state: Array) -> tuple[Array, Array]:
+        q, p = state[: self._n], state[self._n :]
+        q = q / np.linalg.norm(q)
+        return q, p - (p @ q) * q
+
+    def project(self, state: Array) -> Array:
+        """Return the state with |q| = 1, (q,p) = 0 and the energy of the start, by one step along its gradient."""
+        q, p = self._on_sphere(state)
+        n = self._n
+        A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
+        qAq = q @ (A * q)
+        by_q = -(p @ (inverse * p) / qAq**2) * (A * q) - self._force(q, self.parameters, FLOATS)
+        by_p = inverse * p / qAq
+        by_q, by_p = by_q - (by_q @ q) * q, by_p - (by_p @ q) * q
+        size = float(by_q @ by_q + by_p @ by_p)
+        step = (self._energy(q, p) - self._energy(*self._on_sphere(self.initial))) / size if size > 0 else 0.0
+        return np.concatenate(self._on_sphere(np.concatenate([q - step * by_q, p - step * by_p])))
+
+    def neighbour(self, distance: float) -> SeparableFlow:
+        """Return the flow of a start moved by about ``distance``."""
+        direction = np.random.default_rng(self._n).normal(size=self.initial.size) / np.sqrt(self._n)
+        direction[: self._n] *= np.abs(self.initial[: self._n]) ** (self._walls != 0)  # what is near a wall moves relative to it
+        return replace(self, initial=np.concatenate(self._on_sphere(self.initial + distance * direction)))
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return q and q_dot, on the manifold."""
+        n = self._n
+        states = np.array([self.project(state) for state in states])
+        q, p = states[:, :n], states[:, n:]
+        A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
+        p_inverse = inverse * p
+        q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / np.sum(q * A * q, axis=1, keepdims=True)
+        return {"q": q, "q_dot": q_dot / self.time_unit}
+
+    @property
+    def endless(self) -> bool:
+        """Return whether no plane attracts."""
+        return not np.any(self._walls < 0)
+
+    def clearance(self, state: Array) -> float:
+        """Return how far the nearest attracting plane is, less where a motion is given up."""
+        attracting = np.flatnonzero(self._walls < 0)
+        if not attracting.size:
+            return 1.0
+        return float(np.min(np.abs(state[attracting] / self.initial[attracting]))) - _NEAREST
+
+    def ending(self, time: float, state: Array) -> Unsolved:
+        """Return the collision."""
+        attracting = np.flatnonzero(self._walls < 0)
+        axis = int(attracting[np.argmin(np.abs(state[attracting] / self.initial[attracting]))])
+        when = f"at about t = {time * self.time_unit:.4g}"
+        return Unsolved("collision", f"the motion runs into the plane q[{axis}] = 0 {when}, where V is −∞; ask for earlier times")
