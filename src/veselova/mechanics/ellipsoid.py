@@ -17,7 +17,7 @@ from veselova.mechanics.flow import Flow
 from veselova.mechanics.geodesic_flow import GeodesicFlow
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
 from veselova.mechanics.neumann_flow import GaussFlow
-from veselova.mechanics.principal_inertia import positive_numbers
+from veselova.mechanics.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.problem import Series
 from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, unit
 from veselova.mechanics.spheroconic import to_spheroconic
@@ -67,6 +67,7 @@ class EllipsoidGeodesic(TorusProblem):
         if not isinstance(normalize, bool):
             raise InvalidInput(("normalize",), "true or false", shown(normalize))
         diagonal = positive_numbers(A)
+        require_moderate(diagonal, "A")
         n = len(diagonal)
         exact_X, exact_V = exact_vector(X, ("X",), n), exact_vector(X_dot, ("X_dot",), n)
         for name, vector in (("X", exact_X), ("X_dot", exact_V)):
@@ -204,11 +205,11 @@ def _joachimsthal(A: Array, q: Array, V: Array) -> Array:
 
 def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:
     """Raise InvalidInput unless X lies on the ellipsoid and V is a unit tangent, each to the tolerance."""
-    scaled = X / semiaxes
-    value = float(scaled @ scaled)
+    with np.errstate(over="ignore"):
+        scaled = X / semiaxes
+        value, length = float(scaled @ scaled), float(np.linalg.norm(V))
     if not abs(value - 1) <= 2 * INPUT_TOLERANCE:
         raise InvalidInput(("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}")
-    length = float(np.linalg.norm(V))
     if not abs(length - 1) <= INPUT_TOLERANCE:
         raise InvalidInput(("X_dot",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
     normal = scaled / semiaxes

@@ -12,9 +12,12 @@ from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, to_float
 from veselova.mechanics.sphere import INPUT_TOLERANCE
 
-__all__ = ["positive_numbers", "principal_inertia"]
+__all__ = ["positive_numbers", "principal_inertia", "require_moderate"]
 
 Array = NDArray[np.float64]
+
+#: The inverse of a smaller number is no float; numbers up to the second may be multiplied a few times.
+_LEAST, _MODERATE = Fraction(1, 10**308), Fraction(10**60)
 
 
 def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
@@ -25,7 +28,17 @@ def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
     for i, value in enumerate(diagonal):
         if value <= 0 or float(value) == 0:
             raise InvalidInput((name, i), "a finite number greater than 0", shown(A[i]))
+        if value < _LEAST:
+            raise InvalidInput((name, i), "a number whose inverse is within the range of a float", shown(A[i]))
     return diagonal
+
+
+def require_moderate(values: tuple[Fraction, ...], name: str) -> None:
+    """Raise InvalidInput unless squares and products of a few of the numbers and of their inverses stay floats."""
+    least, most = min(values), max(values)
+    if most > _MODERATE or least < 1 / _MODERATE:
+        given = f"numbers from {float(least):.3g} to {float(most):.3g}"
+        raise InvalidInput((name,), f"numbers between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e}", given)
 
 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Array | None]:

@@ -16,7 +16,7 @@ from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plai
 from veselova.mechanics.integrals import unit_scale
 from veselova.mechanics.natural_frame import natural_frame
 from veselova.mechanics.potential import Potential
-from veselova.mechanics.principal_inertia import principal_inertia
+from veselova.mechanics.principal_inertia import principal_inertia, require_moderate
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.rigid_body_flow import RigidBodyFlow, momentum
 from veselova.mechanics.sphere import INPUT_TOLERANCE, unit
@@ -148,13 +148,11 @@ def _inertia(given: Any) -> tuple[tuple[Fraction, ...], Array | None, Array, Arr
     """Return the principal moments, the principal axes where a matrix is given, the tensor and its inverse."""
     form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
     moments, axes = principal_inertia(given, "inertia")
+    require_moderate(moments, "inertia")
     if len(moments) != 3:
         raise InvalidInput(("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}")
     values = to_float(moments)
-    with np.errstate(over="ignore"):
-        reciprocals = 1 / values
-    if not np.all(np.isfinite(reciprocals)):
-        raise InvalidInput(("inertia",), "moments whose inverses are within the range of a float", f"{np.min(values):.3g}")
+    reciprocals = 1 / values
     if axes is None:
         return moments, None, np.diag(values), np.diag(reciprocals)
     tensor = to_float(exact_matrix(given, ("inertia",), 3))

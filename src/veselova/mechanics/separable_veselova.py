@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_number, exact_vector, plain, read_only, to_float
-from veselova.mechanics.principal_inertia import positive_numbers
+from veselova.mechanics.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.separable_flow import SeparableFlow
 from veselova.mechanics.separation import SeparablePotential, separation_constants
@@ -23,6 +23,9 @@ from veselova.mechanics.spheroconic import to_spheroconic
 __all__ = ["SeparableVeselova"]
 
 Array = NDArray[np.float64]
+
+#: Larger numbers leave the range of a float when they are multiplied.
+_LARGEST = Fraction(10**100)
 
 #: The parts of a potential.
 _PARTS = ("quartic", "quadratic", "centrifugal")
@@ -62,6 +65,7 @@ class SeparableVeselova(Problem):
         if not isinstance(normalize, bool):
             raise InvalidInput(("normalize",), "true or false", shown(normalize))
         diagonal = positive_numbers(A)
+        require_moderate(diagonal, "A")
         n = len(diagonal)
         for i, value in enumerate(diagonal):
             if value in diagonal[:i]:
@@ -83,8 +87,12 @@ class SeparableVeselova(Problem):
             object.__setattr__(self, name, read_only(array))
         object.__setattr__(self, "exact", exact)
         object.__setattr__(self, "potential", parts)
+        for name, largest in (("potential", _LARGEST), ("q_dot", _LARGEST)):
+            values = [*parts[:2], *parts[2]] if name == "potential" else list(exact.tangent)
+            if any(abs(x) > largest for x in values):
+                raise InvalidInput((name,), f"numbers up to {float(largest):.0e}", f"{float(max(map(abs, values))):.3g}")
         if not np.isfinite(self.energy):
-            raise InvalidInput(("q_dot",), "a state whose energy is within the range of a float", f"one of {self.energy}")
+            raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
         given = {"A": plain(A), "q": plain(q), "q_dot": plain(q_dot), "normalize": normalize}
         stated = {} if potential is None else {"potential": {name: plain(value) for name, value in potential.items()}}
         object.__setattr__(self, "given", {**given, **stated})

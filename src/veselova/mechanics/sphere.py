@@ -51,7 +51,8 @@ def unit(vector: Array) -> Array:
 
 def require_on_sphere(q: Array, velocity: Array, name: str = "q_dot") -> None:
     """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to the tolerance."""
-    length = float(np.linalg.norm(q))
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(q))
     if abs(length - 1) > INPUT_TOLERANCE:
         raise InvalidInput(("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
     largest = float(np.max(np.abs(velocity)))
