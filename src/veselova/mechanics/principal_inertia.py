@@ -16,8 +16,8 @@ __all__ = ["positive_numbers", "principal_inertia", "require_moderate"]
 
 Array = NDArray[np.float64]
 
-#: The inverse of a smaller number is no float; numbers up to the second may be multiplied a few times.
-_LEAST, _MODERATE = Fraction(1, 10**308), Fraction(10**60)
+#: The inverse of a smaller number is no float; the square of one up to the second is.
+_LEAST, _MODERATE = Fraction(1, 10**308), Fraction(10**120)
 
 
 def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
@@ -33,12 +33,12 @@ def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
     return diagonal
 
 
-def require_moderate(values: tuple[Fraction, ...], name: str) -> None:
-    """Raise InvalidInput unless squares and products of a few of the numbers and of their inverses stay floats."""
+def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = _MODERATE) -> None:
+    """Raise InvalidInput unless the numbers and their inverses are below ``limit``: some products of them must stay floats."""
     least, most = min(values), max(values)
-    if most > _MODERATE or least < 1 / _MODERATE:
+    if most > limit or least < 1 / limit:
         given = f"numbers from {float(least):.3g} to {float(most):.3g}"
-        raise InvalidInput((name,), f"numbers between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e}", given)
+        raise InvalidInput((name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given)
 
 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Array | None]:

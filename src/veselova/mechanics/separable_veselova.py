@@ -25,7 +25,7 @@ __all__ = ["SeparableVeselova"]
 Array = NDArray[np.float64]
 
 #: Larger numbers leave the range of a float when they are multiplied.
-_LARGEST = Fraction(10**100)
+_LARGEST, _WIDEST = Fraction(10**100), Fraction(10**20)
 
 #: The parts of a potential.
 _PARTS = ("quartic", "quadratic", "centrifugal")
@@ -65,7 +65,7 @@ class SeparableVeselova(Problem):
         if not isinstance(normalize, bool):
             raise InvalidInput(("normalize",), "true or false", shown(normalize))
         diagonal = positive_numbers(A)
-        require_moderate(diagonal, "A")
+        require_moderate(diagonal, "A", _WIDEST)
         n = len(diagonal)
         for i, value in enumerate(diagonal):
             if value in diagonal[:i]:
