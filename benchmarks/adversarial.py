@@ -46,7 +46,7 @@ def time_unit(problem: vs.Veselova) -> float:
 
 
 def measured(i: int, seed: int, patience: int) -> tuple[int, str, int, Any]:
-    """Return (i, class, n, (true error, reported error, largest ratio)), a text where it failed, None without truth, or "not run"."""
+    """Return (i, class, n, answer): (true error, reported error, largest ratio), None without truth, NOT_RUN, or what failed."""
     rng = np.random.default_rng([seed, i])
     n = 2 + i % 7
     name, problem = adversarial_start(rng, n)
