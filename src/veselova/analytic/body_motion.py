@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from veselova.analytic.panel_integral import PanelIntegral
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart
-from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import exact_number, exact_vector
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova_so3 import VeselovaSO3
-from veselova.version import __version__
 
 __all__ = ["BodyMotion"]
 
@@ -88,9 +86,7 @@ class BodyMotion:
         """Return the trajectory at times."""
         began, grid = time.perf_counter(), validated_times(times)
         if not self.problem.moves:
-            provenance = Provenance(
-                "analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"}
-            )
+            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
         clock = orbit.clock(grid)
@@ -111,7 +107,7 @@ class BodyMotion:
             "clock_size": clock.size,
             "degree": len(self._start.factor) + self._start.centrifugal.count(0),
         }
-        provenance = Provenance("analytic", "angles", FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        provenance = Provenance.since(began, "analytic", "angles", details)
         return Trajectory(self.problem, grid, error, series, provenance, dense=self)
 
     def _to_body(self, values: Array) -> Array:

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart
-from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.version import __version__
 
 __all__ = ["PointMotion"]
 
@@ -55,10 +53,8 @@ class PointMotion:
         """Return the trajectory at times."""
         began, grid = time.perf_counter(), validated_times(times)
         if not self.problem.moves:
-            seconds, regime = time.perf_counter() - began, {"regime": "rest"}
-            return Trajectory.at_rest(
-                self.problem, grid, Provenance("analytic", "rest", FEWEST_DIGITS, __version__, seconds, regime), self
-            )
+            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
+            return Trajectory.at_rest(self.problem, grid, provenance, self)
         orbit = self._orbit
         clock = orbit.clock(grid)
         tau, z = clock.tau1(grid)
@@ -72,5 +68,5 @@ class PointMotion:
             "clock_size": clock.size,
             "degree": len(self._start.factor) + self._start.centrifugal.count(0),
         }
-        provenance = Provenance("analytic", "angles", FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        provenance = Provenance.since(began, "analytic", "angles", details)
         return Trajectory(self.problem, grid, orbit.error(tau, clock)[0], series, provenance, dense=self)

@@ -24,7 +24,6 @@ from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.mechanics.veselova import Veselova
 from veselova.mechanics.veselova_so3 import VeselovaSO3
-from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
 
@@ -114,9 +113,7 @@ class _Motion:
         """Return the trajectory at times."""
         began, grid = time.perf_counter(), validated_times(times)
         if not self.problem.moves:
-            provenance = Provenance(
-                "analytic", "rest", FEWEST_DIGITS, __version__, time.perf_counter() - began, {"regime": "rest"}
-            )
+            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
         solution, route = self._solution, self.method or self._solution.default_method()
         clock = solution.clock(grid, self.clock)
@@ -138,7 +135,7 @@ class _Motion:
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
-        provenance = Provenance("analytic", route, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        provenance = Provenance.since(began, "analytic", route, details)
         series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
         return Trajectory(self.problem, grid, self.problem.bound(series, error), series, provenance, dense=self)
 

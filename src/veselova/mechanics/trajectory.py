@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import BackendMissing, Unsolved
 from veselova.mechanics.problem import Problem, Series
+from veselova.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,6 +36,11 @@ class Provenance:
     version: str
     seconds: float
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def since(cls, began: float, engine: str, method: str, details: Mapping[str, Any]) -> Provenance:
+        """Return the provenance of an answer in double precision that was begun at a reading of ``time.perf_counter``."""
+        return cls(engine, method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the provenance as a JSON-ready dictionary."""

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.flow import Flow
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.numeric.integrator import Integrator
-from veselova.version import __version__
 
 __all__ = ["METHODS", "solve"]
 
@@ -69,11 +67,11 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     again = partial(solve, problem, method=method, formulation=formulation)
     details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": 0, "projection_every": _SEGMENT}
     if not problem.moves:
-        provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+        provenance = Provenance.since(began, "numeric", method, details)
         return Trajectory.at_rest(problem, grid, provenance, again)
     series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
     series, details = problem.completed(series), {**details, "steps": steps}
-    provenance = Provenance("numeric", method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+    provenance = Provenance.since(began, "numeric", method, details)
     return Trajectory(problem, grid, problem.bound(series, error), series, provenance, dense=again)
 
 
