@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from draws import random_problem
+from draws import adversarial_start, random_problem
 from problems import tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.curve import Curve
@@ -15,6 +15,7 @@ from veselova.analytic.frame import Frame
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Extended
 from veselova.analytic.reduction import moving_part
+from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import spectrum
 from veselova.analytic.start import start
 from veselova.mechanics.integrals import neumann_velocity
@@ -93,3 +94,13 @@ def test_a_start_on_an_axis_takes_its_signs_from_the_velocity(signs: Any, q_dot:
     step = 1e-4
     q = solve(problem, [step]).q[0]
     assert np.allclose(q, problem.q + step * problem.q_dot, atol=1e-7)
+
+
+def test_continuation_leads_where_newtons_method_loses_its_way() -> None:
+    """A closed cut beside a gap of 2e-6: at some phases the damped iteration from 2πz used to stop short."""
+    _, problem = adversarial_start(np.random.default_rng([204, 177]), 4)
+    inversion = Solution(problem).inversion
+    z = np.random.default_rng(1).uniform(0, 1, (2000, 3))
+    assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 1e-12
+    for point in z[:20]:
+        assert np.allclose(inversion._continued(point), inversion.invert(point[None])[0], atol=1e-6)

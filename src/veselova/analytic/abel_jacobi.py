@@ -29,8 +29,12 @@ NARROW_GAP = 1e-6
 _COARSE_DIGITS = 12
 _LOST_DIGITS = 2
 
-#: A residual of this many ε per unit of z is rounding.
-_SETTLED = 8.0
+#: A residual of this many ε per unit of z is rounding, and one of this many times that, which no step betters.
+_SETTLED, _STALLED = 8.0, 1e4
+
+#: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each of its stations.
+_FIRST_STRETCH, _LEAST_STRETCH = 0.25, 1e-9
+_NEAR_STEPS = 12
 
 
 class AngleSeries(Protocol):
@@ -126,14 +130,51 @@ class AbelJacobi(Generic[P]):
             step_fraction[accepted] = np.minimum(1.0, 4 * step_fraction[accepted])
             step_fraction[open_[~better]] /= 4
             # A full step that no longer improves has met the rounding of the sums, which grows with their length.
-            stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < 1e4 * tolerance)]
+            stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
+        for i in open_:
+            psi[i] = self._continued(z[i])
+        return psi
+
+    def _continued(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angles of one point, led there along the line of phases from those of 2πz: the map is one-to-one.
+
+        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way.
+        """
+        psi = 2 * np.pi * z
+        begin, done, step = self.map(psi[None])[0], 0.0, _FIRST_STRETCH
+        while done < 1 and step > _LEAST_STRETCH:
+            reached = min(1.0, done + step)
+            found = self._settled(psi, begin + reached * (z - begin))
+            if found is None:
+                step /= 4
+            else:
+                psi, done, step = found, reached, 2 * step
+        if done == 1:
+            return psi
         gap = self.periods.narrowest_gap
         if gap < NARROW_GAP:
             raise Unsolved(
                 "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
             )
-        raise InternalContradiction(f"the Abel–Jacobi inversion left a residual of {np.max(np.abs(residual)):.2g}")
+        raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
+
+    def _settled(self, psi: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the angles to which plain Newton steps from nearby settle, None where they do not."""
+        tolerance, last = _SETTLED * DOUBLE.epsilon, np.inf
+        for _ in range(_NEAR_STEPS):
+            residual = self.map(psi[None])[0] - z
+            size = float(np.max(np.abs(residual)))
+            if size <= tolerance or (size >= last and size < _STALLED * tolerance):
+                return psi
+            if not size < last:
+                return None
+            last = size
+            try:
+                psi = psi - np.linalg.solve(self.jacobian(psi[None])[0], residual)
+            except np.linalg.LinAlgError:
+                return None
+        return None
 
     def _refine(self, z: Values, coarse: AbelJacobi[P]) -> Values:
         """Newton's method with the double-precision Jacobian: each step adds some fourteen digits."""
