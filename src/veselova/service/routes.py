@@ -56,7 +56,7 @@ def router(settings: Settings, workers: Workers) -> APIRouter:
 
     @routes.get("/v1/systems", summary="List the systems that can be solved", tags=["service"])
     async def systems() -> Response:
-        return _json({"systems": _systems(), "version": __version__, "limits": settings.model_dump()})
+        return _json({"systems": _systems(), "version": __version__, "limits": settings.limits})
 
     @routes.get("/healthz", summary="Whether the server runs", tags=["service"])
     async def healthz() -> Response:

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 __all__ = ["Settings"]
+
+
+def _state_folder() -> Path:
+    """Return the folder in which a program of this account keeps its state (XDG base directories)."""
+    stated = os.environ.get("XDG_STATE_HOME")
+    try:
+        return Path(stated or Path.home() / ".local" / "state") / "veselova"
+    except RuntimeError:  # an account without a home
+        return Path(tempfile.gettempdir()) / "veselova"
 
 
 class Settings(BaseSettings):
@@ -23,3 +34,13 @@ class Settings(BaseSettings):
     max_dimension: int = Field(default=64, ge=2, description="largest n")
     max_times: int = Field(default=100_000, ge=1, description="most times in one request")
     max_values: int = Field(default=4_000_000, ge=1, description="most frame entries in one answer, times × n²")
+
+    data_dir: Path = Field(default_factory=_state_folder, description="folder of the database, the results of jobs and the cache")
+    database_url: SecretStr = Field(
+        default=SecretStr(""), description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir when empty"
+    )
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Return what a client may know: the numbers among the settings."""
+        return {name: value for name, value in self.model_dump().items() if isinstance(value, (int, float))}
