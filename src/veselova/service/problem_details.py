@@ -31,12 +31,17 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
 #: What the service itself refuses: code → (status, title).
 _REFUSALS = {
     "malformed-json": (400, "The body is not JSON"),
+    "no-such-job": (404, "No such job"),
     "not-acceptable": (406, "No acceptable representation"),
+    "not-finished": (409, "The job has not finished"),
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
     "client-gone": (499, "The client closed the connection"),
     "overloaded": (503, "Too many requests are waiting"),
+    "too-many-jobs": (503, "Too many jobs are waiting"),
+    "storage-unavailable": (503, "Jobs cannot be stored at present"),
+    "storage-full": (507, "The room for results is used up"),
     "not-ready": (503, "The server is starting"),
     "shutting-down": (503, "The server is shutting down"),
     "over-budget": (504, "The time budget was used up"),

@@ -40,6 +40,10 @@ class TorusRequest(Request):
     problem: ProblemModel
     budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped")] = 10.0
 
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the request for the system that it asks of."""
+        return []
+
 
 class ComparisonRequest(TorusRequest):
     """A motion asked of both engines."""
@@ -116,7 +120,7 @@ class TrajectoryRequest(ComparisonRequest):
         return beyond_double(self.digits, self.certified)
 
 
-_Model = TypeVar("_Model", bound=Request)
+_Model = TypeVar("_Model", bound=TorusRequest)
 
 
 def read_request(model: type[_Model], document: Any) -> _Model:
@@ -130,7 +134,7 @@ def read_request(model: type[_Model], document: Any) -> _Model:
         request = model.model_validate(document)
     except ValidationError as error:
         raise InvalidRequest([_fault(item) for item in error.errors(include_url=False, include_context=True)]) from None
-    if isinstance(request, ComparisonRequest) and (faults := request.faults()):
+    if faults := request.faults():
         raise InvalidRequest(faults)
     return request
 

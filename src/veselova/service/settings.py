@@ -39,6 +39,19 @@ class Settings(BaseSettings):
     database_url: SecretStr = Field(
         default=SecretStr(""), description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir when empty"
     )
+    dask_scheduler: str = Field(default="", description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty")
+    dask_ca_file: Path | None = Field(default=None, description="certificate of the authority of a Dask cluster, for tls://")
+    dask_cert_file: Path | None = Field(default=None, description="certificate of this server in a Dask cluster")
+    dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
+    sweep_workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps")
+    sweep_worker_memory_mb: int = Field(
+        default=1000, ge=200, description="memory of a worker for sweeps, in MB, before it is ended"
+    )
+    max_running_jobs: int = Field(default=4, ge=1, description="jobs that share the workers; others wait")
+    max_jobs: int = Field(default=100, ge=1, description="jobs that may wait or run before others are refused")
+    max_sweep_problems: int = Field(default=1_000_000, ge=1, description="most problems in one sweep")
+    max_sweep_bytes: int = Field(default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated")
+    max_stored_bytes: int = Field(default=20_000_000_000, ge=1000, description="largest results of all jobs together")
 
     @property
     def limits(self) -> dict[str, float]:

@@ -1,0 +1,94 @@
+"""The Dask cluster that computes sweeps: worker processes of this machine, or a scheduler by its address. One code path."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+from veselova.mechanics.errors import BackendMissing, InvalidInput
+from veselova.service.settings import Settings
+
+__all__ = ["open_cluster", "require_scheduler"]
+
+#: Seconds for a connection to the scheduler, and for the first worker to come up.
+_CONNECT_S = 30
+
+#: Interactive requests go before sweeps where both want the processors.
+_NICENESS = 10
+
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+def require_scheduler(settings: Settings) -> None:
+    """Raise InvalidInput for a scheduler that is neither on loopback nor behind TLS, or for TLS without its files."""
+    if not settings.dask_scheduler:
+        return
+    address = urlsplit(settings.dask_scheduler)
+    if address.scheme not in ("tcp", "tls") or not address.hostname:
+        raise InvalidInput(("VESELOVA_DASK_SCHEDULER",), "an address tls://HOST:PORT", settings.dask_scheduler[:100])
+    if address.scheme == "tcp" and address.hostname not in _LOOPBACK:
+        raise InvalidInput(
+            ("VESELOVA_DASK_SCHEDULER",),
+            "tls://, for whoever reaches a Dask cluster can run code on it",
+            settings.dask_scheduler[:100],
+        )
+    if address.scheme == "tls":
+        for name in ("dask_ca_file", "dask_cert_file", "dask_key_file"):
+            path = getattr(settings, name)
+            if path is None or not path.is_file():
+                raise InvalidInput((f"VESELOVA_{name.upper()}",), "a file, for tls://", str(path or "nothing"))
+
+
+@asynccontextmanager
+async def open_cluster(settings: Settings, processes: bool = True) -> AsyncIterator[Any]:
+    """Give a Dask client in the running event loop; ``processes=False`` computes in threads of this process.
+
+    Raises InvalidInput for an address that is refused, OSError where the scheduler cannot be reached.
+    """
+    require_scheduler(settings)
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+        from distributed.security import Security
+    except ImportError:
+        raise BackendMissing("distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
+
+    if settings.dask_scheduler:
+        files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
+        ca, cert, key = (None if path is None else str(path) for path in files)
+        security = Security(tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key, require_encryption=True) if ca else None
+        async with Client(
+            settings.dask_scheduler, asynchronous=True, security=security, timeout=_CONNECT_S, set_as_default=False
+        ) as client:
+            yield client
+        return
+    quiet = {
+        "distributed.worker.daemon": True,
+        "distributed.scheduler.allowed-failures": 2,
+        "distributed.comm.timeouts.connect": _CONNECT_S,
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.worker.profile.enabled": False,
+        "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
+    }
+    with dask.config.set(quiet):
+        local = LocalCluster(
+            n_workers=settings.sweep_workers if processes else 1,
+            threads_per_worker=1,
+            processes=processes,
+            memory_limit=settings.sweep_worker_memory_mb * 1_000_000 if processes else 0,
+            host="127.0.0.1" if processes else None,
+            dashboard_address=None,
+            asynchronous=True,
+            silence_logs=50,
+        )
+        async with local as cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
+            if processes:
+                await client.run(_stand_back)
+            yield client
+
+
+def _stand_back() -> None:
+    os.nice(_NICENESS)

@@ -1,0 +1,152 @@
+"""Sweeps without a server: the same jobs, run in this process and its workers, and resumed where they were interrupted."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
+from veselova.mechanics.exact import plain
+from veselova.mechanics.problem import Problem
+from veselova.service.schemas import read_request
+from veselova.service.settings import Settings
+from veselova.service.sweep_request import SweepRequest
+
+if TYPE_CHECKING:
+    from veselova.service.jobs import Job, Jobs
+
+__all__ = ["run_sweep", "sweep", "sweep_request"]
+
+#: Called with the numbers of problems done and in all.
+Report = Callable[[int, int], None]
+
+#: Fewer problems than this are computed in this process: starting others takes seconds.
+_FEW = 50
+
+#: Seconds between two reports.
+_REPORT_S = 0.2
+
+
+def sweep(
+    problem: Problem | Mapping[str, Any],
+    vary: Mapping[str, Any],
+    *,
+    samples: int = 1,
+    seed: int = 0,
+    times: Any = None,
+    engine: str | None = None,
+    method: str | None = None,
+    formulation: str | None = None,
+    outputs: list[str] | None = None,
+    trajectories: bool = False,
+    budget_s: float = 10.0,
+    workers: int | None = None,
+    folder: str | Path | None = None,
+    progress: Report | None = None,
+) -> Any:
+    """Return the tori and, with ``times``, the motions of many problems as an xarray Dataset.
+
+    ``vary``: places in the problem's JSON, such as ``"/A/0"`` or ``"/q_dot"``, each with a list or an array of values, a grid
+    ``{"start", "stop", "count", "spacing"}``, or a distribution ``{"uniform": [low, high]}``, ``{"log_uniform": [low, high]}``,
+    ``{"normal": [mean, deviation]}``: ``samples`` draws are taken for each combination of the others, fixed by ``seed``.
+    Without ``times`` each problem gives its torus (constants, frequencies, actions, regime …); with them also the largest error,
+    the drift of the integrals and the extremes of the ``outputs``, and with ``trajectories`` these themselves. A problem that
+    cannot be solved, or not within ``budget_s`` seconds, has its reason in ``outcome`` and ``detail``.
+    What is done is kept in ``folder`` (default: that of the account's state), and a second call with the same arguments goes on
+    from there. ``workers``: processes; all processors when left out. ``progress(done, total)`` is called a few times a second.
+    Raises InvalidInput or InvalidRequest for bad input, BackendMissing without the extra ``sweeps``.
+    """
+    asked = sweep_request(problem, vary, times)
+    options: dict[str, Any] = {"samples": samples, "seed": seed, "engine": engine, "method": method, "formulation": formulation}
+    options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
+    request = read_request(SweepRequest, {**asked, **options})
+    settings = local_settings(folder, workers)
+    job, jobs = run_sweep(request, settings, progress or (lambda done, total: None))
+    from veselova.service.sweep_dataset import sweep_dataset
+
+    kept = jobs.trajectories_path(job.id).with_suffix(".zip")
+    return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
+
+
+def sweep_request(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
+    """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
+    if not isinstance(problem, (Problem, Mapping)):
+        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", shown(problem))
+    if not isinstance(vary, Mapping):
+        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
+    stated = {place: plain(values) if isinstance(values, (np.ndarray, list, tuple)) else values for place, values in vary.items()}
+    if times is not None and not isinstance(times, Mapping):
+        times = plain(times)
+    return {"problem": problem.as_dict() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
+
+
+def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
+    """Return the settings of sweeps in this process; those of a server in the environment hold, but for the folder."""
+    settings = Settings()
+    home = Path(folder) if folder is not None else settings.data_dir / "local"
+    changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
+    if workers is not None:
+        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+            raise InvalidInput(("workers",), "a whole number of at least 1", shown(workers))
+        changes["sweep_workers"] = workers
+    return Settings(**{**settings.model_dump(), **changes})
+
+
+def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tuple[Job, Jobs]:
+    """Run a sweep to its end and return its job, with the store in which its results are.
+
+    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra ``sweeps``.
+    """
+    try:
+        from veselova.service.jobs import Jobs
+        from veselova.service.sweeps import Sweeps
+    except ImportError as error:
+        raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
+
+    jobs = Jobs(settings)
+    job = jobs.submit(request)
+
+    async def run() -> None:
+        sweeps = Sweeps(settings, jobs, processes=request.total > _FEW or bool(settings.dask_scheduler))
+        async with sweeps.opened():
+            sweeps.begin(job.id)
+            ending = asyncio.ensure_future(sweeps.ended(job.id))
+            while not ending.done():
+                await asyncio.wait([ending], timeout=_REPORT_S)
+                if progress := sweeps.progress(job.id):
+                    report(progress.done, request.total)
+
+    if not job.ended:
+        _in_a_loop_of_its_own(run)
+    job = jobs.get(job.id)
+    if job.state != "finished":
+        raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
+    report(job.total, job.total)
+    return job, jobs
+
+
+def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
+    """Run a coroutine to its end, from a notebook too, whose thread runs a loop already."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        asyncio.run(run())
+        return
+    failures: list[BaseException] = []
+
+    def body() -> None:
+        try:
+            asyncio.run(run())
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=body, name="veselova sweep")
+    thread.start()
+    thread.join()
+    if failures:
+        raise failures[0]

@@ -1,0 +1,155 @@
+"""What a sweep says of each problem: a row of numbers by the names of their columns, and the motion itself where it is kept."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import orjson
+
+from veselova.engines import torus
+from veselova.mechanics.errors import InternalContradiction, InvalidInput, InvalidRequest, Unsolved, VeselovaError
+from veselova.mechanics.problem import Problem
+from veselova.mechanics.torus import Torus
+from veselova.mechanics.torus_problem import TorusProblem
+from veselova.mechanics.trajectory import Trajectory
+from veselova.service.parameters import components
+from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
+from veselova.service.sweep_request import SweepRequest
+from veselova.service.tasks import requested_trajectory
+from veselova.service.time_limit import TimeIsUp, time_limit
+from veselova.version import __version__
+
+__all__ = ["SOLVED", "Chunk", "computed_chunk", "lost_chunk"]
+
+_LOG = logging.getLogger("veselova.sweeps")
+
+#: What the column ``outcome`` says of a problem that was solved; else it names the reason, and ``detail`` explains it.
+SOLVED = "solved"
+
+#: What a torus has to say in numbers, and how each is called in the table.
+_OF_TORUS = ("energy", "constants", "branch_points", "frequencies_tau1", "frequencies_t", "rotation_numbers", "actions", "phases")
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """The answers to consecutive problems: a table as Parquet, and arrays with one entry of the first axis for each of them."""
+
+    rows: int
+    table: bytes
+    arrays: Mapping[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+
+
+def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
+    """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
+
+    A problem that cannot be solved is a row that says why. Raises RuntimeError where this process has another version of the
+    engines than the one that asks.
+    """
+    if version != __version__:
+        raise RuntimeError(f"a worker runs veselova {__version__}, the server {version}")
+    sweep = read_request(SweepRequest, orjson.loads(request))
+    answers = [_answer(sweep, row) for row in range(start, stop)]
+    return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
+
+
+def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
+    """Return the chunk of one problem whose worker died over it."""
+    detail = "the worker process ended over this problem, as it does when memory runs out"
+    return Chunk(1, _parquet([_row(sweep, row, "worker-lost", detail)]))
+
+
+def _answer(sweep: SweepRequest, row: int) -> tuple[Row, Mapping[str, Any]]:
+    """Return the row of one problem, and the series that are kept of it."""
+    found: Row = {}
+    kept: dict[str, Any] = {}
+    try:
+        with time_limit(sweep.budget_s):
+            for column, value in _findings(sweep.request_of(row), kept, sweep.trajectories):
+                found[column] = value
+        outcome, detail = SOLVED, ""
+    except TimeIsUp:
+        outcome, detail = "over-budget", f"the work was stopped after its budget of {sweep.budget_s:g} s"
+    except (InvalidInput, InvalidRequest) as error:
+        outcome, detail = "invalid-input", str(error)
+    except Unsolved as error:
+        outcome, detail = error.outcome, error.reason
+    except VeselovaError as error:
+        outcome, detail = "internal-contradiction" if isinstance(error, InternalContradiction) else "unsolved", str(error)
+    except Exception:
+        _LOG.exception("problem %d of sweep %s failed", row, sweep.id)
+        outcome, detail = "internal-error", "an unexpected error; it has been logged"
+    return {**_row(sweep, row, outcome, detail), **found}, kept
+
+
+def _row(sweep: SweepRequest, row: int, outcome: str, detail: str) -> Row:
+    return {"row": row, **dict(sweep.columns(row)), "outcome": outcome, "detail": detail}
+
+
+def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
+    """Yield the columns of one problem; what was found before a failure stays."""
+    problem = request.problem.problem()
+    if isinstance(problem, TorusProblem) and problem.moves:
+        yield from _of_torus(torus(problem))
+    elif isinstance(problem, TorusProblem):
+        yield "regime", "rest"
+    if isinstance(request, TrajectoryRequest):
+        trajectory = requested_trajectory(request)
+        names = request.outputs or list(problem.outputs)
+        if keep:
+            kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)
+        yield from _of_motion(problem, trajectory, names)
+
+
+def _of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
+    for name in _OF_TORUS:
+        yield from components(name, np.asarray(getattr(found, name)).tolist())
+    yield "mean_rate", found.mean_rate
+    yield "regime", found.regime
+    yield "origins", " ".join(found.origins)
+
+
+def _of_motion(problem: Problem, trajectory: Trajectory, names: list[str]) -> Iterator[tuple[str, Any]]:
+    yield "error.max", float(np.max(trajectory.error))
+    for name, drift in trajectory.drift.items():
+        yield f"drift.{name}", drift
+    for name in names:
+        series = trajectory.series(name)
+        for kind, extremes in (("min", series.min(axis=0)), ("max", series.max(axis=0))):
+            yield from components(f"{name}.{kind}", extremes.tolist())
+
+
+def _parquet(rows: list[Row]) -> bytes:
+    """Return the table of the rows, columns in the order in which they first appear; numbers that are missing are null."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = {name: _column([row.get(name) for row in rows]) for name in names}
+    buffer = io.BytesIO()
+    parquet.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+def _column(values: list[Any]) -> Any:
+    """Return an Arrow array of numbers, of texts where any value is one; what is missing is null."""
+    import pyarrow as pa
+
+    if any(isinstance(value, str) for value in values):
+        return pa.array([None if value is None else str(value) for value in values], pa.string())
+    return pa.array(values) if any(value is not None for value in values) else pa.nulls(len(values), pa.float64())
+
+
+def _arrays(kept: list[Mapping[str, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    """Return the series of all problems, NaN for those that have none."""
+    complete = next((series for series in kept if series), {})
+    return {
+        name: np.stack([np.asarray(series[name]) if series else np.full_like(pattern, np.nan) for series in kept])
+        for name, pattern in complete.items()
+    }

@@ -1,0 +1,73 @@
+"""The results of a sweep as an xarray Dataset: the axes of the sweep are its dimensions."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from veselova.mechanics.errors import BackendMissing
+from veselova.service.parameters import components, tabulated
+from veselova.service.sweep_request import SweepRequest
+from veselova.service.systems import SYSTEMS
+
+__all__ = ["sweep_dataset"]
+
+
+def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path | None = None) -> Any:
+    """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one file).
+
+    Dimensions: each parameter with given values, by its name (``A.0``), with them as coordinate where they are numbers, and
+    ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn parameters, ``outcome``, ``detail``
+    and the findings; then the outputs with further dimensions ``time`` and their own. Raises BackendMissing without xarray.
+    """
+    try:
+        import xarray
+        from pyarrow import parquet
+    except ImportError as error:
+        raise BackendMissing(error.name or "xarray", "The Dataset of a sweep", "pip install 'veselova[sweeps]'") from None
+    dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
+    coordinates, variables, given = _of_axes(sweep)
+    columns = parquet.read_table(table if isinstance(table, Path) else io.BytesIO(table))
+    for name in columns.column_names:
+        if name not in given:
+            values = columns[name].to_numpy()
+            variables[name] = (dimensions, values.reshape(sweep.shape))
+    if trajectories is not None:
+        coordinates["time"] = _times(sweep)
+        variables |= _outputs(sweep, dimensions, trajectories)
+    return xarray.Dataset(variables, coordinates, {"request": sweep.canonical.decode()})
+
+
+def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[str]]:
+    """Return coordinates and variables of the axes, and the columns of the table that they stand for."""
+    coordinates: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    given = {"row"}
+    for axis in sweep.axes:
+        parts = [[tabulated(scalar) for _, scalar in components(axis.name, value)] for value in axis.values]
+        names = [name for name, _ in components(axis.name, axis.values[0])]
+        given |= set(names)
+        for name, values in zip(names, zip(*parts, strict=True), strict=True):
+            (coordinates if names == [axis.name] else variables)[name] = ((axis.name,), np.array(values))
+    return coordinates, variables, given
+
+
+def _times(sweep: SweepRequest) -> Any:
+    """Return the times of the motions."""
+    from veselova.service.schemas import ComparisonRequest, read_request
+
+    return read_request(ComparisonRequest, {"problem": sweep.problem.model_dump(), "times": sweep.times}).time_grid()
+
+
+def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str, Any]:
+    import zarr
+
+    axes = {**SYSTEMS[sweep.problem.system].problem_class.outputs, "error": ()}
+    group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
+    return {
+        name: ([*dimensions, "time", *axes[name]], np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]))
+        for name, array in group.arrays()
+    }

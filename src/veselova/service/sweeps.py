@@ -1,0 +1,256 @@
+"""The running of jobs: chunks go to the cluster, and what comes back is stored at once and never computed again."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import CancelledError as FutureCancelled
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import anyio
+from filelock import FileLock, Timeout
+from sqlalchemy.exc import SQLAlchemyError
+
+from veselova.service.cluster import open_cluster
+from veselova.service.jobs import Job, Jobs
+from veselova.service.results import Result
+from veselova.service.settings import Settings
+from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
+from veselova.version import __version__
+
+__all__ = ["Progress", "Sweeps"]
+
+_LOG = logging.getLogger("veselova.sweeps")
+
+#: Chunks of one job that are with the cluster at a time, per worker: one at work and one at hand.
+_AHEAD = 2
+
+#: Seconds between two tries to store, or to reach the cluster: doubled from the first to the last.
+_FIRST_PAUSE_S = 0.5
+_LONGEST_PAUSE_S = 30.0
+
+T = TypeVar("T")
+
+
+@dataclass
+class Progress:
+    """How far a running job is: problems done before this process took it, and since; what it waits for, if anything."""
+
+    began: float
+    before: int
+    done: int
+    waits_for: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Return problems per second since this process took the job."""
+        passed = time.monotonic() - self.began
+        return (self.done - self.before) / passed if passed > 0 else 0.0
+
+
+class Sweeps:
+    """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its process, whatever ends that."""
+
+    def __init__(self, settings: Settings, jobs: Jobs, processes: bool = True) -> None:
+        self.jobs = jobs
+        self._settings = settings
+        self._processes = processes
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._progress: dict[str, Progress] = {}
+        self._changed = asyncio.Condition()
+        self._turns = asyncio.Semaphore(settings.max_running_jobs)
+        self._opening = asyncio.Lock()
+        self._stack = AsyncExitStack()
+        self._cluster: Any = None
+        self._closing = False
+
+    @asynccontextmanager
+    async def opened(self) -> AsyncIterator[Sweeps]:
+        """Run what is begun until the context ends; what is unfinished then stays so."""
+        try:
+            yield self
+        finally:
+            self._closing = True
+            tasks = list(self._tasks.values())
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self._close_cluster(self._cluster)
+
+    async def resume(self) -> None:
+        """Begin every job that another process left unfinished."""
+        for job_id in await anyio.to_thread.run_sync(self.jobs.unfinished):
+            self.begin(job_id)
+
+    def begin(self, job_id: str) -> None:
+        """Run a job, unless it runs already."""
+        if job_id not in self._tasks:
+            task = self._tasks[job_id] = asyncio.create_task(self._run(job_id), name=f"job {job_id}")
+            task.add_done_callback(lambda _: self._tasks.pop(job_id, None))
+
+    async def cancel(self, job_id: str) -> None:
+        """Stop a job; its finished chunks stay."""
+        await anyio.to_thread.run_sync(self.jobs.advance, job_id, "cancelled")
+        if task := self._tasks.get(job_id):
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        await self._tell()
+
+    async def ended(self, job_id: str) -> None:
+        """Return when nothing runs for a job any more."""
+        if task := self._tasks.get(job_id):
+            await asyncio.gather(task, return_exceptions=True)
+
+    def progress(self, job_id: str) -> Progress | None:
+        """Return how far a job is that runs in this process."""
+        return self._progress.get(job_id)
+
+    async def changed(self, timeout: float) -> None:
+        """Return when any job has moved on, or after so many seconds."""
+        try:
+            async with asyncio.timeout(timeout), self._changed:
+                await self._changed.wait()
+        except TimeoutError:
+            return
+
+    async def _tell(self) -> None:
+        async with self._changed:
+            self._changed.notify_all()
+
+    async def _run(self, job_id: str) -> None:
+        folder = self.jobs.folder / job_id
+        async with self._turns:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                with FileLock(folder / "lock", timeout=0):
+                    await self._run_locked(job_id)
+            except Timeout:
+                _LOG.info("job %s runs in another process", job_id)
+            except asyncio.CancelledError:
+                raise
+            except Exception:
+                _LOG.exception("job %s failed", job_id)
+                await self._persist(job_id, self.jobs.advance, job_id, "failed", "an unexpected error; it has been logged")
+            finally:
+                self._progress.pop(job_id, None)
+                await self._tell()
+
+    async def _run_locked(self, job_id: str) -> None:
+        job = await self._persist(job_id, self.jobs.get, job_id)
+        missing = await self._persist(job_id, self.jobs.missing, job)
+        done = job.total - sum(stop - start for start, stop in map(job.rows, missing))
+        self._progress[job_id] = Progress(time.monotonic(), done, done)
+        if not await self._persist(job_id, self.jobs.advance, job_id, "running"):
+            return
+        result = Result(self.jobs, job)
+        pause = _FIRST_PAUSE_S
+        while missing:
+            client = None
+            try:
+                client = await self._open_cluster()
+                await self._compute(client, job, result, missing)
+            except (OSError, TimeoutError) as error:
+                # The scheduler cannot be reached, or was lost with what it had.
+                self._progress[job_id].waits_for = f"the cluster ({error})"
+                _LOG.warning("job %s waits for the cluster: %s", job_id, error)
+                await self._close_cluster(client)
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+            missing = await self._persist(job_id, self.jobs.missing, job)
+        await self._persist(job_id, result.finish)
+        await self._persist(job_id, self.jobs.advance, job_id, "finished")
+
+    async def _compute(self, client: Any, job: Job, result: Result, missing: list[int]) -> None:
+        """Send the missing chunks to the cluster, a few ahead, and store what comes back. Raises OSError when it is lost."""
+        waiting, at_work = list(reversed(missing)), set[asyncio.Task[None]]()
+        try:
+            while waiting or at_work:
+                # A worker that died is missing for a moment; the others, or its successor, go on.
+                room = _AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(at_work)
+                for _ in range(min(room, len(waiting))):
+                    at_work.add(asyncio.create_task(self._chunk(client, job, result, waiting.pop())))
+                finished, at_work = await asyncio.wait(at_work, return_when=asyncio.FIRST_COMPLETED)
+                for task in finished:
+                    task.result()
+        finally:
+            for task in at_work:
+                task.cancel()
+            await asyncio.gather(*at_work, return_exceptions=True)
+
+    async def _chunk(self, client: Any, job: Job, result: Result, position: int) -> None:
+        start, stop = job.rows(position)
+        parts = await self._parts(client, job, start, stop)
+        await self._persist(job.id, result.store, position, parts)
+        progress = self._progress[job.id]
+        progress.done += stop - start
+        await self._tell()
+
+    async def _parts(self, client: Any, job: Job, start: int, stop: int) -> list[Chunk]:
+        """Return the answers to some problems; where their worker dies over them, one by one, to find out over which."""
+        from distributed.scheduler import KilledWorker
+
+        future = client.submit(computed_chunk, job.request, start, stop, __version__, pure=False)
+        try:
+            return [await future]
+        except KilledWorker:
+            if stop - start == 1:
+                return [lost_chunk(job.sweep, start)]
+            return [part for row in range(start, stop) for part in await self._parts(client, job, row, row + 1)]
+        except FutureCancelled as error:
+            raise ConnectionError(f"the cluster dropped the work: {error}") from None
+        except asyncio.CancelledError:
+            if not self._closing:  # at the end the workers of this machine are ended with their cluster
+                await _stop(client, future)
+            raise
+        finally:
+            future.release()
+
+    async def _open_cluster(self) -> Any:
+        async with self._opening:
+            if self._cluster is None:
+                self._cluster = await self._stack.enter_async_context(open_cluster(self._settings, self._processes))
+            return self._cluster
+
+    async def _close_cluster(self, lost: Any) -> None:
+        """Close the cluster, unless another job has replaced the lost one already."""
+        async with self._opening:
+            if self._cluster is not lost:
+                return
+            self._cluster = None
+            try:
+                await self._stack.aclose()
+            except (OSError, TimeoutError, RuntimeError):
+                _LOG.warning("the cluster did not close in order", exc_info=True)
+
+    async def _persist(self, job_id: str, call: Callable[..., T], *arguments: Any) -> T:
+        """Return what a call that stores or reads gives, trying again for as long as the disk or the database refuse."""
+        pause = _FIRST_PAUSE_S
+        while True:
+            try:
+                answer = await anyio.to_thread.run_sync(call, *arguments)
+            except (OSError, SQLAlchemyError) as error:
+                reason = str(getattr(error, "orig", None) or error)
+                _LOG.warning("job %s waits for its storage: %s", job_id, reason)
+                if progress := self._progress.get(job_id):
+                    progress.waits_for = f"its storage ({reason})"
+                await self._tell()
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+            else:
+                if progress := self._progress.get(job_id):
+                    progress.waits_for = ""
+                return answer
+
+
+async def _stop(client: Any, future: Any) -> None:
+    """End work that nobody waits for: a worker that is in the midst of it is restarted, for a thread cannot be stopped."""
+    if client.scheduler_info(n_workers=1)["address"].startswith("inproc"):
+        return
+    where = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
+    await future.cancel(force=True)
+    if where:
+        await client.restart_workers(where, raise_for_error=False)
