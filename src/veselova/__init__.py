@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.veselova_so3 import VeselovaSO3 as VeselovaSO3
     from veselova.service.client import AsyncClient as AsyncClient
     from veselova.service.client import Client as Client
+    from veselova.service.local_sweep import sweep as sweep
 
 #: Public name → the module that defines it.
 _HOMES = {
@@ -72,6 +73,7 @@ _HOMES = {
     "VeselovaSO3": "veselova.mechanics.veselova_so3",
     "compare": "veselova.engines",
     "solve": "veselova.engines",
+    "sweep": "veselova.service.local_sweep",
     "torus": "veselova.engines",
 }
 

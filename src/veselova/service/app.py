@@ -12,6 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from veselova.mechanics.errors import VeselovaError
+from veselova.service.job_routes import job_router
+from veselova.service.job_service import JobService
 from veselova.service.openapi import openapi_document
 from veselova.service.problem_details import Refused, problem_response
 from veselova.service.routes import router
@@ -29,15 +31,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     limits = settings or Settings()
     workers = Workers(limits)
 
+    jobs = JobService(limits)
+
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        async with anyio.create_task_group() as tasks:
+        async with jobs.running(), anyio.create_task_group() as tasks:
             tasks.start_soon(_warm, workers)
             yield
             tasks.cancel_scope.cancel()
 
     app = FastAPI(title="veselova", version=__version__, lifespan=lifespan)
     app.include_router(router(limits, workers))
+    app.include_router(job_router(limits, jobs))
     for kind in (VeselovaError, Refused, HTTPException, Exception):
         app.add_exception_handler(kind, _answer_problem)
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]

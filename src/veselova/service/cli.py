@@ -187,6 +187,22 @@ def torus(file: _File, json: _Json = False) -> None:
 
 
 @app.command()
+def sweep(
+    file: _File,
+    json: _Json = False,
+    output: Annotated[Path | None, typer.Option(help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr")] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="where what is done is kept, so that a second start goes on from there")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes; all processors when left out")] = None,
+) -> None:
+    """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes on where it was."""
+    from veselova.service.sweep_command import run
+
+    run(_document(file), json, output, folder, workers)
+
+
+@app.command()
 def serve(
     host: Annotated[str, typer.Option(help="address to bind")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")] = 8000,

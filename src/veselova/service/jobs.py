@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
@@ -24,6 +25,9 @@ __all__ = ["ENDED", "Job", "Jobs"]
 
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
+
+#: Jobs in one listing.
+_LISTED = 100
 
 
 @dataclass(frozen=True)
@@ -121,13 +125,25 @@ class Jobs:
             found = connection.execute(sa.select(jobs, done.label("done")).where(jobs.c.id == job_id)).mappings().first()
         if found is None:
             raise Refused("no-such-job", f"There is no job {job_id[:40]}.")
-        return Job(**{**found, "request": found["request"].encode(), "done": int(found["done"])})
+        times = {name: _in_utc(found[name]) for name in ("created_at", "finished_at")}
+        return Job(**{**found, **times, "request": found["request"].encode(), "done": int(found["done"])})
 
     def unfinished(self) -> list[str]:
         """Return the jobs that are to go on, oldest first."""
         with self._engine.connect() as connection:
             query = sa.select(jobs.c.id).where(jobs.c.state.not_in(ENDED)).order_by(jobs.c.created_at, jobs.c.id)
             return list(connection.execute(query).scalars())
+
+    def newest(self) -> list[str]:
+        """Return the jobs that were made last, newest first."""
+        with self._engine.connect() as connection:
+            query = sa.select(jobs.c.id).order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
+            return list(connection.execute(query).scalars())
+
+    def require_writable(self) -> None:
+        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written."""
+        with self._engine.begin() as connection:
+            connection.execute(sa.update(jobs).where(jobs.c.id == "").values(detail=""))
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state; fails where the database cannot be read."""
@@ -184,12 +200,21 @@ class Jobs:
         return self.folder / job_id / "summaries.parquet"
 
     def trajectories_path(self, job_id: str) -> Path:
-        """Return where the Zarr store of a job is kept."""
+        """Return where the Zarr store of a running job is kept."""
         return self.folder / job_id / "trajectories.zarr"
+
+    def packed_path(self, job_id: str) -> Path:
+        """Return where the Zarr store of a finished job is kept, in one file."""
+        return self.folder / job_id / "trajectories.zarr.zip"
 
     def stored_bytes(self) -> int:
         """Return how many bytes all jobs have on the disk."""
-        return sum(path.stat().st_size for path in self.folder.rglob("*") if path.is_file())
+        total = 0
+        for folder, _, names in os.walk(self.folder):
+            for name in names:
+                with contextlib.suppress(FileNotFoundError):  # a part that was finished, or a job that was removed, meanwhile
+                    total += (Path(folder) / name).stat().st_size
+        return total
 
 
 def _new(sweep: SweepRequest) -> dict[str, Any]:
@@ -201,6 +226,11 @@ def _new(sweep: SweepRequest) -> dict[str, Any]:
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),
     }
+
+
+def _in_utc(moment: datetime | None) -> datetime | None:
+    """Return a moment with its zone, which SQLite does not keep."""
+    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
 
 
 def _job_of(connection: sa.Connection, key: str) -> str | None:

@@ -69,7 +69,7 @@ def sweep(
     job, jobs = run_sweep(request, settings, progress or (lambda done, total: None))
     from veselova.service.sweep_dataset import sweep_dataset
 
-    kept = jobs.trajectories_path(job.id).with_suffix(".zip")
+    kept = jobs.packed_path(job.id)
     return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
 
 
@@ -113,13 +113,15 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
 
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes=request.total > _FEW or bool(settings.dask_scheduler))
-        async with sweeps.opened():
-            sweeps.begin(job.id)
-            ending = asyncio.ensure_future(sweeps.ended(job.id))
+        sweeps.begin(job.id)
+        ending = asyncio.ensure_future(sweeps.ended(job.id))
+        try:
             while not ending.done():
                 await asyncio.wait([ending], timeout=_REPORT_S)
                 if progress := sweeps.progress(job.id):
                     report(progress.done, request.total)
+        finally:
+            await sweeps.close()
 
     if not job.ended:
         _in_a_loop_of_its_own(run)

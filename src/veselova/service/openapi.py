@@ -12,6 +12,7 @@ from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
 from veselova.service.problem_details import MEDIA_TYPE
 from veselova.service.routes import RESOURCES
+from veselova.service.sweep_request import SweepRequest
 from veselova.service.systems import SYSTEMS
 from veselova.service.tasks import TASKS
 from veselova.version import __version__
@@ -145,7 +146,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             description="POST a problem and times; receive the motion in theta functions or by integration, with its error.",
             routes=app.routes,
         )
-        models = [(model, "validation") for model, _ in TASKS.values()]
+        models = [(model, "validation") for model in (*(model for model, _ in TASKS.values()), SweepRequest)]
         _, definitions = models_json_schema(models, ref_template="#/components/schemas/{model}")  # type: ignore[arg-type]
         schemas = document.setdefault("components", {}).setdefault("schemas", {})
         schemas.update(definitions["$defs"], **_ANSWERS)

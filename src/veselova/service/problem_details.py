@@ -32,6 +32,7 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
 _REFUSALS = {
     "malformed-json": (400, "The body is not JSON"),
     "no-such-job": (404, "No such job"),
+    "no-such-resource": (404, "No such resource"),
     "not-acceptable": (406, "No acceptable representation"),
     "not-finished": (409, "The job has not finished"),
     "body-too-large": (413, "The body is too large"),

@@ -58,7 +58,7 @@ class Result:
             _concatenate(chunks, path)
         store = self._jobs.trajectories_path(self._job.id)
         if store.is_dir():
-            _pack(store, store.with_suffix(".zip"))
+            _pack(store, self._jobs.packed_path(self._job.id))
 
 
 def _joined(parts: list[Chunk]) -> bytes:

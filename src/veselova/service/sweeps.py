@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelled
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -68,18 +68,14 @@ class Sweeps:
         self._cluster: Any = None
         self._closing = False
 
-    @asynccontextmanager
-    async def opened(self) -> AsyncIterator[Sweeps]:
-        """Run what is begun until the context ends; what is unfinished then stays so."""
-        try:
-            yield self
-        finally:
-            self._closing = True
-            tasks = list(self._tasks.values())
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-            await self._close_cluster(self._cluster)
+    async def close(self) -> None:
+        """Stop what runs; what is unfinished stays so, to be resumed."""
+        self._closing = True
+        tasks = list(self._tasks.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._close_cluster(self._cluster)
 
     async def resume(self) -> None:
         """Begin every job that another process left unfinished."""

@@ -1,0 +1,96 @@
+"""The jobs of one server: the store and the runner, opened with the server and again when the storage has come back."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import anyio
+
+from veselova.mechanics.errors import BackendMissing
+from veselova.service.problem_details import Refused
+from veselova.service.settings import Settings
+
+if TYPE_CHECKING:
+    from veselova.service.jobs import Jobs
+    from veselova.service.sweeps import Sweeps
+
+__all__ = ["JobService"]
+
+_LOG = logging.getLogger("veselova.sweeps")
+
+T = TypeVar("T")
+
+
+class JobService:
+    """Opens the store of jobs for a server's life. A server without it answers everything else."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._opening = anyio.Lock()
+        self._sweeps: Sweeps | None = None
+        #: Why there is no store, where there is none.
+        self.failure = "not opened yet"
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Run the jobs until the context ends; those that another server left unfinished are taken up."""
+        try:
+            await self.sweeps()
+        except (Refused, BackendMissing) as error:
+            _LOG.warning("no sweeps for the present: %s", error)
+        try:
+            yield
+        finally:
+            if self._sweeps is not None:
+                await self._sweeps.close()
+                self._sweeps.jobs.close()
+
+    async def sweeps(self) -> Sweeps:
+        """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without the extra ``sweeps``."""
+        async with self._opening:
+            if self._sweeps is None:
+                self._sweeps = await self._opened()
+        return self._sweeps
+
+    async def _opened(self) -> Sweeps:
+        try:
+            from sqlalchemy.exc import SQLAlchemyError
+
+            from veselova.service.jobs import Jobs
+            from veselova.service.sweeps import Sweeps
+        except ImportError as error:
+            self.failure = f"{error.name} is not installed"
+            raise BackendMissing(error.name or "sqlalchemy", "A sweep", "pip install 'veselova[sweeps]'") from None
+        try:
+            jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
+            sweeps = Sweeps(self._settings, jobs)
+            await sweeps.resume()
+        except (OSError, SQLAlchemyError) as error:
+            self.failure = _reason(error)
+            raise Refused("storage-unavailable", f"Jobs cannot be stored at present: {self.failure}.", retry_after=30) from None
+        self.failure = ""
+        return sweeps
+
+    async def ask(self, call: Callable[[Jobs], T]) -> T:
+        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or the database refuse."""
+        from sqlalchemy.exc import SQLAlchemyError
+
+        sweeps = await self.sweeps()
+        try:
+            return await anyio.to_thread.run_sync(call, sweeps.jobs)
+        except (OSError, SQLAlchemyError) as error:
+            _LOG.warning("the storage of jobs failed: %s", _reason(error))
+            detail = f"Jobs cannot be stored or read at present: {_reason(error)}."
+            raise Refused("storage-unavailable", detail, retry_after=30) from None
+
+    async def require(self) -> None:
+        """Raise Refused (``storage-unavailable``) unless the database can be written."""
+        await self.ask(lambda jobs: jobs.require_writable())
+
+
+def _reason(error: Any) -> str:
+    """Return what the disk or the database says, without statements or addresses."""
+    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(".")
