@@ -56,12 +56,18 @@ class Server:
         raise AssertionError(f"not ready in time: {self.log.read_text()}")
 
 
+def free_port() -> int:
+    """Return a port that nothing listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 @contextmanager
 def running_server(folder: Path, **limits: str) -> Iterator[Server]:
     """Run a server with limits from the environment, and end it."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
+    limits.setdefault("data_dir", str(folder / "data"))
     environment = {**os.environ, **{f"VESELOVA_{name.upper()}": value for name, value in limits.items()}}
     log = folder / "server.log"
     with log.open("wb") as stream:

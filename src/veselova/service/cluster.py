@@ -66,7 +66,10 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
             yield client
         return
     quiet = {
-        "distributed.worker.daemon": True,
+        # A worker at its limit is ended. Paused, as Dask would have it before that, it would never go on.
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.memory.pause": False,
         "distributed.scheduler.allowed-failures": 2,
         "distributed.comm.timeouts.connect": _CONNECT_S,
         "distributed.admin.system-monitor.gil.enabled": False,

@@ -20,7 +20,7 @@ from alembic.script import ScriptDirectory
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.settings import Settings
 
-__all__ = ["api_keys", "chunks", "connect", "idempotency_keys", "jobs", "metadata", "schema_differences"]
+__all__ = ["api_keys", "chunks", "connect", "database_url", "idempotency_keys", "jobs", "metadata", "schema_differences"]
 
 metadata = sa.MetaData()
 
@@ -79,7 +79,7 @@ def connect(settings: Settings) -> sa.Engine:
 
     Raises InvalidInput for an address that cannot be read, OSError or sqlalchemy.exc.SQLAlchemyError where it cannot be opened.
     """
-    url = _url(settings)
+    url = database_url(settings)
     if url.get_backend_name() == "sqlite" and url.database:
         Path(url.database).parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     engine = sa.create_engine(url, pool_pre_ping=True)
@@ -90,7 +90,8 @@ def connect(settings: Settings) -> sa.Engine:
     return engine
 
 
-def _url(settings: Settings) -> sa.URL:
+def database_url(settings: Settings) -> sa.URL:
+    """Return the address of the database. Raises InvalidInput for one that cannot be read, or another kind of database."""
     stated = settings.database_url.get_secret_value()
     try:
         url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")

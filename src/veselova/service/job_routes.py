@@ -37,14 +37,15 @@ _BODY = {
 _JOB: dict[int | str, dict[str, Any]] = {200: {"model": JobDocument, "description": "The job"}}
 _ACCEPTED: dict[int | str, dict[str, Any]] = {202: {"model": JobDocument, "description": "The job, at Location"}}
 
+_Key = Annotated[str | None, Header(description="a request that comes again with its key never makes a second job")]
+
 
 def job_router(settings: Settings, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
     routes = APIRouter(tags=["sweeps"])
-    key_header = Header(description="the same key never makes two jobs", max_length=_LONGEST_KEY)
 
     @routes.post("/v1/sweeps", status_code=202, summary="Solve many problems", openapi_extra=_BODY, responses=_ACCEPTED)
-    async def sweep(request: Request, idempotency_key: Annotated[str | None, key_header] = None) -> Response:
+    async def sweep(request: Request, idempotency_key: _Key = None) -> Response:
         require_acceptable(request.headers.get("accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")

@@ -10,6 +10,7 @@ import sys
 from pydantic import ValidationError
 
 from veselova.mechanics.errors import InvalidInput
+from veselova.service.cluster import require_scheduler
 from veselova.service.settings import Settings
 
 __all__ = ["serve"]
@@ -26,6 +27,7 @@ def serve(host: str, port: int, settings_only: bool) -> None:
         for name, value in limits.model_dump().items():
             print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
         return
+    _require_addresses(limits)
     _require_free(host, port)
     import uvicorn
 
@@ -45,6 +47,16 @@ def _settings() -> Settings:
         item = error.errors()[0]
         name = f"VESELOVA_{str(item['loc'][0]).upper()}"
         raise InvalidInput((name,), item["msg"][:1].lower() + item["msg"][1:], str(item["input"])) from None
+
+
+def _require_addresses(limits: Settings) -> None:
+    """Refuse addresses of a scheduler or a database that cannot be followed, where sweeps are installed."""
+    require_scheduler(limits)
+    try:
+        from veselova.service.database import database_url
+    except ImportError:
+        return
+    database_url(limits)
 
 
 def _require_free(host: str, port: int) -> None:

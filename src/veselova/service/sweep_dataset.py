@@ -21,7 +21,8 @@ def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path |
 
     Dimensions: each parameter with given values, by its name (``A.0``), with them as coordinate where they are numbers, and
     ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn parameters, ``outcome``, ``detail``
-    and the findings; then the outputs with further dimensions ``time`` and their own. Raises BackendMissing without xarray.
+    and the findings; then the outputs, as ``trajectory.q``, with further dimensions ``time`` and their own. Raises
+    BackendMissing without xarray.
     """
     try:
         import xarray
@@ -68,6 +69,6 @@ def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str
     axes = {**SYSTEMS[sweep.problem.system].problem_class.outputs, "error": ()}
     group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
     return {
-        name: ([*dimensions, "time", *axes[name]], np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]))
+        f"trajectory.{name}": ([*dimensions, "time", *axes[name]], np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]))
         for name, array in group.arrays()
     }

@@ -52,8 +52,9 @@ _MOST_VALUES = 1_000_000
 #: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be valid.
 _LOOKED_AT = 16
 
-#: Problems in one chunk: about a second of work for a torus of small n, and no more than so many numbers in all.
+#: Problems in one chunk: about a second of work for small n, by their number, the times of their motions and what is kept.
 _CHUNK_ROWS = 250
+_CHUNK_TIMES = 20_000
 _CHUNK_VALUES = 1_000_000
 
 
@@ -188,7 +189,7 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        return max(1, min(_CHUNK_ROWS, _CHUNK_VALUES // self.row_values))
+        return max(1, min(_CHUNK_ROWS, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
 
     @property
     def canonical(self) -> bytes:

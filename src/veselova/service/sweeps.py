@@ -170,8 +170,8 @@ class Sweeps:
                 for _ in range(min(room, len(waiting))):
                     at_work.add(asyncio.create_task(self._chunk(client, job, result, waiting.pop())))
                 finished, at_work = await asyncio.wait(at_work, return_when=asyncio.FIRST_COMPLETED)
-                for task in finished:
-                    task.result()
+                if failures := [error for task in finished if (error := task.exception())]:
+                    raise failures[0]
         finally:
             for task in at_work:
                 task.cancel()

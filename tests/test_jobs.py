@@ -1,0 +1,235 @@
+"""Sweeps over HTTP, through real server processes: jobs, their results, and what they survive."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from pyarrow import parquet
+
+from conftest import Server, free_port, running_server
+from test_http import is_problem, post
+
+BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+
+#: Some seconds of work for two processors, in fifteen chunks.
+LONG = {
+    "problem": BASE,
+    "vary": {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}},
+    "samples": 150,
+    "times": {"start": 0, "stop": 9, "count": 1000},
+    "outputs": ["q"],
+}
+
+
+@pytest.fixture(scope="module")
+def jobs_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with running_server(tmp_path_factory.mktemp("jobs"), sweep_workers="2") as running:
+        yield running
+
+
+def job(server: Server, link: str) -> dict[str, Any]:
+    response = httpx2.get(f"{server.url}{link}", timeout=30)
+    assert response.status_code == 200, response.text
+    document: dict[str, Any] = response.json()
+    return document
+
+
+def wait_for(server: Server, link: str, reached: Any, seconds: float = 120) -> dict[str, Any]:
+    """Follow the events of a job until it has got somewhere."""
+    deadline = time.monotonic() + seconds
+    with httpx2.stream("GET", f"{server.url}{link}/events", timeout=30) as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        for line in response.iter_lines():
+            if line.startswith("data: ") and reached(document := json.loads(line[6:])):
+                return dict(document)
+            assert time.monotonic() < deadline, f"the job did not get there; last: {line}"
+    raise AssertionError("the stream of events ended before the job got there")
+
+
+def finished(document: dict[str, Any]) -> bool:
+    assert document["state"] not in ("failed", "cancelled"), document
+    return bool(document["state"] == "finished")
+
+
+def half_way(document: dict[str, Any]) -> bool:
+    assert document["state"] in ("queued", "running"), document
+    return bool(0 < document["done"] < document["total"])
+
+
+def table(server: Server, link: str) -> list[dict[str, Any]]:
+    response = httpx2.get(f"{server.url}{link}/result", timeout=60)
+    assert response.status_code == 200, response.text
+    rows: list[dict[str, Any]] = parquet.read_table(io.BytesIO(response.content)).to_pylist()
+    return rows
+
+
+@pytest.fixture(scope="module")
+def undisturbed(jobs_server: Server) -> bytes:
+    """The result of the long sweep where nothing happens to it."""
+    link = post(jobs_server, "/v1/sweeps", LONG).headers["location"]
+    wait_for(jobs_server, link, finished)
+    return httpx2.get(f"{jobs_server.url}{link}/result", timeout=60).content
+
+
+def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
+    body = {"problem": BASE, "vary": {"/A/0": [2, 3, -1]}, "times": [0, 1], "outputs": ["q"], "trajectories": True}
+    response = post(jobs_server, "/v1/sweeps", body)
+    assert response.status_code == 202
+    link = response.headers["location"]
+    assert response.json()["links"]["self"] == link
+    assert wait_for(jobs_server, link, finished)["done"] == 3
+    rows = table(jobs_server, link)
+    assert [row["outcome"] for row in rows] == ["solved", "solved", "invalid-input"]
+    assert rows[0]["q.max.0"] <= 1
+    document = job(jobs_server, link)
+    assert document["request"]["vary"] == body["vary"]
+    assert document["created_at"].endswith("+00:00")
+    packed = httpx2.get(f"{jobs_server.url}{document['links']['trajectories']}")
+    assert packed.headers["content-type"] == "application/zip"
+    assert link.endswith(httpx2.get(f"{jobs_server.url}/v1/jobs").json()["jobs"][0]["id"])
+    # The same request is the same job, finished already.
+    again = post(jobs_server, "/v1/sweeps", body)
+    assert (again.headers["location"], again.json()["state"]) == (link, "finished")
+
+
+def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
+    body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
+    first = post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"})
+    assert post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"] == first.headers["location"]
+    other = post(jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"})
+    assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
+
+
+def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
+    fault = is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/B": [1]}}), 422, "invalid-input")
+    assert fault["errors"][0]["pointer"] == "/vary/~1B"
+    is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [1]}, "budget_s": 1e6}), 422, "invalid-input")
+    for path in ("", "/events", "/result", "/trajectories"):
+        is_problem(httpx2.get(f"{jobs_server.url}/v1/jobs/none{path}"), 404, "no-such-job")
+    is_problem(httpx2.delete(f"{jobs_server.url}/v1/jobs/none"), 404, "no-such-job")
+
+
+def test_a_job_is_cancelled_resumed_and_removed(jobs_server: Server, undisturbed: bytes) -> None:
+    body = {**LONG, "seed": 1}
+    link = post(jobs_server, "/v1/sweeps", body).headers["location"]
+    wait_for(jobs_server, link, half_way)
+    is_problem(httpx2.get(f"{jobs_server.url}{link}/result"), 409, "not-finished")
+    cancelled = httpx2.delete(f"{jobs_server.url}{link}", timeout=60).json()
+    assert cancelled["state"] == "cancelled"
+    assert 0 < cancelled["done"] < 300
+    assert job(jobs_server, link)["done"] == cancelled["done"]  # nothing goes on behind it
+    resumed = post(jobs_server, "/v1/sweeps", body)
+    assert resumed.headers["location"] == link
+    assert resumed.json()["done"] == cancelled["done"]
+    assert httpx2.delete(f"{jobs_server.url}{link}?remove=true", timeout=60).status_code == 204
+    is_problem(httpx2.get(f"{jobs_server.url}{link}"), 404, "no-such-job")
+
+
+def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: bytes) -> None:
+    with running_server(tmp_path, sweep_workers="2") as server:
+        before = set(server.workers())
+        link = post(server, "/v1/sweeps", LONG).headers["location"]
+        wait_for(server, link, half_way)
+        victim = max(set(server.workers()) - before)
+        os.kill(victim, signal.SIGKILL)
+        wait_for(server, link, finished)
+        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+
+
+def test_the_death_of_the_server_loses_no_finished_chunk(tmp_path: Path, undisturbed: bytes) -> None:
+    with running_server(tmp_path, sweep_workers="2") as server:
+        link = post(server, "/v1/sweeps", LONG).headers["location"]
+        wait_for(server, link, half_way)
+        server.process.kill()
+        server.process.wait()
+    kept = sorted((tmp_path / "data" / "jobs" / link.rsplit("/", 1)[1] / "chunks").glob("*.parquet"))
+    dates = [path.stat().st_mtime_ns for path in kept[:1]]
+    assert kept
+    with running_server(tmp_path, sweep_workers="2") as server:
+        assert job(server, link)["done"] > 0
+        wait_for(server, link, lambda document: document["done"] > 100 or finished(document))
+        assert dates == [path.stat().st_mtime_ns for path in kept[:1]]
+        wait_for(server, link, finished)
+        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+
+
+def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undisturbed: bytes) -> None:
+    with running_server(tmp_path, sweep_workers="2") as server:
+        link = post(server, "/v1/sweeps", LONG).headers["location"]
+        wait_for(server, link, half_way)
+        holder = sqlite3.connect(tmp_path / "data" / "veselova.db", isolation_level=None)
+        holder.execute("BEGIN IMMEDIATE")
+        waiting = wait_for(server, link, lambda document: document["detail"])
+        assert waiting["detail"].startswith("waits for its storage (database is locked")
+        refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
+        assert is_problem(refused, 503, "storage-unavailable")
+        assert refused.headers["retry-after"]
+        holder.execute("ROLLBACK")
+        wait_for(server, link, finished)
+        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+
+
+def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    with running_server(tmp_path, data_dir=str(tmp_path / "file")) as server:
+        assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
+        refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
+        assert "Jobs cannot be stored at present" in is_problem(refused, 503, "storage-unavailable")["detail"]
+
+
+@contextmanager
+def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen([sys.executable, "-m", "dask", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def test_a_cluster_that_was_started_elsewhere_computes_the_same(tmp_path: Path, undisturbed: bytes) -> None:
+    """The scheduler dies in the middle, too, and another takes its place."""
+    port = str(free_port())
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = ("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+    worker = ("worker", address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1", "--local-directory", str(tmp_path))
+    with running_server(tmp_path, dask_scheduler=address) as server:
+        with dask(*scheduler), dask(*worker), dask(*worker):
+            link = post(server, "/v1/sweeps", LONG).headers["location"]
+            wait_for(server, link, half_way)
+        with dask(*scheduler), dask(*worker), dask(*worker):
+            wait_for(server, link, finished)
+            assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"dask_scheduler": "tcp://192.0.2.1:8786"}, "required tls://"),
+        ({"dask_scheduler": "tls://192.0.2.1:8786"}, "VESELOVA_DASK_CA_FILE: required a file, for tls://; given nothing"),
+        ({"dask_scheduler": "nowhere"}, "required an address tls://HOST:PORT; given nowhere"),
+        ({"database_url": "mysql://me:secret@host/name"}, "required an address sqlite:///PATH or postgresql://"),
+    ],
+)
+def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(
+    settings: dict[str, str], message: str, tmp_path: Path
+) -> None:
+    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), **{f"VESELOVA_{k.upper()}": v for k, v in settings.items()}}
+    command = [sys.executable, "-m", "veselova", "serve", "--port", "0"]
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60, check=False)
+    assert answer.returncode == 2
+    assert message in answer.stderr
+    assert "secret" not in answer.stderr

@@ -1,0 +1,338 @@
+"""Sweeps from Python and the command line: which problems they are, what is said of each, and what outlives a process."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+import xarray
+
+import veselova as vs
+from veselova.mechanics.errors import InvalidInput, InvalidRequest
+from veselova.service import sweeps as running
+from veselova.service.database import connect, schema_differences
+from veselova.service.jobs import Jobs
+from veselova.service.local_sweep import local_settings, run_sweep
+from veselova.service.schemas import read_request
+from veselova.service.settings import Settings
+from veselova.service.summaries import computed_chunk, lost_chunk
+from veselova.service.sweep_request import SweepRequest
+from veselova.service.time_limit import TimeIsUp, time_limit
+from veselova.version import __version__
+
+BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+DRAWN = {"/A/0": [2, 3, 4], "/q_dot": {"normal": [0, 1]}}
+
+
+def request(**changes: Any) -> SweepRequest:
+    return read_request(SweepRequest, {"problem": BASE, "vary": DRAWN, "samples": 5, "seed": 7, **changes})
+
+
+def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
+    import io
+
+    from pyarrow import parquet
+
+    table = parquet.read_table(io.BytesIO(computed_chunk(sweep.canonical, start, stop, __version__).table))
+    found: list[dict[str, Any]] = table.to_pylist()
+    return found
+
+
+def test_axes_are_combined_and_the_last_runs_fastest() -> None:
+    sweep = request(vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1)
+    assert sweep.shape == (2, 3)
+    assert [dict(sweep.columns(row)) for row in (0, 1, 3)] == [
+        {"A.0": 2, "q_dot.1": 1},
+        {"A.0": 2, "q_dot.1": 1.5},
+        {"A.0": 3, "q_dot.1": 1},
+    ]
+    problem = sweep.request_of(4).problem.problem().as_dict()
+    assert (problem["A"][0], problem["A"][1], problem["q_dot"][1]) == (3, "1.5", 1.5)
+
+
+def test_a_draw_depends_on_seed_and_row_alone() -> None:
+    sweep, other = request(), request(seed=8)
+    assert sweep.total == 15
+    assert dict(sweep.columns(11)) == dict(request().columns(11)) != dict(other.columns(11))
+    assert dict(sweep.columns(11)) != dict(sweep.columns(12))
+    assert dict(request(samples=9).columns(3)) == dict(sweep.columns(3))
+
+
+@pytest.mark.parametrize(
+    ("stated", "inside"),
+    [
+        ({"uniform": [2, 3]}, lambda x: np.all((x >= 2) & (x <= 3)) and abs(x.mean() - 2.5) < 0.05),
+        ({"log_uniform": ["0.01", 100]}, lambda x: np.all((x >= 0.01) & (x <= 100)) and abs(np.log10(x).mean()) < 0.2),
+        ({"normal": [5, 0.1]}, lambda x: abs(x.mean() - 5) < 0.02 and abs(x.std() - 0.1) < 0.02),
+    ],
+)
+def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
+    sweep = request(vary={"/A": stated}, samples=300)
+    drawn = np.array([list(dict(sweep.columns(row)).values()) for row in range(300)])
+    assert drawn.shape == (300, 3)
+    assert inside(drawn)
+
+
+def test_a_logarithmic_grid_has_equal_ratios() -> None:
+    sweep = request(vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1)
+    assert np.allclose([dict(sweep.columns(row))["A.0"] for row in range(3)], [1, 10, 100], rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"vary": {"/B": [1]}}, "vary./B"),
+        ({"vary": {"/system": [1]}}, "vary./system"),
+        ({"vary": {"A": [1]}}, "vary.A"),
+        ({"vary": {"": [1]}}, "vary."),
+        ({"vary": {"/A/9": [1]}}, "vary./A/9"),
+        ({"vary": {"/A/-1": [1]}}, "vary./A/-1"),
+        ({"vary": {"/A/0": []}}, "vary./A/0"),
+        ({"vary": {"/A/0": 3}}, "vary./A/0"),
+        ({"vary": {"/A": [[1, 2]]}}, "vary./A[0]"),
+        ({"vary": {"/A/0": [[1, 2]]}}, "vary./A/0[0]"),
+        ({"vary": {"/A": {"start": 1, "stop": 2, "count": 3}}}, "vary./A"),
+        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 0}}}, "vary./A/0.count"),
+        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**9}}}, "vary./A/0.count"),
+        ({"vary": {"/A/0": {"start": 1, "stop": "x", "count": 3}}}, "vary./A/0.stop"),
+        ({"vary": {"/A/0": {"start": 0, "stop": 2, "count": 3, "spacing": "log"}}}, "vary./A/0"),
+        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 3, "spacing": "cubic"}}}, "vary./A/0.spacing"),
+        ({"vary": {"/A/0": {"uniform": [2, 1]}}}, "vary./A/0.uniform"),
+        ({"vary": {"/A/0": {"uniform": [1]}}}, "vary./A/0.uniform"),
+        ({"vary": {"/A/0": {"normal": [1, -1]}}}, "vary./A/0.normal[1]"),
+        ({"vary": {"/A/0": {"log_uniform": [0, 1]}}}, "vary./A/0.log_uniform[0]"),
+        ({"vary": {"/A/0": {"cauchy": [0, 1]}}}, "vary./A/0"),
+        ({"vary": {"/A": {"uniform": [1, 2]}, "/A/0": [1]}}, "vary./A/0"),
+        ({"vary": {"/normalize": {"uniform": [1, 2]}}}, "vary./normalize"),
+        ({"vary": {}}, "vary"),
+        ({"vary": [1]}, "vary"),
+        ({"samples": 0}, "samples"),
+        ({"samples": 2, "vary": {"/A/0": [1, 2]}}, "samples"),
+        ({"seed": -1}, "seed"),
+        ({"engine": "analytic"}, "engine"),
+        ({"trajectories": True}, "trajectories"),
+        ({"times": []}, "times"),
+        ({"times": {"start": 0}}, "times"),
+        ({"times": [0, 1], "outputs": ["nothing"]}, "outputs[0]"),
+        ({"vary": {"/A/0": [-1, -2]}, "samples": 1}, "problem.A[0]"),
+        ({"budget_s": 0}, "budget_s"),
+        ({"nonsense": 1}, "nonsense"),
+    ],
+)
+def test_a_fault_is_named_before_anything_runs(changes: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidRequest) as refusal:
+        request(**changes)
+    assert refusal.value.faults[0].field == field
+
+
+def test_a_system_without_a_torus_needs_times() -> None:
+    so3 = {"system": "veselova-so3", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0, 0.1]}
+    stated = {"problem": so3, "vary": {"/Omega/0": [1, 2]}}
+    with pytest.raises(InvalidRequest, match="times: required this field"):
+        read_request(SweepRequest, stated)
+    found = rows(read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2)
+    assert [row["outcome"] for row in found] == ["solved", "solved"]
+    assert all(row["gamma.max.2"] == 1 and row["error.max"] < 1e-9 for row in found)
+
+
+def test_a_row_says_what_torus_and_solve_say() -> None:
+    times = {"start": 0, "stop": 3, "count": 7}
+    sweep = request(times=times)
+    for row, found in enumerate(rows(sweep, 0, 4)):
+        problem = sweep.request_of(row).problem.problem()
+        expected, motion = vs.torus(problem), vs.solve(problem, np.linspace(0, 3, 7))
+        assert found["row"] == row
+        assert found["outcome"] == "solved"
+        for name in ("energy", "mean_rate", "regime"):
+            assert found[name] == getattr(expected, name)
+        for name in ("constants", "frequencies_t", "actions", "phases", "branch_points"):
+            assert [found[f"{name}.{i}"] for i in range(getattr(expected, name).size)] == getattr(expected, name).tolist()
+        assert found["error.max"] == motion.error.max()
+        assert found["drift.energy"] == motion.drift["energy"]
+        assert found["frame.min.1.2"] == motion.frame[:, 1, 2].min()
+        assert found["tau1.max"] == motion.tau1.max()
+
+
+def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:
+    sweep = request(vary={"/A/0": [2, -1, "x"], "/q_dot/1": [0, 0.5]}, samples=1)
+    found = rows(sweep, 0, sweep.total)
+    assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
+    assert found[0]["regime"] == "rest"
+    assert found[2]["detail"].startswith("problem.A[0]: required a finite number greater than 0; given -1")
+    assert found[2]["energy"] is None
+
+
+def test_a_problem_over_its_budget_is_given_up() -> None:
+    hard = {
+        "system": "veselova",
+        "A": [9, 8, 7, 6, 5, 4, 3, 2],
+        "q": [1] * 8,
+        "q_dot": [1, -1, 2, -2, 1, 0, -1, 0],
+        "normalize": True,
+    }
+    sweep = read_request(
+        SweepRequest, {"problem": hard, "vary": {"/A/0": [9, 10]}, "times": [0, 1000], "engine": "numeric", "budget_s": 0.05}
+    )
+    assert [row["outcome"] for row in rows(sweep, 0, 2)] == ["over-budget"] * 2
+
+
+def _for_ever() -> None:
+    while True:
+        pass
+
+
+def test_the_time_limit_ends_a_loop_and_nothing_after_it() -> None:
+    with pytest.raises(TimeIsUp), time_limit(0.05):
+        _for_ever()
+    with time_limit(0.05):
+        total = sum(range(1000))
+    time.sleep(0.1)  # the limit of a block that has ended must stay silent
+    assert total == 499500
+
+
+def test_a_problem_whose_worker_died_says_so() -> None:
+    import io
+
+    from pyarrow import parquet
+
+    (row,) = parquet.read_table(io.BytesIO(lost_chunk(request(), 3).table)).to_pylist()
+    assert (row["row"], row["outcome"]) == (3, "worker-lost")
+
+
+def test_equal_requests_are_one_job_and_others_are_not() -> None:
+    assert request().id == request(problem={**BASE, "frame": None}).id
+    assert request().id != request(seed=8).id
+    assert request().id != request(vary={**DRAWN, "/A/0": [2, 3, 5]}).id
+
+
+def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
+    said: list[tuple[int, int]] = []
+    dataset = vs.sweep(
+        BASE,
+        {"/A/0": np.array([2.0, 3.0]), "/q": [[1, 0, 0], [0.6, 0, 0.8]], "/q_dot": {"normal": [0, 1]}},
+        samples=3,
+        times=[0, 1, 2],
+        outputs=["q", "tau1"],
+        trajectories=True,
+        folder=tmp_path,
+        progress=lambda done, total: said.append((done, total)),
+    )
+    assert isinstance(dataset, xarray.Dataset)
+    assert dict(dataset.sizes) == {"A.0": 2, "q": 2, "sample": 3, "time": 3, "axis": 3}
+    assert dataset["A.0"].values.tolist() == [2, 3]
+    assert dataset["q.2"].values.tolist() == [0, 0.8]
+    assert np.all(dataset.outcome == "solved")
+    drawn = [float(dataset[f"q_dot.{i}"][1, 1, 2]) for i in range(3)]
+    motion = vs.solve(vs.Veselova([3, "1.5", 1], [0.6, 0, 0.8], drawn, normalize=True), [0, 1, 2])
+    assert np.array_equal(dataset["trajectory.q"][1, 1, 2], motion.q)
+    assert dataset["tau1.max"][1, 1, 2] == motion.tau1.max()
+    assert said[-1] == (12, 12)
+
+
+def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One run in this process; another by two workers, which is interrupted and then goes on."""
+    sweep = request(samples=100, times=[0, 1], outputs=["q"], trajectories=True)
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 20)
+    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    job, undisturbed = run_sweep(sweep, local_settings(tmp_path / "one", 1), lambda done, total: None)
+
+    class Interrupted(Exception):
+        pass
+
+    def interrupt(done: int, total: int) -> None:
+        if done >= 60:
+            raise Interrupted
+
+    monkeypatch.setattr("veselova.service.local_sweep._FEW", 0)
+    settings = local_settings(tmp_path / "two", 2)
+    with pytest.raises(Interrupted):
+        run_sweep(sweep, settings, interrupt)
+    interrupted = Jobs(settings)
+    job = interrupted.get(sweep.id)
+    assert 60 <= job.done < 300
+    damaged = interrupted.chunk_path(job.id, 1)
+    damaged.write_bytes(damaged.read_bytes()[:-1])
+    calls: list[int] = []
+    store = Jobs.store
+    monkeypatch.setattr(
+        Jobs, "store", lambda self, job_id, position, *rest: calls.append(position) or store(self, job_id, position, *rest)
+    )
+    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    _, resumed = run_sweep(sweep, settings, lambda done, total: None)
+    assert 0 not in calls
+    assert 1 in calls
+    assert len(calls) == 15 - job.done // 20 + 1
+    for path in ("result_path", "packed_path"):
+        assert getattr(resumed, path)(sweep.id).read_bytes() == getattr(undisturbed, path)(sweep.id).read_bytes()
+
+
+def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr(running, "_FIRST_PAUSE_S", 0.05)
+    settings = local_settings(tmp_path, 1)
+    read_only, refused = threading.Event(), threading.Event()
+    store = Jobs.store
+
+    def watched(self: Jobs, *arguments: Any) -> None:
+        with self._engine.connect() as connection:
+            connection.exec_driver_sql(f"PRAGMA query_only = {'ON' if read_only.is_set() else 'OFF'}")
+        try:
+            store(self, *arguments)
+        except sa.exc.OperationalError:
+            refused.set()
+            read_only.clear()
+            raise
+
+    read_only.set()
+    monkeypatch.setattr(Jobs, "store", watched)
+    job, _ = run_sweep(request(), settings, lambda done, total: None)
+    assert refused.is_set()
+    assert (job.state, job.done) == ("finished", 15)
+
+
+def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
+        Jobs(Settings(data_dir=tmp_path, max_sweep_problems=10)).submit(request())
+    with pytest.raises(InvalidInput, match="bytes of results"):
+        Jobs(Settings(data_dir=tmp_path, max_sweep_bytes=1000)).submit(request())
+    jobs = Jobs(Settings(data_dir=tmp_path, max_jobs=1))
+    jobs.submit(request())
+    assert jobs.submit(request()).id == request().id
+    with pytest.raises(Exception, match="1 jobs are waiting"):
+        jobs.submit(request(seed=8))
+
+
+def test_migrations_make_the_tables_of_the_code(tmp_path: Path) -> None:
+    assert schema_differences(connect(Settings(data_dir=tmp_path))) == []
+
+
+def test_the_command_line_sweeps(tmp_path: Path) -> None:
+    body = {"problem": BASE, "vary": {"/A/0": [2, 3, -1]}}
+    file = tmp_path / "sweep.json"
+    file.write_text(json.dumps(body))
+    command = [sys.executable, "-m", "veselova", "sweep", str(file), "--folder", str(tmp_path / "kept")]
+
+    def run(*more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*command, *more], capture_output=True, text=True, timeout=120, check=False)
+
+    answer = run("--json", "--output", str(tmp_path / "table.csv"))
+    assert answer.returncode == 0, answer.stderr
+    assert json.loads(answer.stdout)["outcomes"] == {"solved": 2, "invalid-input": 1}
+    assert (tmp_path / "table.csv").read_text().count("\n") == 4
+    again = run("--output", str(tmp_path / "table.nc"))
+    assert again.returncode == 0, again.stderr
+    with xarray.open_dataset(tmp_path / "table.nc", engine="scipy") as dataset:
+        assert dataset["A.0"].values.tolist() == [2, 3, -1]
+        assert math.isnan(dataset.energy[2])
+    refused = run("--output", str(tmp_path / "table.xls"))
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "--output: required a file in an existing folder" in refused.stderr
