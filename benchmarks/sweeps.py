@@ -2,8 +2,8 @@
 
     python benchmarks/sweeps.py [PROBLEMS]
 
-Torus summaries of bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in one run. The time is that from
-the first chunk to the last, so the start of the processes does not count. Default: 10 000 problems for each.
+Torus summaries of bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in one run. The time is that
+from the first chunk to the last, so the start of the processes does not count. Default: 10 000 problems for each.
 """
 
 from __future__ import annotations
