@@ -80,7 +80,7 @@ def solve_good() -> Any:
     return solve(Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"]), GOOD["times"])
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".json"])
+@pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".arrow", ".json"])
 def test_motions_are_written_to_files(suffix: str, tmp_path: Path) -> None:
     answer = run("solve", "-", "--output", f"motion{suffix}", "--plot", "motion.svg", stdin=request(), cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr

@@ -28,6 +28,7 @@ from veselova.analytic.interval import Interval
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
+from veselova.mechanics.archive import read_archive
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.times import exact_times
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
@@ -346,3 +347,7 @@ def test_files_carry_all_digits(tmp_path: Path) -> None:
     with np.load(tmp_path / "motion.npz") as archive:
         assert Decimal(str(archive["q_decimal"][1, 2])) == trajectory.decimals.midpoints["q"][1, 2]
         assert Decimal(str(archive["q_radius"][1, 2])) == trajectory.decimals.radii["q"][1, 2]
+        again = read_archive(trajectory.problem, archive)
+    assert again.decimals is not None
+    assert np.all(again.decimals.midpoints["omega"] == trajectory.decimals.midpoints["omega"])
+    assert np.array_equal(again.error, trajectory.error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import io
 import json
 import pickle
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 from problems import tagged
 from veselova import BackendMissing, Comparison, Trajectory, Unsolved, compare, solve, torus
+from veselova.mechanics.archive import read_archive
 from veselova.mechanics.trajectory import Provenance
 
 TIMES = np.linspace(0, 5, 11)
@@ -107,9 +109,12 @@ def test_csv_loses_no_digit(trajectory: Trajectory, tmp_path: Path) -> None:
     values = np.array([[float(x) for x in row.split(",")] for row in rows])
     assert np.array_equal(values, np.column_stack(list(table.values())))
     assert "frame_1_2" in table
+    assert np.array_equal(table["integral_energy"], trajectory.integrals["energy"])
 
 
-@pytest.mark.parametrize(("method", "library"), [("to_parquet", "pyarrow"), ("to_xarray", "xarray"), ("plot", "matplotlib")])
+@pytest.mark.parametrize(
+    ("method", "library"), [("to_parquet", "pyarrow"), ("to_arrow", "pyarrow"), ("to_xarray", "xarray"), ("plot", "matplotlib")]
+)
 def test_a_missing_library_is_named(trajectory: Trajectory, method: str, library: str, monkeypatch: Any, tmp_path: Path) -> None:
     real = builtins.__import__
 
@@ -120,7 +125,7 @@ def test_a_missing_library_is_named(trajectory: Trajectory, method: str, library
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(BackendMissing, match=library):
-        getattr(trajectory, method)(*([tmp_path / "x"] if method == "to_parquet" else []))
+        getattr(trajectory, method)(*([tmp_path / "x"] if library == "pyarrow" else []))
 
 
 def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
@@ -129,13 +134,48 @@ def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
         solve(tagged("generic")[1].problem(), [1.0], "numeric", "taylor")
 
 
-def test_parquet_and_xarray_hold_the_series(trajectory: Trajectory, tmp_path: Path) -> None:
-    from pyarrow import parquet
+def test_parquet_arrow_and_xarray_hold_the_series(trajectory: Trajectory, tmp_path: Path) -> None:
+    from pyarrow import ipc, parquet
 
     trajectory.to_parquet(tmp_path / "motion.parquet")
-    assert parquet.read_table(tmp_path / "motion.parquet").column_names == list(trajectory.columns())
+    trajectory.to_arrow(tmp_path / "motion.arrow")
+    with (tmp_path / "motion.arrow").open("rb") as file:
+        tables = parquet.read_table(tmp_path / "motion.parquet"), ipc.open_stream(file).read_all()
+    for table in tables:
+        assert table.column_names == list(trajectory.columns())
+        assert all(np.array_equal(table[name], values) for name, values in trajectory.columns().items())
+        assert json.loads(table.schema.metadata[b"provenance"]) == trajectory.provenance.as_dict()
     dataset = trajectory.to_xarray()
     assert dataset["frame"].dims == ("time", "axis", "vector")
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "arrow"])
+def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(kind: str, monkeypatch: Any) -> None:
+    from pyarrow import ipc, parquet
+
+    motion = solve(tagged("generic")[3].problem(), TIMES)
+    whole, blocks = io.BytesIO(), io.BytesIO()
+    getattr(motion, f"to_{kind}")(whole, ["tau1", "frame"])
+    for name in ("_TEXT_BLOCK", "_BINARY_BLOCK"):
+        monkeypatch.setattr(f"veselova.mechanics.table.{name}", 30)
+    getattr(motion, f"to_{kind}")(blocks, ["tau1", "frame"])
+    read = {
+        "npz": lambda data: np.load(data)["frame"],
+        "csv": lambda data: np.loadtxt(data, delimiter=",", skiprows=1),
+        "parquet": lambda data: np.column_stack(parquet.read_table(data).columns),
+        "arrow": lambda data: np.column_stack(ipc.open_stream(data).read_all().columns),
+    }[kind]
+    assert np.array_equal(read(io.BytesIO(whole.getvalue())), read(io.BytesIO(blocks.getvalue())))
+    assert b"omega" not in whole.getvalue()
+
+
+def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_path: Path) -> None:
+    trajectory.to_npz(tmp_path / "motion.npz")
+    with np.load(tmp_path / "motion.npz") as archive:
+        again = read_archive(trajectory.problem, archive)
+    assert again.provenance == trajectory.provenance
+    for name, values in trajectory.columns().items():
+        assert np.array_equal(again.columns()[name], values)
 
 
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.archive import write_archive
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import BackendMissing, Unsolved
 from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.table import Table, Target, flat_columns, opened, row_blocks
 from veselova.version import __version__
 
 if TYPE_CHECKING:
@@ -113,7 +113,12 @@ class Trajectory:
     @cached_property
     def integrals(self) -> Mapping[str, Array]:
         """Return the integrals of motion at each time, by name (see the problem's ``integrals``)."""
-        return self.problem.integrals(self.arrays)
+        width = sum(values[:1].size for values in self.arrays.values())
+        blocks = [
+            self.problem.integrals({name: values[rows] for name, values in self.arrays.items()})
+            for rows in row_blocks(self.times.size, width)
+        ]
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
     @property
     def drift(self) -> dict[str, float]:
@@ -128,42 +133,39 @@ class Trajectory:
             )
         return self.dense(times)
 
-    def columns(self) -> dict[str, Array]:
-        """Return the flat table of the trajectory: time, error and every component, named like ``frame_1_2`` (from 1)."""
-        return self._table(self.error, {name: self.series(name) for name in self.problem.outputs})
+    def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
+        """Return the flat table of all or the chosen series: time, error, every component, named like ``frame_1_2`` (from 1), and
+        every integral of motion, like ``integral_energy``."""
+        return self._table(self.error, {name: self.series(name) for name in outputs or self.problem.outputs})
 
     def _table(self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         table: dict[str, NDArray[Any]] = {self.problem.time: self.times, "error": error}
-        for name in series:
-            for index in np.ndindex(series[name].shape[1:]):
-                table["_".join([name, *(str(i + 1) for i in index)])] = series[name][(slice(None), *index)]
+        for name, values in series.items():
+            table |= flat_columns(name, values)
+        for name, values in self.integrals.items():
+            table |= flat_columns(f"integral_{name}", values)
         return table
 
-    def to_npz(self, path: str | Path) -> None:
-        """Write all series, the integrals and the provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
-        arrays = {name: self.series(name) for name in self.problem.outputs}
-        if self.decimals is not None:
-            for suffix, values in (("decimal", self.decimals.midpoints), ("radius", self.decimals.radii)):
-                arrays |= {f"{name}_{suffix}": values[name].astype(str) for name in self.problem.outputs}
-        integrals = {f"integral_{name}": values for name, values in self.integrals.items()}
-        provenance = json.dumps(self.provenance.as_dict())
-        with Path(path).open("wb") as file:  # an open file keeps savez from appending its own suffix to the name
-            np.savez_compressed(file, times=self.times, error=self.error, provenance=provenance, **arrays, **integrals)  # type: ignore[arg-type]
+    def to_npz(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
+        with opened(target) as stream:
+            write_archive(self, stream, outputs or self.problem.outputs)
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the flat table as comma-separated values, 17 digits or all of the decimals, one row per time."""
-        table, form = self.columns(), "%.17g"
+    def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table as comma-separated values, one row per time: doubles to the last bit, or all of the decimals."""
+        table: Mapping[str, NDArray[Any]] = self.columns(outputs)
         if self.decimals is not None:
-            table, form = self._table(self.decimals.error, self.decimals.midpoints), "%s"
-        np.savetxt(path, np.column_stack(list(table.values())), fmt=form, delimiter=",", header=",".join(table), comments="")
+            midpoints = self.decimals.midpoints
+            table = self._table(self.decimals.error, {name: midpoints[name] for name in outputs or self.problem.outputs})
+        Table(table, self.provenance.as_dict()).to_csv(target)
 
-    def to_parquet(self, path: str | Path) -> None:
-        """Write the flat table as Parquet, doubles only; raises BackendMissing without pyarrow."""
-        try:
-            from pyarrow import parquet, table
-        except ImportError:
-            raise BackendMissing("pyarrow", "Parquet output", "pip install pyarrow") from None
-        parquet.write_table(table(self.columns()), str(path))
+    def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table and the provenance as Parquet, doubles only; raises BackendMissing without pyarrow."""
+        Table(self.columns(outputs), self.provenance.as_dict()).to_parquet(target)
+
+    def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table and the provenance as an Arrow IPC stream, doubles only; raises BackendMissing without pyarrow."""
+        Table(self.columns(outputs), self.provenance.as_dict()).to_arrow(target)
 
     def to_xarray(self) -> Any:
         """Return an xarray Dataset of doubles with the time as its coordinate; raises BackendMissing without xarray."""

@@ -21,7 +21,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 _File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input")]
 _Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
 _Output = Annotated[
-    Path | None, typer.Option(help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet or .json")
+    Path | None, typer.Option(help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet, .arrow or .json")
 ]
 _Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
 _Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
@@ -244,7 +244,7 @@ def _print_json(document: Any) -> None:
 #: Fields of a motion's request that say nothing of its torus.
 _OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
 
-_WRITERS = (".npz", ".csv", ".parquet", ".json")
+_WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -267,7 +267,7 @@ def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:
     if path.suffix.lower() == ".json":
         path.write_bytes(encoded(trajectory_document(trajectory, outputs)))
     else:
-        getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path)
+        getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
 
 
 def _say_written(output: Path | None, plot: Path | None) -> None:
