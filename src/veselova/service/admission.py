@@ -8,6 +8,8 @@ from typing import Any
 from starlette.requests import Request
 
 from veselova.mechanics.errors import InvalidInput
+from veselova.service.estimates import require_hope
+from veselova.service.negotiation import accepted_type
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import ComparisonRequest, TorusRequest
 from veselova.service.settings import Settings
@@ -20,20 +22,7 @@ _LONGEST_INTEGER = 4000
 
 def require_acceptable(accept: str | None) -> None:
     """Raise Refused unless an Accept header allows application/json."""
-    if accept is None:
-        return
-    accepted = {}
-    for part in accept.split(","):
-        media_range, *parameters = (piece.strip().lower() for piece in part.split(";"))
-        accepted[media_range] = not _is_zero_quality(parameters)
-    # The most specific range decides (RFC 9110, 12.5.1).
-    if next((accepted[name] for name in ("application/json", "application/*", "*/*") if name in accepted), False):
-        return
-    raise Refused("not-acceptable", f"This resource is application/json; the request accepts {accept[:100]}.")
-
-
-def _is_zero_quality(parameters: list[str]) -> bool:
-    return any(p.startswith("q=") and p[2:].strip("0.") == "" for p in parameters)
+    accepted_type(accept, ["application/json"])
 
 
 async def read_json(request: Request, settings: Settings) -> Any:
@@ -51,7 +40,27 @@ async def read_json(request: Request, settings: Settings) -> Any:
         body += chunk
         if len(body) > limit:
             raise too_large
-    return decoded(bytes(body))
+    document = decoded(bytes(body))
+    _require_modest(document, settings)
+    return document
+
+
+def _require_modest(document: Any, settings: Settings) -> None:
+    """Raise InvalidInput where a document is deeper, or has longer texts, than the settings allow; without recursion."""
+    layer = [document]
+    for _ in range(settings.max_depth + 1):
+        longest = max((len(value) for value in layer if isinstance(value, str)), default=0)
+        if longest > settings.max_text:
+            raise InvalidInput((), f"texts of at most {settings.max_text} characters", f"one of {longest}")
+        layer = [
+            item
+            for value in layer
+            if isinstance(value, (dict, list))
+            for item in (value.values() if isinstance(value, dict) else value)
+        ]
+        if not layer:
+            return
+    raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
 
 
 def decoded(text: bytes) -> Any:
@@ -95,6 +104,8 @@ def admit(request: TorusRequest, settings: Settings) -> None:
         raise InvalidInput(("budget_s",), f"at most {settings.max_budget_s:g} on this server", f"{request.budget_s:g}")
     if not isinstance(request, ComparisonRequest):
         return
+    if request.digits > settings.max_digits:
+        raise InvalidInput(("digits",), f"at most {settings.max_digits} on this server", str(request.digits))
     count = request.time_count()
     if count > settings.max_times:
         raise InvalidInput(("times",), f"at most {settings.max_times} times on this server", str(count)[:30])
@@ -102,3 +113,4 @@ def admit(request: TorusRequest, settings: Settings) -> None:
         raise InvalidInput(
             ("times",), f"at most {settings.max_values} frame entries (times × n²) on this server", str(count * n * n)
         )
+    require_hope(request, settings)

@@ -12,6 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from veselova.mechanics.errors import VeselovaError
+from veselova.service.answers import Answers
 from veselova.service.job_routes import job_router
 from veselova.service.job_service import JobService
 from veselova.service.openapi import openapi_document
@@ -31,17 +32,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     limits = settings or Settings()
     workers = Workers(limits)
 
+    answers = Answers(limits, workers)
     jobs = JobService(limits)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        async with jobs.running(), anyio.create_task_group() as tasks:
+        async with answers.serving(), jobs.running(), anyio.create_task_group() as tasks:
             tasks.start_soon(_warm, workers)
             yield
             tasks.cancel_scope.cancel()
 
     app = FastAPI(title="veselova", version=__version__, lifespan=lifespan)
-    app.include_router(router(limits, workers))
+    app.include_router(router(limits, workers, answers))
     app.include_router(job_router(limits, jobs))
     for kind in (VeselovaError, Refused, HTTPException, Exception):
         app.add_exception_handler(kind, _answer_problem)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import orjson
@@ -13,6 +14,7 @@ from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import Decimals
 from veselova.mechanics.errors import InternalContradiction
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.table import row_blocks
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Provenance, Trajectory
 
@@ -24,6 +26,7 @@ __all__ = [
     "torus_of",
     "trajectory_document",
     "trajectory_of",
+    "write_document",
 ]
 
 
@@ -104,20 +107,35 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 
 def encoded(document: Mapping[str, Any]) -> bytes:
     """Return a document as JSON bytes; NaN and infinity, which JSON cannot say and orjson writes as null, are our bug."""
-    _require_finite(document, "document")
-    return orjson.dumps(_contiguous(document), option=orjson.OPT_SERIALIZE_NUMPY)
+    stream = io.BytesIO()
+    write_document(document, stream)
+    return stream.getvalue()
+
+
+def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
+    """Write a document as JSON, its arrays block by block, so that the text of large ones is never in memory as a whole."""
+    stream.write(b"{")
+    for i, (name, value) in enumerate(document.items()):
+        stream.write(b"," * (i > 0) + orjson.dumps(name) + b":")
+        if isinstance(value, Mapping):
+            write_document(value, stream)
+        elif isinstance(value, np.ndarray) and value.ndim:
+            _write_array(name, value, stream)
+        else:
+            _require_finite(value, name)
+            stream.write(orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY))
+    stream.write(b"}")
+
+
+def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
+    stream.write(b"[")
+    for rows in row_blocks(array.shape[0], array[:1].size):
+        _require_finite(array[rows], name)
+        text = orjson.dumps(np.ascontiguousarray(array[rows]), option=orjson.OPT_SERIALIZE_NUMPY)
+        stream.write(b"," * (rows.start > 0) + text[1:-1])
+    stream.write(b"]")
 
 
 def _require_finite(value: Any, place: str) -> None:
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            _require_finite(item, f"{place}.{key}")
-    elif isinstance(value, (float, np.ndarray, np.floating)) and not np.all(np.isfinite(value)):
+    if isinstance(value, (float, np.ndarray, np.floating)) and not np.all(np.isfinite(value)):
         raise InternalContradiction(f"{place} holds a number that is not finite")
-
-
-def _contiguous(value: Any) -> Any:
-    """Return the document with every array in the memory order that orjson takes."""
-    if isinstance(value, Mapping):
-        return {key: _contiguous(item) for key, item in value.items()}
-    return np.ascontiguousarray(value) if isinstance(value, np.ndarray) and value.ndim else value

@@ -9,9 +9,11 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from veselova.mechanics.decimals import FEWEST_DIGITS
+from veselova.service.answers import PROVENANCE
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.formats import FORMATS
 from veselova.service.problem_details import MEDIA_TYPE
-from veselova.service.routes import RESOURCES
+from veselova.service.routes import RESOURCES, TRAJECTORIES
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.systems import SYSTEMS
 from veselova.service.tasks import TASKS
@@ -133,6 +135,26 @@ _REFUSALS = {
     501: "An optional library is not installed on this server",
     503: "Overloaded, or the worker was lost; see Retry-After",
     504: "Over the time budget",
+    507: "The work needs more memory than a worker has, or the disk is full",
+}
+
+#: Refusals of one path alone, and what a GET of a kept trajectory can be refused for.
+_PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
+_KEPT = {404: "Not kept, or not any more", **{status: _REFUSALS[status] for status in (406, 500, 503, 504, 507)}}
+
+_TEXT = {"schema": {"type": "string"}}
+#: Header fields of a trajectory, in every format.
+_FIELDS: dict[str, dict[str, Any]] = {
+    "ETag": {"description": "hash of the request, its defaults filled in and its budget left out, and the format", **_TEXT},
+    "Content-Location": {"description": "where a GET gives this trajectory, in any format, while it is kept", **_TEXT},
+    PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
+}
+_CONDITION = {
+    "name": "If-None-Match",
+    "in": "header",
+    "required": False,
+    "description": "an ETag: nothing is sent if it is still that of the answer",
+    "schema": {"type": "string"},
 }
 
 
@@ -152,6 +174,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         schemas.update(definitions["$defs"], **_ANSWERS)
         for path, (kind, _, content) in RESOURCES.items():
             _describe(document["paths"][path]["post"], kind, content)
+        _describe_kept(document["paths"][f"{TRAJECTORIES}/{{name}}"]["get"])
         app.openapi_schema = document
     return app.openapi_schema
 
@@ -166,7 +189,34 @@ def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     answer: dict[str, Any] = {"schema": {"$ref": f"#/components/schemas/{kind.capitalize()}"}}
     if kind in ANSWERS:
         answer["example"] = ANSWERS[kind]
+    refusals = _REFUSALS
     operation["responses"] = {"200": {"description": content, "content": {"application/json": answer}}}
+    if kind == "trajectory":
+        operation["parameters"], refusals = [_CONDITION], {**_REFUSALS, **_PRECONDITION}
+        operation["responses"]["200"] = _trajectory(content, answer)
+    _refuse(operation, refusals)
+
+
+def _describe_kept(operation: dict[str, Any]) -> None:
+    """Put the answers and refusals of a kept trajectory into the operation of its GET."""
+    operation["parameters"] = [*(p for p in operation["parameters"] if p["in"] == "path"), _CONDITION]
+    answer = {"schema": {"$ref": "#/components/schemas/Trajectory"}}
+    operation["responses"] = {
+        "200": _trajectory("The trajectory", answer),
+        "304": {"description": "The client has it already", "headers": {"ETag": _FIELDS["ETag"]}},
+    }
+    _refuse(operation, _KEPT)
+
+
+def _trajectory(description: str, answer: dict[str, Any]) -> dict[str, Any]:
+    """Return the response that has a trajectory in one of its formats."""
+    table = {"text/csv": _TEXT}
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    content = {form.media_type: table.get(form.media_type, binary) for form in FORMATS.values()}
+    return {"description": description, "headers": _FIELDS, "content": {**content, "application/json": answer}}
+
+
+def _refuse(operation: dict[str, Any], refusals: dict[int, str]) -> None:
     problem = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
-    for status, description in _REFUSALS.items():
+    for status, description in sorted(refusals.items()):
         operation["responses"][str(status)] = {"description": description, "content": problem}

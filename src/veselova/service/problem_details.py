@@ -33,8 +33,10 @@ _REFUSALS = {
     "malformed-json": (400, "The body is not JSON"),
     "no-such-job": (404, "No such job"),
     "no-such-resource": (404, "No such resource"),
+    "no-such-answer": (404, "No such answer is kept"),
     "not-acceptable": (406, "No acceptable representation"),
     "not-finished": (409, "The job has not finished"),
+    "precondition-failed": (412, "The answer is the one that you have"),
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
@@ -42,6 +44,7 @@ _REFUSALS = {
     "overloaded": (503, "Too many requests are waiting"),
     "too-many-jobs": (503, "Too many jobs are waiting"),
     "storage-unavailable": (503, "Jobs cannot be stored at present"),
+    "worker-memory": (507, "The work needs more memory than a worker has"),
     "storage-full": (507, "The room for results is used up"),
     "not-ready": (503, "The server is starting"),
     "shutting-down": (503, "The server is shutting down"),
@@ -60,6 +63,9 @@ class Refused(Exception):
         self.detail = detail
         self.retry_after = retry_after
         super().__init__(detail)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # from a worker to the server
+        return type(self), (self.code, self.detail, self.retry_after)
 
 
 def problem_document(error: Exception) -> dict[str, Any]:

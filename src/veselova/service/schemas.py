@@ -116,6 +116,11 @@ class TrajectoryRequest(ComparisonRequest):
     certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
 
     @property
+    def chosen_engine(self) -> str:
+        """Return the engine asked for, or the one that serves the system when none is."""
+        return self.engine or next(name for name in SYSTEMS[self.problem.system].problem_class.engines)
+
+    @property
     def _exact(self) -> bool:
         return beyond_double(self.digits, self.certified)
 

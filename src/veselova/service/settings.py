@@ -30,15 +30,24 @@ class Settings(BaseSettings):
     max_waiting: int = Field(default=64, ge=0, description="requests that may wait for a worker before others are refused")
     max_budget_s: float = Field(default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds")
     shutdown_grace_s: int = Field(default=10, ge=0, description="seconds that requests in flight get after SIGTERM")
-    max_body_bytes: int = Field(default=4_000_000, ge=1000, description="largest request body")
+    estimate_slack: float = Field(
+        default=4.0, ge=0, description="refuse work whose estimated time is so many times its budget; 0 refuses none"
+    )
+    worker_memory_mb: int = Field(default=2048, ge=256, description="memory of a worker, in MB; work that needs more is refused")
+    max_body_bytes: int = Field(default=4_000_000, ge=1000, description="largest request body (200 000 times as a list)")
+    max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
+    max_text: int = Field(default=2100, ge=20, description="longest text in a request body (a number as a string)")
     max_dimension: int = Field(default=64, ge=2, description="largest n")
-    max_times: int = Field(default=100_000, ge=1, description="most times in one request")
-    max_values: int = Field(default=4_000_000, ge=1, description="most frame entries in one answer, times × n²")
+    max_digits: int = Field(default=1000, ge=15, description="most digits")
+    max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")
+    max_values: int = Field(default=16_000_000, ge=1, description="most frame entries in one answer, times × n²")
 
     data_dir: Path = Field(default_factory=_state_folder, description="folder of the database, the results of jobs and the cache")
     database_url: SecretStr = Field(
         default=SecretStr(""), description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir when empty"
     )
+    cache_bytes: int = Field(default=1_000_000_000, ge=0, description="size of the cache of trajectories in data_dir; 0: none")
+
     dask_scheduler: str = Field(default="", description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty")
     dask_ca_file: Path | None = Field(default=None, description="certificate of the authority of a Dask cluster, for tls://")
     dask_cert_file: Path | None = Field(default=None, description="certificate of this server in a Dask cluster")

@@ -13,7 +13,7 @@ from veselova.service.documents import comparison_document, encoded, trajectory_
 from veselova.service.examples import BODY4
 from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest
 
-__all__ = ["TASKS", "answer", "requested_comparison", "requested_torus", "requested_trajectory", "warm_up"]
+__all__ = ["TASKS", "requested_comparison", "requested_torus", "requested_trajectory", "warm_up"]
 
 
 def requested_trajectory(request: TrajectoryRequest) -> Trajectory:
@@ -51,12 +51,6 @@ TASKS: Mapping[str, tuple[type[TorusRequest], Callable[[Any], dict[str, Any]]]] 
     "comparison": (ComparisonRequest, _comparison),
     "torus": (TorusRequest, _torus),
 }
-
-
-def answer(kind: str, request: Mapping[str, Any]) -> bytes:
-    """Return the JSON of an answer; ``request`` is the dump of a validated request."""
-    model, compute = TASKS[kind]
-    return encoded(compute(model.model_validate(request)))
 
 
 def warm_up() -> None:

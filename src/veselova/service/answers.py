@@ -1,0 +1,196 @@
+"""Answers to requests for motions and tori: negotiated, taken from the cache or computed, in memory or through the spool."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from anyio import to_thread
+from starlette.requests import Request
+from starlette.responses import Response
+
+from veselova.mechanics.decimals import FEWEST_DIGITS
+from veselova.service.admission import admit, read_json, require_acceptable
+from veselova.service.cache import Cache
+from veselova.service.connection import while_connected
+from veselova.service.delivery import DamagedEntry, Delivery, Wanted, answered, restored, solved
+from veselova.service.formats import FORMATS, Format, format_of
+from veselova.service.identity import entity_tag, identity, is_identity, matches
+from veselova.service.negotiation import accepted_coding, accepted_type
+from veselova.service.problem_details import Refused
+from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.settings import Settings
+from veselova.service.spool import Spool, SpooledResponse
+from veselova.service.tasks import TASKS
+from veselova.service.workers import Workers
+
+__all__ = ["PROVENANCE", "Answers"]
+
+#: Numbers from which an answer is written to a file, and bytes of a kept one.
+_LARGE_NUMBERS, _LARGE_BYTES = 100_000, 1_000_000
+
+#: The header field that has the provenance of a trajectory, whatever its format, as JSON.
+PROVENANCE = "Veselova-Provenance"
+
+#: What a name stands for never changes; only who asked may keep it, since a server may ask for keys.
+_FOREVER = "private, max-age=31536000, immutable"
+
+
+class Answers:
+    """What one server answers, from its workers, its cache and its spool."""
+
+    def __init__(self, settings: Settings, workers: Workers) -> None:
+        self._settings, self._workers = settings, workers
+        self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
+        self._spool = Spool(settings.data_dir / "spool")
+
+    @asynccontextmanager
+    async def serving(self) -> AsyncIterator[None]:
+        """Keep the spool open for the life of the server."""
+        await to_thread.run_sync(self._spool.open)
+        try:
+            yield
+        finally:
+            self._spool.close()
+
+    async def document(self, kind: str, request: Request) -> Response:
+        """Return the JSON answer of a comparison or a torus."""
+        require_acceptable(_header(request, "accept"))
+        asked = await self._asked(TASKS[kind][0], request)
+        wanted = Wanted("json", _coding(request), self._place(_is_large(asked)))
+
+        async def work() -> Response:
+            delivery = await self._workers.run(answered, kind, asked.model_dump(), wanted, budget_s=asked.budget_s)
+            return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
+
+        return await self._guarded(request, work, wanted.place)
+
+    async def trajectory(self, request: Request) -> Response:
+        """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
+        form = _format(request)
+        asked = await self._asked(TrajectoryRequest, request)
+        name = identity(asked)
+        kept = await to_thread.run_sync(self._cache.find, name)
+        tag = entity_tag(name, form.name)
+        if matches(_header(request, "if-none-match"), tag, kept is not None):
+            # RFC 9110, 13.1.2: 304 answers GET and HEAD alone.
+            raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
+        wanted = Wanted(form.name, _coding(request), self._place(_is_large(asked)))
+        store = self._place(self._settings.cache_bytes > 0)
+
+        async def work() -> Response:
+            if kept is not None and (delivery := await self._restored(name, kept, wanted, asked.budget_s)):
+                return _response(delivery, wanted, {**_headers(name, form), "Cache-Status": "veselova; hit"})
+            delivery = await self._workers.run(solved, asked.model_dump(), wanted, store, budget_s=asked.budget_s)
+            stored = await self._keep(name, store, delivery)
+            return _response(delivery, wanted, _headers(name, form, stored))
+
+        return await self._guarded(request, work, wanted.place, store)
+
+    async def named(self, name: str, request: Request) -> Response:
+        """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
+        form = _format(request)
+        kept = await to_thread.run_sync(self._cache.find, name) if is_identity(name) else None
+        if kept is None:
+            raise _not_kept(name)
+        headers = {**_headers(name, form), "Cache-Control": _FOREVER}
+        if matches(_header(request, "if-none-match"), headers["ETag"], exists=True):
+            return Response(status_code=304, headers=headers)
+        if request.method == "HEAD":
+            return Response(media_type=form.media_type, headers=headers)
+        wanted = Wanted(form.name, _coding(request), self._place(_bytes(kept) > _LARGE_BYTES))
+
+        async def work() -> Response:
+            delivery = await self._restored(name, kept, wanted, self._settings.max_budget_s)
+            if delivery is None:
+                raise _not_kept(name)
+            return _response(delivery, wanted, {**headers, "Cache-Status": "veselova; hit"})
+
+        return await self._guarded(request, work, wanted.place)
+
+    async def _asked(self, model: type[TorusRequest], request: Request) -> Any:
+        asked = read_request(model, await read_json(request, self._settings))
+        admit(asked, self._settings)
+        return asked
+
+    async def _restored(self, name: str, kept: Path, wanted: Wanted, budget_s: float) -> Delivery | None:
+        """Return a kept answer, or None where it is damaged or has just been removed."""
+        try:
+            return await self._workers.run(restored, str(kept), wanted, budget_s=budget_s)
+        except DamagedEntry:
+            await to_thread.run_sync(self._cache.discard, name)
+        except FileNotFoundError:
+            pass
+        return None
+
+    async def _keep(self, name: str, store: str | None, delivery: Delivery) -> bool:
+        if store is None:
+            return False
+        if delivery.not_stored is not None:
+            self._cache.report(delivery.not_stored)
+            return False
+        return await to_thread.run_sync(self._cache.put, name, Path(store))
+
+    def _place(self, needed: bool) -> str | None:
+        return self._spool.place() if needed else None
+
+    @staticmethod
+    async def _guarded(request: Request, work: Any, *places: str | None) -> Response:
+        """Return what the work gives while the client is there; nothing of the spool outlives it."""
+        try:
+            return await while_connected(request, work)
+        finally:
+            for place in filter(None, places):
+                with suppress(OSError):
+                    Path(place).unlink(missing_ok=True)
+
+
+def _response(delivery: Delivery, wanted: Wanted, headers: Mapping[str, str]) -> Response:
+    fields = {**headers, "Content-Type": FORMATS[wanted.format].media_type}
+    if delivery.coding != "identity":
+        fields["Content-Encoding"] = delivery.coding
+    if delivery.provenance is not None:
+        fields[PROVENANCE] = delivery.provenance
+    if delivery.body is not None:
+        return Response(delivery.body, headers=fields)
+    return SpooledResponse(str(wanted.place), fields)
+
+
+def _headers(name: str, form: Format, kept: bool = True) -> dict[str, str]:
+    """Return what the headers of a trajectory say of its name: its own address where it can be had there again."""
+    headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
+    if form.name != "json":
+        headers["Content-Disposition"] = f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
+    return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if kept else headers
+
+
+def _header(request: Request, name: str) -> str | None:
+    return ", ".join(request.headers.getlist(name)) or None
+
+
+def _format(request: Request) -> Format:
+    return format_of(accepted_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()]))
+
+
+def _coding(request: Request) -> str:
+    return accepted_coding(_header(request, "accept-encoding"))
+
+
+def _is_large(asked: TorusRequest) -> bool:
+    if not isinstance(asked, ComparisonRequest):
+        return False
+    numbers = asked.time_count() * asked.problem.dimension**2 * asked.digits / FEWEST_DIGITS
+    return numbers > _LARGE_NUMBERS
+
+
+def _bytes(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def _not_kept(name: str) -> Refused:
+    return Refused("no-such-answer", f"No trajectory is kept as {name[:80]}; POST its request to /v1/trajectories.")

@@ -1,0 +1,110 @@
+"""The cache of answers: a folder of bounded size, shared by several servers. It may fail, and then there is none."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import time
+import uuid
+from contextlib import suppress
+from pathlib import Path
+
+__all__ = ["Cache"]
+
+_LOG = logging.getLogger("veselova.service")
+
+#: What is left after entries had to go, as a part of what may be: the next few answers need no search through the folder.
+_KEPT = 0.9
+
+#: The end of the name of an entry on its way into the cache, and the nanoseconds after which it will not arrive any more.
+_PART, _ARRIVAL_NS = ".part", 600 * 10**9
+
+
+class Cache:
+    """Files by name. An entry appears whole or not at all (it is renamed into place), and the least recently used go first.
+
+    ``size`` is what the entries may take together, in bytes; 0 is no cache. A folder that cannot be read or written, and a disk
+    that is full, are reported once, and leave every question unanswered until they work again.
+    """
+
+    def __init__(self, folder: Path, size: int) -> None:
+        self._folder, self._size = folder, size
+        self._failing = False
+
+    def find(self, name: str) -> Path | None:
+        """Return the file of an entry, which is now the one used last, or None."""
+        if not self._size:
+            return None
+        path = self._path(name)
+        try:
+            os.utime(path)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            self._report(error)
+            return None
+        return path
+
+    def put(self, name: str, source: Path) -> bool:
+        """Move a file into the cache, and make room for it; return whether it is there now."""
+        if not self._size:
+            return False
+        part = self._folder / f".{uuid.uuid4().hex}{_PART}"
+        try:
+            size = source.stat().st_size
+            if size > self._size:
+                return False
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._make_room(size)
+            shutil.move(source, part)  # a copy, where the source is on another disk
+            part.replace(self._path(name))
+        except OSError as error:
+            self._report(error)
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+            return False
+        self._failing = False
+        return True
+
+    def discard(self, name: str) -> None:
+        """Remove an entry that turned out to be damaged."""
+        _LOG.warning("the cached answer %s is damaged and was removed", name)
+        try:
+            self._path(name).unlink(missing_ok=True)
+        except OSError as error:
+            self._report(error)
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}.npz"
+
+    def _make_room(self, size: int) -> None:
+        """Remove the entries used longest ago until so many bytes fit. What another server removes meanwhile is gone as well."""
+        entries = []
+        with os.scandir(self._folder) as found:
+            for entry in found:
+                try:
+                    state = entry.stat()
+                except FileNotFoundError:
+                    continue
+                entries.append((state.st_mtime_ns, state.st_size, entry.path))
+        total = sum(held for _, held, _ in entries)
+        if total + size <= self._size:
+            return
+        arriving = time.time_ns() - _ARRIVAL_NS
+        for used, held, path in sorted(entries):
+            if path.endswith(_PART) and used > arriving:
+                continue
+            Path(path).unlink(missing_ok=True)
+            total -= held
+            if total + size <= _KEPT * self._size:
+                return
+
+    def report(self, reason: str) -> None:
+        """Say why answers are not cached, once until one is again."""
+        if not self._failing:
+            self._failing = True
+            _LOG.warning("answers are not cached: %s", reason)
+
+    def _report(self, error: OSError) -> None:
+        self.report(f"{error.filename or self._folder}: {error.strerror or error}")

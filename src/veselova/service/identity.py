@@ -1,0 +1,50 @@
+"""The name of an answer: a hash of the request that it answers, with every default filled in and the budget left out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+from veselova.service.schemas import TrajectoryRequest
+from veselova.service.systems import SYSTEMS
+from veselova.version import __version__
+
+__all__ = ["entity_tag", "identity", "is_identity", "matches"]
+
+
+def identity(request: TrajectoryRequest) -> str:
+    """Return the SHA-256 of the canonical request and of the version of the package, which answers it, in hexadecimal."""
+    kind, engine = SYSTEMS[request.problem.system].problem_class, request.chosen_engine
+    formulation = request.formulation or (kind.formulations[0] if engine == "numeric" else None)
+    chosen = {"engine": engine, "formulation": formulation, "outputs": list(request.outputs or kind.outputs)}
+    document = {**request.model_dump(exclude={"budget_s"}), **chosen, "version": __version__}
+    text = json.dumps(_canonical(document), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def is_identity(text: str) -> bool:
+    """Return whether a text could be the name of an answer."""
+    return len(text) == hashlib.sha256().digest_size * 2 and all(letter in "0123456789abcdef" for letter in text)
+
+
+def entity_tag(name: str, format_name: str) -> str:
+    """Return the ETag of one format of an answer; weak, since an answer that is computed again took other seconds."""
+    return f'W/"{name}-{format_name}"'
+
+
+def matches(if_none_match: str | None, tag: str, exists: bool) -> bool:
+    """Return whether an If-None-Match header names the tag, in weak comparison; ``*`` names any answer that exists."""
+    names = [part.strip().removeprefix("W/") for part in (if_none_match or "").split(",")]
+    return tag.removeprefix("W/") in names or (exists and names == ["*"])
+
+
+def _canonical(value: Any) -> Any:
+    """Return a JSON value with 3 and 3.0 written alike. A string is a number taken exactly, and stays what it is."""
+    if isinstance(value, dict):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_canonical(item) for item in value]
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
+        return float(value)
+    return value
