@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
+from pathlib import Path
 from typing import Any
 
 import httpx2
@@ -28,6 +30,8 @@ from veselova import (
     solve,
     torus,
 )
+from veselova.service.download import MEDIA_TYPES
+from veselova.service.formats import FORMATS
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TIMES = np.linspace(-1, 2, 7)
@@ -97,7 +101,7 @@ def test_the_asynchronous_client_has_the_same_methods(server: Server) -> None:
 def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
     public = {name for name in vars(Client) if not name.startswith("_")}
     assert public == {name for name in vars(AsyncClient) if not name.startswith("_")}
-    assert public == {"trajectory", "compare", "torus", "close"}
+    assert public == {"trajectory", "download", "compare", "torus", "close"}
     for name in public:
         assert getattr(Client, name).__doc__ == getattr(AsyncClient, name).__doc__
 
@@ -247,3 +251,89 @@ def test_requests_are_what_the_openapi_document_says() -> None:
     assert bodies[0]["problem"] == GOOD["problem"] | {"normalize": False}
     assert bodies[0]["times"] == [0, 1, 2]
     assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == ("numeric", "taylor", 3)
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+@pytest.mark.parametrize("kind", ["json", "csv", "npz", "arrow", "parquet"])
+def test_downloads_are_the_files_of_the_library(server: Server, kind: str, asynchronous: bool, tmp_path: Path) -> None:
+    path, options = tmp_path / f"motion.{kind}", {"outputs": ["q", "tau1"], "engine": "numeric"}
+    if asynchronous:
+
+        async def fetch() -> Any:
+            async with AsyncClient(server.url) as client:
+                return await client.download(PROBLEM, TIMES, path, kind, **options)
+
+        provenance = asyncio.run(fetch())
+    else:
+        with Client(server.url) as client:
+            provenance = client.download(PROBLEM, TIMES, str(path), kind, **options)
+    expected = solve(PROBLEM, TIMES, "numeric")
+    assert provenance.details == expected.provenance.details
+    assert np.array_equal(read_table(path)["tau1"], expected.tau1)
+    assert "omega" not in path.read_bytes().decode("latin-1")
+    assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
+
+
+def read_table(path: Path) -> Any:
+    from pyarrow import ipc, parquet
+
+    readers: dict[str, Any] = {
+        ".json": lambda: json.loads(path.read_bytes())["series"],
+        ".csv": lambda: np.genfromtxt(path, delimiter=",", names=True),
+        ".npz": lambda: dict(np.load(path)),
+        ".arrow": lambda: ipc.open_stream(path.read_bytes()).read_all(),
+        ".parquet": lambda: parquet.read_table(path),
+    }
+    return readers[path.suffix]()
+
+
+def test_a_download_goes_to_an_open_stream_too(server: Server) -> None:
+    stream = io.BytesIO()
+    with Client(server.url) as client:
+        client.download(PROBLEM, TIMES, stream)
+    assert np.array_equal(np.load(io.BytesIO(stream.getvalue()))["frame"], solve(PROBLEM, TIMES).frame)
+
+
+def broken(*chunks: bytes) -> Any:
+    """Return a transport whose first answer breaks off after the chunks, and whose second is whole."""
+    header = {"veselova-provenance": json.dumps(solve(PROBLEM, TIMES).provenance.as_dict())}
+    answers = iter([True, False])
+
+    def body(breaks: bool) -> Any:
+        yield from chunks
+        if breaks:
+            raise httpx2.ReadError("cut off")
+
+    return httpx2.MockTransport(lambda _: httpx2.Response(200, headers=header, content=body(next(answers))))
+
+
+def test_a_download_that_breaks_off_begins_again_or_leaves_no_file(tmp_path: Path) -> None:
+    with Client("http://server", transport=broken(b"one", b"two")) as client:
+        client.download(PROBLEM, TIMES, tmp_path / "whole.npz")
+    assert (tmp_path / "whole.npz").read_bytes() == b"onetwo"
+    with Client("http://server", attempts=1, transport=broken(b"one")) as client, pytest.raises(ServiceUnreachable):
+        client.download(PROBLEM, TIMES, tmp_path / "part.npz")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["whole.npz"]
+    stream = io.BytesIO()
+    with Client("http://server", transport=broken(b"one")) as client, pytest.raises(ServiceUnreachable):
+        client.download(PROBLEM, TIMES, stream)
+    assert stream.getvalue() == b"one"
+
+
+def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(server: Server, tmp_path: Path) -> None:
+    client = Client("http://nowhere.invalid")
+    for target, kind, field in (
+        (tmp_path / "no" / "x.npz", "npz", "target"),
+        (3, "npz", "target"),
+        (tmp_path / "x", "xls", "format"),
+    ):
+        with pytest.raises(InvalidInput, match=field):
+            client.download(PROBLEM, TIMES, target, kind)
+    with Client(server.url) as client, pytest.raises(ProblemResponse) as raised:
+        client.download(PROBLEM, TIMES, tmp_path / "x.csv", "csv", outputs=["p"])
+    assert raised.value.status == 422
+    assert not list(tmp_path.iterdir())
+
+
+def test_client_and_server_agree_on_the_formats() -> None:
+    assert {entry.name: entry.media_type for entry in FORMATS.values()} == MEDIA_TYPES

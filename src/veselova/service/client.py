@@ -6,24 +6,16 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
+from collections.abc import Awaitable, Callable
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import httpx2 as httpx
 import orjson
 import stamina
+from anyio import to_thread
 
-from veselova.mechanics.comparison import Comparison
-from veselova.mechanics.decimals import FEWEST_DIGITS
-from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
-from veselova.mechanics.exact import plain
-from veselova.mechanics.problem import Problem
-from veselova.mechanics.times import validated_times
-from veselova.mechanics.torus import Torus
-from veselova.mechanics.trajectory import Trajectory
-from veselova.service.documents import comparison_of, stored_outputs, torus_of, trajectory_of
+from veselova.mechanics.errors import ProblemResponse, ServiceError, ServiceUnreachable, shown
+from veselova.service.calls import Call, compare_call, download_call, torus_call, trajectory_call
 
 __all__ = ["AsyncClient", "Client"]
 
@@ -44,16 +36,6 @@ _LONGEST_PAUSE_S = 30.0
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 
 
-@dataclass(frozen=True)
-class _Call(Generic[T]):
-    """One request: where it goes, its body, how long it may take, and what its answer becomes."""
-
-    path: str
-    body: Mapping[str, Any]
-    budget_s: float
-    result: Callable[[Any], T]
-
-
 class _Retry(Exception):
     """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may ask for a pause in seconds."""
 
@@ -67,67 +49,6 @@ def _pause_before_retry(error: Exception) -> bool | float:
     return isinstance(error, _Retry) and (error.pause or True)
 
 
-def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
-    """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated here already."""
-    if isinstance(problem, Problem):
-        return problem
-    if not isinstance(problem, Mapping):
-        raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", shown(problem)
-        )
-    from veselova.service.schemas import TorusRequest, read_request
-
-    return read_request(TorusRequest, {"problem": dict(problem)}).problem.problem()
-
-
-def _times(times: Any) -> Any:
-    if isinstance(times, Mapping):
-        return dict(times)
-    validated_times(times)  # refuses here what the server would
-    return plain(times)
-
-
-def _trajectory_call(
-    problem: Problem | Mapping[str, Any],
-    times: Any,
-    engine: str | None = None,
-    method: str | None = None,
-    *,
-    digits: int = FEWEST_DIGITS,
-    certified: bool = False,
-    formulation: str | None = None,
-    budget_s: float = 10.0,
-) -> _Call[Trajectory]:
-    """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
-    asked = _problem(problem)
-    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
-    body = {**chosen, **_motion(asked, times, method, budget_s)}
-    return _Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
-
-
-def _compare_call(
-    problem: Problem | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
-) -> _Call[Comparison]:
-    """Return both engines' motions and how they agree (see ``veselova.compare``)."""
-    asked = _problem(problem)
-    return _Call("/v1/comparisons", _motion(asked, times, method, budget_s), budget_s, partial(comparison_of, asked))
-
-
-def _torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> _Call[Torus]:
-    """Return the invariant torus of a motion (see ``veselova.torus``)."""
-    return _Call("/v1/tori", {"problem": _problem(problem).as_dict(), "budget_s": budget_s}, budget_s, torus_of)
-
-
-def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
-    return {
-        "problem": problem.as_dict(),
-        "times": _times(times),
-        "method": method,
-        "outputs": list(stored_outputs(problem)),
-        "budget_s": budget_s,
-    }
-
-
 class _Core:
     """What both clients share: the address, the retries, the reading of answers."""
 
@@ -139,16 +60,16 @@ class _Core:
         """Return a fresh retry context; one belongs to one call."""
         return stamina.retry_context(on=_pause_before_retry, attempts=self._attempts, timeout=None, wait_initial=0.2)
 
-    def _request(self, call: _Call[Any]) -> dict[str, Any]:
-        headers = {"content-type": "application/json", "accept": "application/json, application/problem+json"}
+    def _request(self, call: Call[Any]) -> dict[str, Any]:
+        headers = {"content-type": "application/json", "accept": f"{call.accept}, application/problem+json;q=0.1"}
         timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
         return {"method": "POST", "url": call.path, "content": orjson.dumps(call.body), "headers": headers, "timeout": timeout}
 
-    def _result(self, call: _Call[T], response: httpx.Response) -> T:
+    def _result(self, call: Call[T], response: httpx.Response) -> T:
         """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
         if response.status_code == httpx.codes.OK:
             try:
-                return call.result(orjson.loads(response.content))
+                return call.result(orjson.loads(response.content) if call.sink is None else response.headers)
             except (ValueError, KeyError, TypeError):
                 raise ServiceError(f"{self._base_url}{call.path} answered with something else than a result") from None
         try:
@@ -163,11 +84,12 @@ class _Core:
         pause = response.headers.get("retry-after", "")
         raise _Retry(failure, min(float(pause), _LONGEST_PAUSE_S) if pause.isdigit() else None)
 
-    def _unreachable(self, error: httpx.TransportError) -> Exception:
+    def _unreachable(self, call: Call[Any], error: httpx.TransportError) -> Exception:
         """Return the failure behind a transport error, to be retried where the connection itself failed."""
         failure = ServiceUnreachable(f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}")
         failure.__cause__ = error
-        return _Retry(failure) if isinstance(error, _PASSING) else failure
+        passing = isinstance(error, _PASSING) and (call.sink is None or call.sink.untouched)
+        return _Retry(failure) if passing else failure
 
 
 class Client(_Core):
@@ -181,14 +103,15 @@ class Client(_Core):
         super().__init__(base_url, attempts=attempts)
         self._http = httpx.Client(base_url=base_url, transport=transport)
 
-    def _send(self, call: _Call[T]) -> T:
+    def _send(self, call: Call[T]) -> T:
         try:
             for attempt in self._retries():
                 with attempt:
                     try:
-                        response = self._http.request(**self._request(call))
+                        with self._http.stream(**self._request(call)) as response:
+                            self._receive(call, response)
                     except httpx.TransportError as error:
-                        raise self._unreachable(error) from None
+                        raise self._unreachable(call, error) from None
                     except RuntimeError as error:
                         raise ServiceError(f"the client is closed ({error})") from None
                     return self._result(call, response)
@@ -197,16 +120,26 @@ class Client(_Core):
         raise AssertionError("a retry context gives at least one attempt")
 
     @staticmethod
-    def _method(call: Callable[P, _Call[T]]) -> Callable[Concatenate[Client, P], T]:
+    def _receive(call: Call[Any], response: httpx.Response) -> None:
+        if call.sink is None or response.status_code != httpx.codes.OK:
+            response.read()
+            return
+        with call.sink.opened() as write:
+            for chunk in response.iter_bytes():
+                write(chunk)
+
+    @staticmethod
+    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[Client, P], T]:
         def method(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
             return self._send(call(*args, **kwargs))
 
         method.__doc__ = call.__doc__
         return method
 
-    trajectory = _method(_trajectory_call)
-    compare = _method(_compare_call)
-    torus = _method(_torus_call)
+    trajectory = _method(trajectory_call)
+    download = _method(download_call)
+    compare = _method(compare_call)
+    torus = _method(torus_call)
 
     def close(self) -> None:
         """Close the connections."""
@@ -226,14 +159,15 @@ class AsyncClient(_Core):
         super().__init__(base_url, attempts=attempts)
         self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
 
-    async def _send(self, call: _Call[T]) -> T:
+    async def _send(self, call: Call[T]) -> T:
         try:
             async for attempt in self._retries():
                 with attempt:
                     try:
-                        response = await self._http.request(**self._request(call))
+                        async with self._http.stream(**self._request(call)) as response:
+                            await self._receive(call, response)
                     except httpx.TransportError as error:
-                        raise self._unreachable(error) from None
+                        raise self._unreachable(call, error) from None
                     except RuntimeError as error:
                         raise ServiceError(f"the client is closed ({error})") from None
                     return self._result(call, response)
@@ -242,16 +176,26 @@ class AsyncClient(_Core):
         raise AssertionError("a retry context gives at least one attempt")
 
     @staticmethod
-    def _method(call: Callable[P, _Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:
+    async def _receive(call: Call[Any], response: httpx.Response) -> None:
+        if call.sink is None or response.status_code != httpx.codes.OK:
+            await response.aread()
+            return
+        with call.sink.opened() as write:
+            async for chunk in response.aiter_bytes():
+                await to_thread.run_sync(write, chunk)
+
+    @staticmethod
+    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:
         def method(self: AsyncClient, /, *args: P.args, **kwargs: P.kwargs) -> Awaitable[T]:
             return self._send(call(*args, **kwargs))
 
         method.__doc__ = call.__doc__
         return method
 
-    trajectory = _method(_trajectory_call)
-    compare = _method(_compare_call)
-    torus = _method(_torus_call)
+    trajectory = _method(trajectory_call)
+    download = _method(download_call)
+    compare = _method(compare_call)
+    torus = _method(torus_call)
 
     async def close(self) -> None:
         """Close the connections."""
