@@ -17,14 +17,14 @@ from veselova.service.settings import Settings
 __all__ = ["Cost", "cost", "require_hope"]
 
 #: Seconds for each time and n², by engine, in double precision.
-_SECONDS = {"analytic": 9e-7, "numeric": 1.3e-7}
+_SECONDS = {"analytic": 8e-7, "numeric": 9e-8}
 
 #: Seconds for each time, n² and FEWEST_DIGITS digits beyond double precision; and for the set-up, for each n, at that many
 #: digits, where it grows like digits^1.5.
-_SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 8e-5, 1e-2, 1.5
+_SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 5e-5, 5e-3, 1.5
 
 #: Bytes for each time and n²: the frame, ω, and as much again while they are computed; a decimal is an object of its own.
-_BYTES, _BYTES_DECIMAL = 40, 400
+_BYTES, _BYTES_DECIMAL = 32, 400
 
 _MEGABYTE = 1 << 20
 

@@ -13,7 +13,7 @@ from veselova.service.answers import PROVENANCE
 from veselova.service.examples import ANSWERS, BODY4_PROBLEM
 from veselova.service.formats import FORMATS
 from veselova.service.problem_details import MEDIA_TYPE
-from veselova.service.routes import RESOURCES, TRAJECTORIES
+from veselova.service.routes import KEPT, RESOURCES
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.systems import SYSTEMS
 from veselova.service.tasks import TASKS
@@ -140,7 +140,7 @@ _REFUSALS = {
 
 #: Refusals of one path alone, and what a GET of a kept trajectory can be refused for.
 _PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
-_KEPT = {404: "Not kept, or not any more", **{status: _REFUSALS[status] for status in (406, 500, 503, 504, 507)}}
+_KEPT_REFUSALS = {404: "Not kept, or not any more", **{status: _REFUSALS[status] for status in (406, 500, 503, 504, 507)}}
 
 _TEXT = {"schema": {"type": "string"}}
 #: Header fields of a trajectory, in every format.
@@ -148,6 +148,13 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "ETag": {"description": "hash of the request, its defaults filled in and its budget left out, and the format", **_TEXT},
     "Content-Location": {"description": "where a GET gives this trajectory, in any format, while it is kept", **_TEXT},
     PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
+}
+_NAME = {
+    "name": "name",
+    "in": "path",
+    "required": True,
+    "description": "the last part of the Content-Location of an answer",
+    "schema": {"type": "string"},
 }
 _CONDITION = {
     "name": "If-None-Match",
@@ -174,7 +181,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         schemas.update(definitions["$defs"], **_ANSWERS)
         for path, (kind, _, content) in RESOURCES.items():
             _describe(document["paths"][path]["post"], kind, content)
-        _describe_kept(document["paths"][f"{TRAJECTORIES}/{{name}}"]["get"])
+        document["paths"][KEPT] = {"get": _kept(), "head": _kept_head()}
         app.openapi_schema = document
     return app.openapi_schema
 
@@ -197,15 +204,29 @@ def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     _refuse(operation, refusals)
 
 
-def _describe_kept(operation: dict[str, Any]) -> None:
-    """Put the answers and refusals of a kept trajectory into the operation of its GET."""
-    operation["parameters"] = [*(p for p in operation["parameters"] if p["in"] == "path"), _CONDITION]
+def _kept() -> dict[str, Any]:
+    """Return the operation that gives a kept trajectory."""
     answer = {"schema": {"$ref": "#/components/schemas/Trajectory"}}
-    operation["responses"] = {
-        "200": _trajectory("The trajectory", answer),
-        "304": {"description": "The client has it already", "headers": {"ETag": _FIELDS["ETag"]}},
+    operation: dict[str, Any] = {
+        "tags": ["motions"],
+        "summary": "Give a trajectory that is kept",
+        "operationId": "kept",
+        "parameters": [_NAME, _CONDITION],
+        "responses": {
+            "200": _trajectory("The trajectory", answer),
+            "304": {"description": "The client has it already", "headers": {"ETag": _FIELDS["ETag"]}},
+        },
     }
-    _refuse(operation, _KEPT)
+    _refuse(operation, _KEPT_REFUSALS)
+    return operation
+
+
+def _kept_head() -> dict[str, Any]:
+    """Return the operation that gives the header of a kept trajectory alone."""
+    statuses = {200: "It is kept", 304: "The client has it already", 404: "Not kept, or not any more", 406: _REFUSALS[406]}
+    responses = {str(status): {"description": description} for status, description in statuses.items()}
+    named = {"tags": ["motions"], "summary": "Tell whether a trajectory is kept", "operationId": "kept_head"}
+    return {**named, "parameters": [_NAME, _CONDITION], "responses": responses}
 
 
 def _trajectory(description: str, answer: dict[str, Any]) -> dict[str, Any]:

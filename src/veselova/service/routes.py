@@ -16,10 +16,10 @@ from veselova.service.systems import SYSTEMS
 from veselova.service.workers import Workers
 from veselova.version import __version__
 
-__all__ = ["RESOURCES", "TRAJECTORIES", "router"]
+__all__ = ["KEPT", "RESOURCES", "router"]
 
-#: The path of trajectories, and below it of those that are kept.
-TRAJECTORIES = "/v1/trajectories"
+#: The path of trajectories, and that of those which are kept.
+TRAJECTORIES, KEPT = "/v1/trajectories", "/v1/trajectories/{name}"
 
 #: Path → (kind of answer, summary, what the answer holds).
 RESOURCES = {
@@ -52,10 +52,11 @@ def router(settings: Settings, workers: Workers, answers: Answers) -> APIRouter:
         answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
         routes.add_api_route(path, answer, methods=["POST"], summary=summary, name=kind, tags=["motions"])
 
-    @routes.api_route(f"{TRAJECTORIES}/{{name}}", methods=["GET"], summary="Give a trajectory that is kept", tags=["motions"])
-    @routes.api_route(f"{TRAJECTORIES}/{{name}}", methods=["HEAD"], include_in_schema=False)
-    async def named(name: str, request: Request) -> Response:
-        return await answers.named(name, request)
+    async def kept(request: Request) -> Response:
+        return await answers.named(request.path_params["name"], request)
+
+    # A route of Starlette, for GET and HEAD at once; openapi describes it.
+    routes.add_route(KEPT, kept, methods=["GET"], name="kept")
 
     @routes.get("/v1/systems", summary="List the systems that can be solved", tags=["service"])
     async def systems() -> Response:
