@@ -1,0 +1,48 @@
+"""The OpenAPI document against the server: requests drawn from it are answered as it says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from conftest import Server
+
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+]
+
+
+@pytest.mark.parametrize(
+    ("path", "method"),
+    [
+        ("/v1/trajectories", "POST"),
+        ("/v1/trajectories/{name}", "GET"),
+        ("/v1/comparisons", "POST"),
+        ("/v1/tori", "POST"),
+    ],
+)
+def test_answers_are_what_the_document_says(server: Server, path: str, method: str) -> None:
+    operation = schemathesis.openapi.from_url(f"{server.url}/openapi.json")[path][method]
+
+    @given(case=operation.as_strategy())
+    @settings(max_examples=40, suppress_health_check=list(HealthCheck))
+    def conforms(case: Any) -> None:
+        if isinstance(case.body, dict):
+            case.body = {**case.body, "budget_s": 5.0}  # what is drawn shall not be refused for the seconds of a busy machine
+        case.validate_response(case.call(timeout=60), checks=CHECKS)
+
+    conforms()
