@@ -64,7 +64,7 @@ def test_costs_grow_with_points_dimension_and_digits() -> None:
 
 
 def test_the_slack_of_estimates_is_a_setting() -> None:
-    exact = trajectory(digits=500, times=many(2000), budget_s=5.0)
+    exact = trajectory(digits=500, times=many(3000), budget_s=5.0)
     with pytest.raises(InvalidInput, match=r"budget_s = 5"):
         require_hope(exact, Settings())
     require_hope(exact, Settings(estimate_slack=0))
