@@ -99,7 +99,9 @@ class Answers:
         if matches(_header(request, "if-none-match"), headers["ETag"], exists=True):
             return Response(status_code=304, headers=headers)
         if request.method == "HEAD":
-            return Response(media_type=form.media_type, headers=headers)
+            response = Response(headers={**headers, "Content-Type": form.media_type})
+            del response.headers["content-length"]  # that of the GET is not known before it
+            return response
         wanted = Wanted(form.name, _coding(request), self._place(_bytes(kept) > _LARGE_BYTES))
 
         async def work() -> Response:

@@ -17,11 +17,11 @@ from veselova.service.settings import Settings
 __all__ = ["Cost", "cost", "require_hope"]
 
 #: Seconds for each time and n², by engine, in double precision.
-_SECONDS = {"analytic": 8e-7, "numeric": 9e-8}
+_SECONDS = {"analytic": 7e-7, "numeric": 9e-8}
 
 #: Seconds for each time, n² and FEWEST_DIGITS digits beyond double precision; and for the set-up, for each n, at that many
 #: digits, where it grows like digits^1.5.
-_SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 4e-5, 4e-3, 1.5
+_SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 2.5e-5, 3e-3, 1.5
 
 #: Bytes for each time and n²: the frame, ω, and as much again while they are computed; a decimal is an object of its own.
 _BYTES, _BYTES_DECIMAL = 32, 400
