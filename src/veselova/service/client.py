@@ -6,6 +6,8 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Awaitable, Callable
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
@@ -14,7 +16,7 @@ import orjson
 import stamina
 from anyio import to_thread
 
-from veselova.mechanics.errors import ProblemResponse, ServiceError, ServiceUnreachable, shown
+from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
 from veselova.service.calls import Call, compare_call, download_call, torus_call, trajectory_call
 
 __all__ = ["AsyncClient", "Client"]
@@ -49,19 +51,31 @@ def _pause_before_retry(error: Exception) -> bool | float:
     return isinstance(error, _Retry) and (error.pause or True)
 
 
+def _credentials(api_key: str) -> dict[str, str]:
+    """Return the header that shows a key; none for an empty one. The refusal does not quote what may be a secret."""
+    if not re.fullmatch(r"[\x21-\x7e]*", api_key):
+        raise InvalidInput(("api_key",), "a key of the server (printable ASCII, no spaces)", "other characters")
+    return {"authorization": f"Bearer {api_key}"} if api_key else {}
+
+
 class _Core:
     """What both clients share: the address, the retries, the reading of answers."""
 
-    def __init__(self, base_url: str, *, attempts: int = 4) -> None:
+    def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
         self._base_url = base_url
         self._attempts = attempts
+        self._credentials = _credentials(os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key)
 
     def _retries(self) -> Any:
         """Return a fresh retry context; one belongs to one call."""
         return stamina.retry_context(on=_pause_before_retry, attempts=self._attempts, timeout=None, wait_initial=0.2)
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
-        headers = {"content-type": "application/json", "accept": f"{call.accept}, application/problem+json;q=0.1"}
+        headers = {
+            "content-type": "application/json",
+            "accept": f"{call.accept}, application/problem+json;q=0.1",
+            **self._credentials,
+        }
         timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
         return {"method": "POST", "url": call.path, "content": orjson.dumps(call.body), "headers": headers, "timeout": timeout}
 
@@ -95,12 +109,20 @@ class _Core:
 class Client(_Core):
     """A synchronous client. Every method answers with the same types as the library itself.
 
+    ``api_key`` is shown with every request; left out, that of the environment variable VESELOVA_API_KEY.
     ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before anything is sent,
     ProblemResponse with the server's problem document, ServiceUnreachable when no answer comes.
     """
 
-    def __init__(self, base_url: str = "http://127.0.0.1:8000", *, attempts: int = 4, transport: Any = None) -> None:
-        super().__init__(base_url, attempts=attempts)
+    def __init__(
+        self,
+        base_url: str = "http://127.0.0.1:8000",
+        *,
+        attempts: int = 4,
+        api_key: str | None = None,
+        transport: Any = None,
+    ) -> None:
+        super().__init__(base_url, attempts=attempts, api_key=api_key)
         self._http = httpx.Client(base_url=base_url, transport=transport)
 
     def _send(self, call: Call[T]) -> T:
@@ -155,8 +177,15 @@ class Client(_Core):
 class AsyncClient(_Core):
     """The asynchronous client: the same methods, awaited."""
 
-    def __init__(self, base_url: str = "http://127.0.0.1:8000", *, attempts: int = 4, transport: Any = None) -> None:
-        super().__init__(base_url, attempts=attempts)
+    def __init__(
+        self,
+        base_url: str = "http://127.0.0.1:8000",
+        *,
+        attempts: int = 4,
+        api_key: str | None = None,
+        transport: Any = None,
+    ) -> None:
+        super().__init__(base_url, attempts=attempts, api_key=api_key)
         self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
 
     async def _send(self, call: Call[T]) -> T:
