@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from veselova.mechanics.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved
 
-__all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_document", "problem_response"]
+__all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_code", "problem_document", "problem_response"]
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -40,6 +40,10 @@ _REFUSALS = {
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
+    "unauthorized": (401, "An API key is required"),
+    "rate-limited": (429, "Too many requests"),
+    "unknown-method": (501, "The method is unknown"),
+    "database-unavailable": (503, "The database does not answer"),
     "client-gone": (499, "The client closed the connection"),
     "overloaded": (503, "Too many requests are waiting"),
     "too-many-jobs": (503, "Too many jobs are waiting"),
@@ -86,6 +90,12 @@ def problem_document(error: Exception) -> dict[str, Any]:
     if isinstance(error, Unsolved):
         document["outcome"] = error.outcome
     return document
+
+
+def problem_code(error: Exception) -> str:
+    """Return the name of what went wrong: the outcome of an engine, or the code of the problem document."""
+    document = problem_document(error)
+    return str(document.get("outcome") or document["type"].rpartition(":")[2])
 
 
 def problem_response(error: Exception) -> Response:
