@@ -64,14 +64,14 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_server(folder: Path, **limits: str) -> Iterator[Server]:
-    """Run a server with limits from the environment, and end it."""
+def running_server(folder: Path, *arguments: str, **limits: str) -> Iterator[Server]:
+    """Run a server with arguments of its command and settings from the environment, and end it."""
     port = free_port()
     limits.setdefault("data_dir", str(folder / "data"))
     environment = {**os.environ, **{f"VESELOVA_{name.upper()}": value for name, value in limits.items()}}
     log = folder / "server.log"
     with log.open("wb") as stream:
-        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
+        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port), *arguments]
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:

@@ -18,6 +18,7 @@ from veselova.service.connection import while_connected
 from veselova.service.delivery import DamagedEntry, Delivery, Wanted, answered, restored, solved
 from veselova.service.formats import FORMATS, Format, format_of
 from veselova.service.identity import entity_tag, identity, is_identity, matches
+from veselova.service.metrics import Metrics
 from veselova.service.negotiation import accepted_coding, accepted_type
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
@@ -41,8 +42,8 @@ _FOREVER = "private, max-age=31536000, immutable"
 class Answers:
     """What one server answers, from its workers, its cache and its spool."""
 
-    def __init__(self, settings: Settings, workers: Workers) -> None:
-        self._settings, self._workers = settings, workers
+    def __init__(self, settings: Settings, workers: Workers, metrics: Metrics) -> None:
+        self._settings, self._workers, self._metrics = settings, workers, metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
         self._spool = Spool(settings.data_dir / "spool")
 
@@ -62,7 +63,8 @@ class Answers:
         wanted = Wanted("json", _coding(request), self._place(_is_large(asked)))
 
         async def work() -> Response:
-            delivery = await self._workers.run(answered, kind, asked.model_dump(), wanted, budget_s=asked.budget_s)
+            with self._metrics.work(kind, asked.model_dump()):
+                delivery = await self._workers.run(answered, kind, asked.model_dump(), wanted, budget_s=asked.budget_s)
             return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
 
         return await self._guarded(request, work, wanted.place)
@@ -81,9 +83,12 @@ class Answers:
         store = self._place(self._settings.cache_bytes > 0)
 
         async def work() -> Response:
-            if kept is not None and (delivery := await self._restored(name, kept, wanted, asked.budget_s)):
+            delivery = await self._restored(name, kept, wanted, asked.budget_s) if kept is not None else None
+            self._metrics.cached(hit=delivery is not None)
+            if delivery is not None:
                 return _response(delivery, wanted, {**_headers(name, form), "Cache-Status": "veselova; hit"})
-            delivery = await self._workers.run(solved, asked.model_dump(), wanted, store, budget_s=asked.budget_s)
+            with self._metrics.work("trajectory", asked.model_dump()):
+                delivery = await self._workers.run(solved, asked.model_dump(), wanted, store, budget_s=asked.budget_s)
             stored = await self._keep(name, store, delivery)
             return _response(delivery, wanted, _headers(name, form, stored))
 

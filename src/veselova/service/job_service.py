@@ -86,6 +86,18 @@ class JobService:
             detail = f"Jobs cannot be stored or read at present: {_reason(error)}."
             raise Refused("storage-unavailable", detail, retry_after=30) from None
 
+    def counts(self) -> dict[str, int]:
+        """Return how many jobs are in each state, nothing while the store does not answer. Blocks."""
+        if self._sweeps is None:
+            return {}
+        from sqlalchemy.exc import SQLAlchemyError
+
+        try:
+            return self._sweeps.jobs.counts()
+        except (OSError, SQLAlchemyError) as error:
+            _LOG.warning("the storage of jobs failed: %s", _reason(error))
+            return {}
+
     async def require(self) -> None:
         """Raise Refused (``storage-unavailable``) unless the database can be written."""
         await self.ask(lambda jobs: jobs.require_writable())

@@ -13,7 +13,6 @@ from veselova.service.answers import Answers
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 from veselova.service.systems import SYSTEMS
-from veselova.service.workers import Workers
 from veselova.version import __version__
 
 __all__ = ["KEPT", "RESOURCES", "router"]
@@ -45,8 +44,8 @@ def _systems() -> list[dict[str, Any]]:
     ]
 
 
-def router(settings: Settings, workers: Workers, answers: Answers) -> APIRouter:
-    """Return the routes of one server, over its settings, workers and answers."""
+def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable[list[str]]]) -> APIRouter:
+    """Return the routes of one server, over its settings, its answers, and what says which of its parts are missing."""
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
         answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
@@ -66,10 +65,10 @@ def router(settings: Settings, workers: Workers, answers: Answers) -> APIRouter:
     async def healthz() -> Response:
         return _json({"status": "ok", "version": __version__})
 
-    @routes.get("/readyz", summary="Whether a worker is warm", tags=["service"])
+    @routes.get("/readyz", summary="Whether the server can answer: a warm worker, its database", tags=["service"])
     async def readyz() -> Response:
-        if not workers.warm:
-            raise Refused("not-ready", "No worker is warm yet.", retry_after=1)
+        if parts := await missing():
+            raise Refused("not-ready", " ".join(parts), retry_after=1)
         return _json({"status": "ready"})
 
     return routes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import signal
 import socket
@@ -13,7 +14,10 @@ from veselova.mechanics.errors import InvalidInput
 from veselova.service.cluster import require_scheduler
 from veselova.service.settings import Settings
 
-__all__ = ["serve"]
+__all__ = ["serve", "settings_of_environment"]
+
+#: The key that a client of this environment shows; no setting of the server.
+_OF_THE_CLIENT = {"VESELOVA_API_KEY"}
 
 
 def serve(host: str, port: int, settings_only: bool) -> None:
@@ -22,22 +26,33 @@ def serve(host: str, port: int, settings_only: bool) -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    limits = _settings()
+    limits = settings_of_environment()
     if settings_only:
         for name, value in limits.model_dump().items():
             print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
         return
     _require_addresses(limits)
-    _require_free(host, port)
+    _bindable(host, port)
     import uvicorn
 
     from veselova.service.app import create_app
+    from veselova.service.logs import configure_logging
 
-    uvicorn.run(create_app(limits), host=host, port=port, log_level="info", timeout_graceful_shutdown=limits.shutdown_grace_s)
+    configure_logging(limits)
+    app = create_app(limits)
+    uvicorn.run(
+        app,
+        host=host,
+        port=port,
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=limits.shutdown_grace_s,
+    )
 
 
-def _settings() -> Settings:
-    known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields}
+def settings_of_environment() -> Settings:
+    """Return the settings of the environment; raises InvalidInput for one that is not valid."""
+    known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} | _OF_THE_CLIENT
     for name in sorted(os.environ):
         if name.startswith("VESELOVA_") and name not in known:
             print(f"veselova: {name} is not one of its settings (veselova serve --settings lists them)", file=sys.stderr)
@@ -46,7 +61,8 @@ def _settings() -> Settings:
     except ValidationError as error:
         item = error.errors()[0]
         name = f"VESELOVA_{str(item['loc'][0]).upper()}"
-        raise InvalidInput((name,), item["msg"][:1].lower() + item["msg"][1:], str(item["input"])) from None
+        required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
+        raise InvalidInput((name,), required[:1].lower() + required[1:], str(item["input"])) from None
 
 
 def _require_addresses(limits: Settings) -> None:
@@ -59,15 +75,20 @@ def _require_addresses(limits: Settings) -> None:
     database_url(limits)
 
 
-def _require_free(host: str, port: int) -> None:
-    """Refuse an address that cannot be bound in the words of the other refusals, before anything is started."""
+def _bindable(host: str, port: int) -> bool:
+    """Return whether an address is one of loopback.
+
+    An address that cannot be bound is refused in the words of the other refusals, before anything is started.
+    """
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except socket.gaierror as error:
         raise InvalidInput(("--host",), "an address of this machine", f"{host} ({error.strerror})") from None
+    family, kind, protocol, _, address = found[0]
     with socket.socket(family, kind, protocol) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(address)
         except OSError as error:
             raise InvalidInput(("--port",), "an address and a port to bind", f"{host}:{port} ({error.strerror})") from None
+    return all(ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -61,6 +62,9 @@ class Settings(BaseSettings):
     max_sweep_problems: int = Field(default=1_000_000, ge=1, description="most problems in one sweep")
     max_sweep_bytes: int = Field(default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated")
     max_stored_bytes: int = Field(default=20_000_000_000, ge=1000, description="largest results of all jobs together")
+
+    log_format: Literal["auto", "json", "text"] = Field(default="auto", description="lines of the log; auto: text on a terminal")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="least severe lines logged")
 
     @property
     def limits(self) -> dict[str, float]:

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import anyio
-from anyio import BrokenWorkerProcess, CapacityLimiter, to_process
+from anyio import BrokenWorkerProcess, CapacityLimiter, CapacityLimiterStatistics, to_process
 
+from veselova.service.metrics import Metrics
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 from veselova.service.tasks import warm_up
@@ -24,11 +25,20 @@ _MEGABYTE = 1 << 20
 class Workers:
     """The worker processes of one server. Threads, and pools of the standard library, go on burning after a timeout."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, metrics: Metrics) -> None:
+        self._metrics = metrics
         self._limiter = CapacityLimiter(settings.workers)
         self._max_waiting = settings.max_waiting
         self._memory_mb = settings.worker_memory_mb
         self.warm = False
+        metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self.load.total_tokens)
+        metrics.gauge("veselova_workers_busy", "Worker processes at work", lambda: self.load.borrowed_tokens)
+        metrics.gauge("veselova_queue_length", "Requests that wait for a worker", lambda: self.load.tasks_waiting)
+
+    @property
+    def load(self) -> CapacityLimiterStatistics:
+        """Return how many workers there may be, how many are at work, and how many requests wait for one."""
+        return self._limiter.statistics()
 
     async def start(self) -> None:
         """Start one worker with both engines loaded."""
@@ -42,7 +52,7 @@ class Workers:
         ``worker-memory`` when the task needs more of it, ``worker-lost`` when the process died. What the engines raise comes
         through.
         """
-        load = self._limiter.statistics()
+        load = self.load
         if load.borrowed_tokens >= load.total_tokens and load.tasks_waiting >= self._max_waiting:
             raise Refused("overloaded", f"{self._max_waiting} requests are waiting for a worker; try again later.", retry_after=2)
         work: tuple[Any, ...] = (_within_memory, self._memory_mb, task, *arguments)

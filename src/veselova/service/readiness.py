@@ -1,0 +1,33 @@
+"""Whether a server can answer: what of it is missing."""
+
+from __future__ import annotations
+
+import anyio.to_thread
+
+from veselova.mechanics.errors import BackendMissing
+from veselova.service.job_service import JobService
+from veselova.service.keys import Keys
+from veselova.service.problem_details import Refused
+from veselova.service.workers import Workers
+
+__all__ = ["missing_parts"]
+
+
+async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -> list[str]:
+    """Return what keeps a server from answering, in words: a warm worker, the store of its jobs, its keys where it asks for them.
+
+    A server without the libraries of jobs is complete without their store.
+    """
+    missing = [] if workers.warm else ["No worker is warm yet."]
+    try:
+        await jobs.require()
+    except Refused as error:
+        missing.append(error.detail)
+    except BackendMissing:
+        pass
+    if keys is not None:
+        try:
+            await anyio.to_thread.run_sync(keys.require)
+        except Refused as error:
+            missing.append(error.detail)
+    return missing

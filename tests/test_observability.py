@@ -1,0 +1,281 @@
+"""What a server tells of itself: lines of the log, request ids, metrics, traces, readiness, through real requests."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import logging
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi import FastAPI
+from prometheus_client.parser import text_string_to_metric_families
+
+from conftest import Server, running_server
+from hostile import GOOD
+from test_http import is_problem, post
+from veselova.service.app import create_app
+from veselova.service.logs import line_formatter
+from veselova.service.metrics import Metrics
+from veselova.service.settings import Settings
+
+ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server of these tests alone, so that what it counts is known."""
+    with running_server(tmp_path_factory.mktemp("observed"), workers="1", max_waiting="1") as running:
+        yield running
+
+
+def lines(server: Server) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in server.log.read_text().splitlines()]
+
+
+def line_of(server: Server, response: httpx2.Response) -> dict[str, Any]:
+    """Return the one line that the server wrote of a request, once it is there."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        found = [line for line in lines(server) if line.get("request_id") == response.headers["x-request-id"]]
+        if found:
+            assert len(found) == 1
+            return found[0]
+        time.sleep(0.02)
+    raise AssertionError("no line")
+
+
+def numbers(server: Server) -> dict[tuple[str, ...], float]:
+    """Return the metrics: (name, value of every label in the order of label names) → number."""
+    text = httpx2.get(f"{server.url}/metrics").text
+    return samples(text)
+
+
+def samples(text: str) -> dict[tuple[str, ...], float]:
+    families = text_string_to_metric_families(text)
+    return {
+        (sample.name, *(sample.labels[label] for label in sorted(sample.labels))): sample.value
+        for family in families
+        for sample in family.samples
+    }
+
+
+def in_process(app: FastAPI, path: str, **headers: str) -> httpx2.Response:
+    async def ask() -> httpx2.Response:
+        transport = httpx2.ASGITransport(app, raise_app_exceptions=False)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
+            return await client.get(path, headers=headers)
+
+    return asyncio.run(ask())
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "expected"),
+    [
+        ("/v1/trajectories", {}, {"status": 200, "system": "veselova", "engine": "analytic", "outcome": "solved"}),
+        ("/v1/trajectories", {"engine": "numeric"}, {"status": 200, "engine": "numeric", "outcome": "solved"}),
+        ("/v1/comparisons", {}, {"status": 200, "engine": "both", "outcome": "solved"}),
+        ("/v1/trajectories", {"times": [1e40]}, {"status": 422, "engine": "analytic", "outcome": "too-far"}),
+        ("/v1/trajectories", {"engine": "magic"}, {"status": 422, "outcome": "invalid-input"}),
+        ("/v1/trajectories", {**ENDLESS, "budget_s": 0.2}, {"status": 504, "engine": "numeric", "outcome": "over-budget"}),
+    ],
+)
+def test_each_request_is_one_line(own: Server, path: str, change: dict[str, Any], expected: dict[str, Any]) -> None:
+    line = line_of(own, post(own, path, {**GOOD, **change}))
+    assert expected.items() <= line.items()
+    assert (line["event"], line["level"], line["method"], line["route"]) == ("request", "info", "POST", path)
+    assert line["client"] == "127.0.0.1"
+    assert 0 < line["seconds"] < 60
+    assert line["timestamp"].endswith("Z")
+
+
+def test_every_line_is_json_those_of_the_server_library_too(own: Server) -> None:
+    assert any(line["logger"].startswith("uvicorn") for line in lines(own))
+    assert all({"event", "level", "logger", "timestamp"} <= line.keys() for line in lines(own))
+
+
+def test_ids_of_clients_are_echoed_and_others_are_made(own: Server) -> None:
+    answer = httpx2.get(f"{own.url}/v1/systems", headers={"x-request-id": "run-7.part_2"})
+    assert answer.headers["x-request-id"] == "run-7.part_2"
+    assert line_of(own, answer)["outcome"] == "answered"
+    made = {httpx2.get(f"{own.url}/v1/systems").headers["x-request-id"] for _ in range(3)}
+    assert len(made) == 3
+
+
+@pytest.mark.parametrize("given", ["two words", "x" * 65, '"}{', "<script>", "é".encode("latin-1"), "a,b"])
+def test_an_id_that_could_harm_a_log_is_replaced(own: Server, given: Any) -> None:
+    answer = httpx2.get(f"{own.url}/v1/systems", headers={"x-request-id": given})
+    assert answer.status_code == 200
+    assert len(answer.headers["x-request-id"]) == 32
+    assert line_of(own, answer)["status"] == 200
+
+
+def test_a_path_cannot_write_lines_of_its_own(own: Server) -> None:
+    answer = httpx2.get(f"{own.url}/none%0A%7B%22event%22%3A%22forged%22%7D%1b[31m" + "x" * 500)
+    line = line_of(own, answer)
+    assert "route" not in line
+    assert line["path"].startswith("/none%0A%7B")
+    assert len(line["path"]) == 100
+    assert line["outcome"] == "not-found"
+
+
+def test_no_secret_is_logged(own: Server) -> None:
+    secret = "vsl_0123456789ab_" + "S" * 43
+    headers = {"authorization": f"Bearer {secret}", "cookie": "session=TTTTTTTT"}
+    answer = httpx2.get(f"{own.url}/v1/systems?token=UUUUUUUU", headers=headers)
+    assert line_of(own, answer)
+    log = own.log.read_text()
+    assert not [part for part in ("SSSSSSSS", "TTTTTTTT", "UUUUUUUU") if part in log]
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_an_exception_that_quotes_a_key_is_logged_without_it(text: bool) -> None:
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(line_formatter(text))
+    logger = logging.Logger("trial")
+    logger.addHandler(handler)
+    try:
+        raise RuntimeError("header Bearer vsl_0123456789ab_" + "S" * 43)
+    except RuntimeError:
+        logger.exception("failed", extra={"engine": "analytic", "authorization": "SSSSSSSS"})
+    written = stream.getvalue()
+    assert "SSSS" not in written
+    assert "vsl_0123456789ab_…" in written
+    assert "RuntimeError" in written
+    assert "analytic" in written
+    if not text:
+        assert json.loads(written)["event"] == "failed"
+
+
+def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: Path) -> None:
+    assert not [line for line in lines(own) if line.get("route") in ("/readyz", "/healthz", "/metrics")]
+    with running_server(tmp_path, log_format="text", log_level="debug") as talkative:
+        pass
+    log = talkative.log.read_text()
+    assert any("route=/readyz" in line and "status=200" in line for line in log.splitlines())
+    assert not log.startswith("{")
+
+
+def test_what_is_counted_is_what_was_asked(own: Server) -> None:
+    before = numbers(own)
+    post(own, "/v1/trajectories", GOOD)
+    post(own, "/v1/trajectories", {**GOOD, "times": [1e40]})
+    post(own, "/v1/tori", {"problem": GOOD["problem"]})
+    post(own, "/v1/tori", b"{", accept="text/html")
+    httpx2.get(f"{own.url}/nowhere-{time.time()}")
+    after = numbers(own)
+    grown = {name: after[name] - before.get(name, 0) for name in after if after[name] != before.get(name, 0)}
+    assert grown[("veselova_outcomes_total", "analytic", "trajectory", "solved")] == 1
+    assert grown[("veselova_outcomes_total", "analytic", "trajectory", "too-far")] == 1
+    assert grown[("veselova_outcomes_total", "analytic", "torus", "solved")] == 1
+    assert grown[("veselova_work_seconds_count", "analytic", "trajectory")] == 2
+    assert 0 < grown[("veselova_work_seconds_sum", "analytic", "trajectory")] < 20
+    assert grown[("veselova_refusals_total", "not-acceptable")] == 1
+    assert grown[("http_requests_total", "/v1/trajectories", "POST", "200")] == 1
+    assert grown[("http_requests_total", "/v1/trajectories", "POST", "422")] == 1
+    assert grown[("http_requests_total", "none", "GET", "404")] == 1  # whatever the path
+    assert grown[("http_request_duration_seconds_count", "/v1/tori", "POST")] == 2
+    assert after[("veselova_info", "0.1.0")] == 1
+    assert after[("process_resident_memory_bytes",)] > 1e7
+
+
+def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
+    assert numbers(own)[("veselova_workers",)] == 1
+    threads = [threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": 4})) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    seen = set()
+    while any(thread.is_alive() for thread in threads):
+        now = numbers(own)
+        seen.add((now[("veselova_workers_busy",)], now[("veselova_queue_length",)]))
+    assert (1, 1) in seen
+    now = numbers(own)
+    assert (now[("veselova_workers_busy",)], now[("veselova_queue_length",)]) == (0, 0)
+    assert now[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] >= 2
+
+
+def test_applications_count_for_themselves(tmp_path: Path) -> None:
+    settings = Settings(workers=1, data_dir=tmp_path)
+    first, second = create_app(settings), create_app(settings)
+    for _ in range(3):
+        in_process(first, "/nowhere")
+    counted = ("http_requests_total", "none", "GET", "404")
+    assert samples(in_process(first, "/metrics").text)[counted] == 3
+    assert counted not in samples(in_process(second, "/metrics").text)
+
+
+def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
+    from prometheus_client import generate_latest
+
+    metrics, jobs = Metrics(), {"queued": 2.0}
+    metrics.gauges("veselova_jobs", "Jobs by state", "state", lambda: jobs)
+    for hit in (True, False, True):
+        metrics.cached(hit)
+    jobs["running"] = 1.0
+    shown = samples(generate_latest(metrics.registry).decode())
+    assert shown[("veselova_jobs", "queued")] == 2
+    assert shown[("veselova_jobs", "running")] == 1
+    assert shown[("veselova_cache_total", "hit")] == 2
+    assert shown[("veselova_cache_total", "miss")] == 1
+
+
+def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    app = create_app(Settings(data_dir=tmp_path))
+
+    @app.get("/failing")
+    async def failing() -> None:
+        raise RuntimeError("the reason, which is nobody's business")
+
+    with caplog.at_level(logging.INFO, "veselova"):
+        response = in_process(app, "/failing", **{"x-request-id": "case-1", "origin": "https://a.example"})
+    document = is_problem(response, 500, "internal-error")
+    assert "business" not in document["detail"]
+    assert response.headers["x-request-id"] == "case-1"
+    record = next(record for record in caplog.records if record.name == "veselova.service.requests")
+    assert (record.__dict__["outcome"], record.__dict__["status"]) == ("internal-error", 500)
+    assert samples(in_process(app, "/metrics").text)[("http_requests_total", "/failing", "GET", "500")] == 1
+
+
+def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
+    cold = create_app(Settings(data_dir=tmp_path))
+    assert is_problem(in_process(cold, "/readyz"), 503, "not-ready")["detail"] == "No worker is warm yet."
+
+
+def test_traces_follow_the_standard_switch() -> None:
+    script = """
+import asyncio, httpx2
+from opentelemetry import trace
+from opentelemetry.sdk.trace import TracerProvider
+from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
+from veselova.service.app import create_app
+from veselova.service.settings import Settings
+
+exporter, provider = InMemorySpanExporter(), TracerProvider()
+provider.add_span_processor(SimpleSpanProcessor(exporter))
+trace.set_tracer_provider(provider)
+
+async def ask():
+    transport = httpx2.ASGITransport(create_app(Settings()))
+    async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
+        parent = "00-" + "a" * 32 + "-" + "b" * 16 + "-01"
+        await client.get("/v1/systems", headers={"traceparent": parent, "authorization": "Bearer SSSS"})
+        await client.get("/healthz")
+
+asyncio.run(ask())
+spans = exporter.get_finished_spans()
+assert {f"{span.context.trace_id:x}" for span in spans} == {"a" * 32}, spans
+assert "GET /v1/systems" in {span.name for span in spans}, [span.name for span in spans]
+assert not any("SSSS" in span.to_json() for span in spans)
+"""
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 0, answer.stderr
