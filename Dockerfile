@@ -1,4 +1,5 @@
 # The service. Build: docker build -t veselova .      Run: docker run --rm -p 127.0.0.1:8000:8000 veselova
+# It then asks clients for an API key; docs/container.md makes one, or does without.
 # Any base with Python 3.11 or newer as python3 and its venv module will do (docs/container.md builds on a plain Debian).
 ARG BASE=python:3.11-slim-bookworm
 
@@ -18,6 +19,8 @@ LABEL org.opencontainers.image.title="veselova" \
       org.opencontainers.image.description="Motions of an n-dimensional rigid body under the Veselova constraint, over HTTP" \
       org.opencontainers.image.licenses="BSD-3-Clause"
 COPY --from=build /opt/veselova /opt/veselova
+# The state of the service (keys, jobs), where a volume is mounted at /data and VESELOVA_DATA_DIR says so.
+RUN install -d -m 0700 -o 10001 -g 10001 /data
 # No account is created: a number needs no entry, and the process owns nothing but /tmp.
 USER 10001:10001
 WORKDIR /tmp

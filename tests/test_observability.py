@@ -6,6 +6,8 @@ import asyncio
 import io
 import json
 import logging
+import re
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -158,7 +160,7 @@ def test_an_exception_that_quotes_a_key_is_logged_without_it(text: bool) -> None
 
 def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: Path) -> None:
     assert not [line for line in lines(own) if line.get("route") in ("/readyz", "/healthz", "/metrics")]
-    with running_server(tmp_path, log_format="text", log_level="debug") as talkative:
+    with running_server(tmp_path, "--log-format", "text", "--log-level", "debug") as talkative:
         pass
     log = talkative.log.read_text()
     assert any("route=/readyz" in line and "status=200" in line for line in log.splitlines())
@@ -203,9 +205,16 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     assert now[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] >= 2
 
 
+def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
+    row = "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', NULL)"
+    with sqlite3.connect(own.log.parent / "data" / "veselova.db") as database:
+        database.execute(row)
+    assert numbers(own)[("veselova_jobs", "failed")] == 1
+
+
 def test_applications_count_for_themselves(tmp_path: Path) -> None:
     settings = Settings(workers=1, data_dir=tmp_path)
-    first, second = create_app(settings), create_app(settings)
+    first, second = create_app(settings, loopback=True), create_app(settings, loopback=True)
     for _ in range(3):
         in_process(first, "/nowhere")
     counted = ("http_requests_total", "none", "GET", "404")
@@ -229,7 +238,7 @@ def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
 
 
 def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    app = create_app(Settings(data_dir=tmp_path))
+    app = create_app(Settings(data_dir=tmp_path, cors_origins="https://a.example"), loopback=True)
 
     @app.get("/failing")
     async def failing() -> None:
@@ -240,14 +249,21 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, c
     document = is_problem(response, 500, "internal-error")
     assert "business" not in document["detail"]
     assert response.headers["x-request-id"] == "case-1"
+    assert response.headers["x-content-type-options"] == "nosniff"
+    assert response.headers["access-control-allow-origin"] == "https://a.example"
     record = next(record for record in caplog.records if record.name == "veselova.service.requests")
     assert (record.__dict__["outcome"], record.__dict__["status"]) == ("internal-error", 500)
     assert samples(in_process(app, "/metrics").text)[("http_requests_total", "/failing", "GET", "500")] == 1
 
 
 def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
-    cold = create_app(Settings(data_dir=tmp_path))
+    cold = create_app(Settings(data_dir=tmp_path), loopback=True)
     assert is_problem(in_process(cold, "/readyz"), 503, "not-ready")["detail"] == "No worker is warm yet."
+    broken = create_app(Settings(data_dir=tmp_path), loopback=False)
+    with sqlite3.connect(tmp_path / "veselova.db") as database:
+        database.execute("DROP TABLE api_keys")
+    detail = is_problem(in_process(broken, "/readyz"), 503, "not-ready")["detail"]
+    assert detail == "No worker is warm yet. The keys cannot be read: the database does not answer (OperationalError)."
 
 
 def test_traces_follow_the_standard_switch() -> None:
@@ -265,7 +281,7 @@ provider.add_span_processor(SimpleSpanProcessor(exporter))
 trace.set_tracer_provider(provider)
 
 async def ask():
-    transport = httpx2.ASGITransport(create_app(Settings()))
+    transport = httpx2.ASGITransport(create_app(Settings(), loopback=True))
     async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
         parent = "00-" + "a" * 32 + "-" + "b" * 16 + "-01"
         await client.get("/v1/systems", headers={"traceparent": parent, "authorization": "Bearer SSSS"})
@@ -279,3 +295,14 @@ assert not any("SSSS" in span.to_json() for span in spans)
 """
     answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
     assert answer.returncode == 0, answer.stderr
+
+
+def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) -> None:
+    text = (Path(__file__).parent.parent / "docs" / "service.md").read_text()
+    settings = set(re.findall(r"VESELOVA_([A-Z_]+[A-Z])", text)) - {"API_KEY"}
+    assert settings >= {"KEYS", "RATE_LIMIT", "LOG_FORMAT"}
+    assert {name.lower() for name in settings} <= set(Settings.model_fields)
+    metrics = set(re.findall(r"`((?:veselova|http)_\w+)`", text))
+    shown = httpx2.get(f"{own.url}/metrics").text
+    assert len(metrics) > 8
+    assert not [name for name in metrics if f"# TYPE {name.removesuffix('_total')}" not in shown]

@@ -12,18 +12,22 @@ import anyio
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI, Request
 from starlette.exceptions import HTTPException
+from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
 
 from veselova.mechanics.errors import VeselovaError
+from veselova.service.access import UNLIMITED, Access, Policy
 from veselova.service.answers import Answers
 from veselova.service.job_routes import job_router
 from veselova.service.job_service import JobService
+from veselova.service.keys import open_keys
 from veselova.service.metrics import Metrics
 from veselova.service.openapi import openapi_document
 from veselova.service.problem_details import Refused, problem_code, problem_response
 from veselova.service.readiness import missing_parts
 from veselova.service.request_log import Failures, RequestLog, note
 from veselova.service.routes import router
+from veselova.service.security_headers import SecurityHeaders, add_documentation
 from veselova.service.settings import Settings
 from veselova.service.workers import Workers
 from veselova.version import __version__
@@ -32,16 +36,24 @@ __all__ = ["create_app"]
 
 _LOG = logging.getLogger("veselova.service")
 
-#: Paths for the probes of orchestrators.
-UNLIMITED = frozenset({"/healthz", "/readyz"})
+#: What a page of another origin may send, and see of an answer.
+_CORS_SENT = ("Authorization", "Content-Type", "Idempotency-Key", "If-None-Match", "X-Request-ID")
+_CORS_SEEN = ("Content-Location", "ETag", "Location", "RateLimit", "RateLimit-Policy", "Retry-After", "X-Request-ID")
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """Return the application; settings come from the environment when none are given."""
+def create_app(settings: Settings | None = None, *, loopback: bool = False) -> FastAPI:
+    """Return the application; settings come from the environment when none are given.
+
+    ``loopback`` says that nobody but this machine can connect; clients need no API key then, unless the settings require one.
+    Raises Refused where keys are required and their database cannot be opened.
+    """
     limits = settings or Settings()
     metrics = Metrics()
     workers = Workers(limits, metrics)
     answers = Answers(limits, workers, metrics)
+    keys = open_keys(limits) if Policy.requires_keys(limits, loopback) else None
+    if keys is not None and not any(key.revoked_at is None for key in keys.list()):
+        _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")
     jobs = JobService(limits)
     metrics.gauges("veselova_jobs", "Sweeps by state", "state", jobs.counts)
 
@@ -51,27 +63,42 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             tasks.start_soon(_warm, workers)
             yield
             tasks.cancel_scope.cancel()
+        if keys is not None:
+            keys.close()
 
     app = FastAPI(
         title="veselova",
         version=__version__,
         lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
-    app.include_router(router(limits, answers, partial(missing_parts, workers, jobs, None)))
+    app.include_router(router(limits, answers, partial(missing_parts, workers, jobs, keys)))
     app.include_router(job_router(limits, jobs))
+    add_documentation(app)
     for kind in (VeselovaError, Refused, HTTPException):
         app.add_exception_handler(kind, partial(_answer_problem, metrics))
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
-    _surround(app, metrics)
+    _surround(app, limits, Policy.of(limits, loopback, keys), metrics)
     return app
 
 
-def _surround(app: FastAPI, metrics: Metrics) -> None:
+def _surround(app: FastAPI, settings: Settings, policy: Policy, metrics: Metrics) -> None:
     """Put what looks at every request around an application: each of these stands around those before it."""
     metrics.serve(app)
+    app.add_middleware(Access, policy=policy, refused=metrics.refused)
     app.add_middleware(Failures)
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=re.findall(r"[^\s,]+", settings.cors_origins),
+            allow_methods=("GET", "POST", "DELETE"),
+            allow_headers=_CORS_SENT,
+            expose_headers=_CORS_SEEN,
+        )
     app.add_middleware(RequestLog, quiet=UNLIMITED | {"/metrics"})
+    app.add_middleware(SecurityHeaders)
     app.add_middleware(CorrelationIdMiddleware, validator=_is_request_id)
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from veselova.service import server_commands
 from veselova.version import __version__
 
 __all__ = ["main"]
@@ -202,16 +203,8 @@ def sweep(
     run(_document(file), json, output, folder, workers)
 
 
-@app.command()
-def serve(
-    host: Annotated[str, typer.Option(help="address to bind")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")] = 8000,
-    settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
-) -> None:
-    """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
-    from veselova.service.serving import serve as run_server
-
-    run_server(host, port, settings)
+app.command()(server_commands.serve)
+app.add_typer(server_commands.keys, name="keys")
 
 
 def _document(file: str) -> Any:

@@ -127,10 +127,12 @@ _ANSWERS: dict[str, dict[str, Any]] = {
 
 _REFUSALS = {
     400: "Not JSON",
+    401: "No API key of this server, where it requires one",
     406: "No acceptable representation",
     413: "Body too large",
     415: "Not application/json",
     422: "Invalid input, or a problem that the engine cannot serve",
+    429: "Too many requests of one key or address; see Retry-After",
     500: "The server failed",
     501: "An optional library is not installed on this server",
     503: "Overloaded, or the worker was lost; see Retry-After",
@@ -182,6 +184,8 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         for path, (kind, _, content) in RESOURCES.items():
             _describe(document["paths"][path]["post"], kind, content)
         document["paths"][KEPT] = {"get": _kept(), "head": _kept_head()}
+        document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
+        document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
         app.openapi_schema = document
     return app.openapi_schema
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ipaddress
+import logging
 import os
 import signal
 import socket
 import sys
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -16,48 +18,60 @@ from veselova.service.settings import Settings
 
 __all__ = ["serve", "settings_of_environment"]
 
+_LOG = logging.getLogger("veselova.service")
+
 #: The key that a client of this environment shows; no setting of the server.
 _OF_THE_CLIENT = {"VESELOVA_API_KEY"}
 
 
-def serve(host: str, port: int, settings_only: bool) -> None:
-    """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an address or a setting."""
+def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips: str | None = None, **stated: Any) -> None:
+    """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an address or a setting.
+
+    ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the proxies whose X-Forwarded-For
+    is believed (uvicorn's option), none when left out.
+    """
     # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    limits = settings_of_environment()
+    limits = settings_of_environment(**stated)
     if settings_only:
         for name, value in limits.model_dump().items():
             print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
         return
     _require_addresses(limits)
-    _bindable(host, port)
+    loopback = _bindable(host, port)
     import uvicorn
 
+    from veselova.service.access import Policy
     from veselova.service.app import create_app
     from veselova.service.logs import configure_logging
 
     configure_logging(limits)
-    app = create_app(limits)
+    app = create_app(limits, loopback=loopback)
+    if not loopback and not Policy.requires_keys(limits, loopback):
+        _LOG.warning("clients need no key although %s is no loopback address: whoever reaches it can use the service", host)
     uvicorn.run(
         app,
         host=host,
         port=port,
         log_config=None,
         access_log=False,
+        server_header=False,
+        proxy_headers=forwarded_allow_ips is not None,
+        forwarded_allow_ips=forwarded_allow_ips,
         timeout_graceful_shutdown=limits.shutdown_grace_s,
     )
 
 
-def settings_of_environment() -> Settings:
-    """Return the settings of the environment; raises InvalidInput for one that is not valid."""
+def settings_of_environment(**stated: Any) -> Settings:
+    """Return the settings of the environment with those stated; raises InvalidInput for one that is not valid."""
     known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} | _OF_THE_CLIENT
     for name in sorted(os.environ):
         if name.startswith("VESELOVA_") and name not in known:
             print(f"veselova: {name} is not one of its settings (veselova serve --settings lists them)", file=sys.stderr)
     try:
-        return Settings()
+        return Settings(**{name: value for name, value in stated.items() if value is not None})
     except ValidationError as error:
         item = error.errors()[0]
         name = f"VESELOVA_{str(item['loc'][0]).upper()}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr
+from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 __all__ = ["Settings"]
@@ -63,8 +64,34 @@ class Settings(BaseSettings):
     max_sweep_bytes: int = Field(default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated")
     max_stored_bytes: int = Field(default=20_000_000_000, ge=1000, description="largest results of all jobs together")
 
+    keys: Literal["auto", "required", "off"] = Field(
+        default="auto", description="whether clients must show an API key; auto: unless the server binds to loopback"
+    )
+    rate_limit: str = Field(
+        default="auto",
+        description="requests of one key or address, such as 120/minute, or none; auto: 600/minute beyond loopback",
+    )
+    failed_key_limit: str = Field(default="20/minute", description="wrong keys from one address before it is refused, or none")
+    cors_origins: str = Field(default="", description="origins whose pages may call the service, with commas between them, or *")
     log_format: Literal["auto", "json", "text"] = Field(default="auto", description="lines of the log; auto: text on a terminal")
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="least severe lines logged")
+
+    @field_validator("rate_limit", "failed_key_limit")
+    @classmethod
+    def _is_rate(cls, text: str, info: ValidationInfo) -> str:
+        from veselova.service.rates import rate_of
+
+        if text != "auto" or info.field_name != "rate_limit":
+            rate_of(text)
+        return text
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _are_origins(cls, text: str) -> str:
+        for origin in filter(None, map(str.strip, text.split(","))):
+            if origin != "*" and not re.fullmatch(r"https?://[^/\s?#@*]+", origin):
+                raise ValueError("required origins such as https://example.org, with commas between them, or *")
+        return text
 
     @property
     def limits(self) -> dict[str, float]:

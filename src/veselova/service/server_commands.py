@@ -1,0 +1,77 @@
+"""The commands of who runs a server: ``veselova serve`` and ``veselova keys``."""
+
+from __future__ import annotations
+
+import json as json_text
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from veselova.service.keys import Keys
+
+__all__ = ["keys", "serve"]
+
+_Json = Annotated[bool, typer.Option("--json", help="print JSON")]
+
+
+def serve(
+    host: Annotated[str, typer.Option(help="address to bind")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")] = 8000,
+    require_keys: Annotated[bool, typer.Option("--require-keys", help="ask clients for an API key on loopback too")] = False,
+    insecure: Annotated[bool, typer.Option("--insecure", help="ask for no API key, whatever the address")] = False,
+    forwarded_allow_ips: Annotated[
+        str | None, typer.Option(metavar="ADDRESSES", help="proxies whose X-Forwarded-For is believed, with commas between them")
+    ] = None,
+    log_format: Annotated[str | None, typer.Option(help="auto, json or text")] = None,
+    log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error")] = None,
+    settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
+) -> None:
+    """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
+    from veselova.mechanics.errors import InvalidInput
+    from veselova.service.serving import serve as run_server
+
+    if require_keys and insecure:
+        raise InvalidInput(("--insecure",), "one of --require-keys and --insecure", "both")
+    stated = "required" if require_keys else "off" if insecure else None
+    run_server(host, port, settings, forwarded_allow_ips, keys=stated, log_format=log_format, log_level=log_level)
+
+
+keys = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Create, list and revoke the API keys of the service.")
+
+
+@keys.command()
+def create(name: Annotated[str, typer.Argument(metavar="NAME", help="whose key it is")], json: _Json = False) -> None:
+    """Create an API key and print it; it is stored nowhere and cannot be shown again."""
+    key, text = _keys().create(name)
+    if json:
+        print(json_text.dumps({**key.as_dict(), "key": text}))
+        return
+    print(text)
+    typer.echo(f"The key of {name}, id {key.id}. Keep it now: only its hash is stored.", err=True)
+
+
+@keys.command("list")
+def list_keys(json: _Json = False) -> None:
+    """List the API keys by id and name; the keys themselves are known to their holders alone."""
+    found = _keys().list()
+    if json:
+        print(json_text.dumps([key.as_dict() for key in found]))
+        return
+    for key in found:
+        state = f"revoked {key.revoked_at:%Y-%m-%d %H:%M}" if key.revoked_at else "valid"
+        print(f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {state:24}  {key.name}")
+
+
+@keys.command()
+def revoke(key_id: Annotated[str, typer.Argument(metavar="ID", help="the id of the key (veselova keys list)")]) -> None:
+    """Revoke an API key; a server that runs refuses it from the next request on."""
+    key = _keys().revoke(key_id)
+    print(f"The key of {key.name}, id {key.id}, is revoked.")
+
+
+def _keys() -> Keys:
+    from veselova.service.keys import open_keys
+    from veselova.service.serving import settings_of_environment
+
+    return open_keys(settings_of_environment())

@@ -1,0 +1,388 @@
+"""Who may ask, and how often: API keys, rate limits, origins and security headers, through real requests."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import hashlib
+import json
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from conftest import Server, running_server
+from hostile import GOOD
+from test_http import is_problem
+from veselova import Client, InvalidInput, ProblemResponse, Veselova
+from veselova.service import rates
+from veselova.service.rates import network_of, rate_of
+
+PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
+
+
+def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder / "data")}
+    command = [sys.executable, "-m", "veselova", "keys", *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+
+
+def new_key(folder: Path, name: str) -> dict[str, str]:
+    answer = keys(folder, "create", name, "--json")
+    assert answer.returncode == 0, answer.stderr
+    key: dict[str, str] = json.loads(answer.stdout)
+    return key
+
+
+def get(server: Server, path: str = "/v1/systems", key: str | None = None, **headers: str) -> httpx2.Response:
+    shown = {} if key is None else {"authorization": f"Bearer {key}"}
+    return httpx2.get(f"{server.url}{path}", headers={**shown, **headers})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("guarded")
+
+
+@pytest.fixture(scope="module")
+def key(folder: Path) -> str:
+    return new_key(folder, "Sophie")["key"]
+
+
+@pytest.fixture(scope="module")
+def guarded(folder: Path, key: str) -> Iterator[Server]:
+    """A server that requires keys, and counts no failures."""
+    with running_server(
+        folder, "--require-keys", failed_key_limit="none", cors_origins="https://a.example, https://b.example"
+    ) as own:
+        yield own
+
+
+def test_a_key_is_shown_once_and_stored_as_a_hash(tmp_path: Path) -> None:
+    created = keys(tmp_path, "create", "Sophie Kowalevski")
+    text = created.stdout.strip()
+    assert re.fullmatch(r"vsl_[0-9a-f]{12}_[\w-]{43}", text)
+    assert "Keep it now" in created.stderr
+    listed = keys(tmp_path, "list").stdout
+    assert text.split("_")[1] in listed
+    assert "Sophie Kowalevski" in listed
+    secret = text[17:]
+    assert secret not in listed + keys(tmp_path, "list", "--json").stdout
+    stored = b"".join(file.read_bytes() for file in (tmp_path / "data").iterdir())
+    assert secret.encode() not in stored
+    assert hashlib.sha256(text.encode()).hexdigest().encode() in stored
+
+
+def test_a_request_with_a_key_is_answered_and_one_without_is_refused(guarded: Server, key: str) -> None:
+    assert get(guarded, key=key).status_code == 200
+    assert get(guarded, authorization=f"bearer  {key}").status_code == 200
+    for path in ("/v1/systems", "/metrics", "/no-such-path"):
+        response = get(guarded, path)
+        is_problem(response, 401, "unauthorized")
+        assert response.headers["www-authenticate"] == 'Bearer realm="veselova"'
+        assert response.headers["cache-control"] == "no-store"
+    assert is_problem(httpx2.post(f"{guarded.url}/v1/tori", json={}), 401, "unauthorized")
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        "Basic dXNlcjpwYXNz",
+        "Bearer",
+        "{key}",
+        "Bearer {key}x",
+        "Bearer {short}",
+        "Bearer {other}",
+        "Bearer vsl_000000000000_" + "A" * 43,
+        "Bearer ' OR 1=1 --",
+        "Bearer " + "x" * 5000,
+        "Bearer \xe9",
+    ],
+)
+def test_what_is_no_key_of_the_server_is_refused(guarded: Server, key: str, shown: str) -> None:
+    other = key[:17] + "A" * 43
+    headers = {"authorization": shown.format(key=key, short=key[:-1], other=other).encode("latin-1")}
+    response = httpx2.get(f"{guarded.url}/v1/systems", headers=headers)
+    document = is_problem(response, 401, "unauthorized")
+    assert response.headers["www-authenticate"] == 'Bearer realm="veselova", error="invalid_token"'
+    assert key[17:] not in document["detail"]
+
+
+def test_two_authorizations_are_none(guarded: Server, key: str) -> None:
+    headers = [("authorization", f"Bearer {key}"), ("authorization", f"Bearer {key}")]
+    is_problem(httpx2.get(f"{guarded.url}/v1/systems", headers=headers), 401, "unauthorized")
+
+
+def test_a_revoked_key_is_refused_from_the_next_request_on(guarded: Server, folder: Path) -> None:
+    made = new_key(folder, "Carl")
+    assert get(guarded, key=made["key"]).status_code == 200
+    assert made["id"] in keys(folder, "revoke", made["id"]).stdout
+    is_problem(get(guarded, key=made["key"]), 401, "unauthorized")
+    listed = json.loads(keys(folder, "list", "--json").stdout)
+    assert next(row for row in listed if row["id"] == made["id"])["revoked_at"]
+
+
+def test_probes_and_the_contract_need_no_key(guarded: Server) -> None:
+    for path in ("/healthz", "/readyz", "/docs", "/openapi.json"):
+        assert get(guarded, path).status_code == 200
+    document = get(guarded, "/openapi.json").json()
+    assert document["components"]["securitySchemes"] == {"key": {"type": "http", "scheme": "bearer"}}
+    assert "401" in document["paths"]["/v1/tori"]["post"]["responses"]
+
+
+def test_the_client_shows_its_key(guarded: Server, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VESELOVA_API_KEY", raising=False)
+    with Client(guarded.url, api_key=key) as client:
+        assert client.torus(PROBLEM).n == 3
+    with Client(guarded.url) as client, pytest.raises(ProblemResponse) as raised:
+        client.torus(PROBLEM)
+    assert raised.value.status == 401
+    monkeypatch.setenv("VESELOVA_API_KEY", key)
+    with Client(guarded.url) as client:
+        assert client.torus(PROBLEM).n == 3
+    with Client(guarded.url, api_key="") as client, pytest.raises(ProblemResponse):
+        client.torus(PROBLEM)
+    with pytest.raises(InvalidInput, match="api_key") as refused:
+        Client(guarded.url, api_key=f"{key}\n")
+    assert key not in str(refused.value)
+
+
+def test_beyond_loopback_keys_are_required(tmp_path: Path) -> None:
+    with running_server(tmp_path, "--host", "0.0.0.0") as own:
+        response = get(own)
+        is_problem(response, 401, "unauthorized")
+        assert response.headers["ratelimit-policy"] == '"default";q=600;w=60'
+        assert "there is none yet" in own.log.read_text()
+        assert get(own, key=new_key(tmp_path, "Ada")["key"]).status_code == 200
+
+
+def test_whoever_wants_no_keys_beyond_loopback_says_so(tmp_path: Path) -> None:
+    with running_server(tmp_path, "--host", "0.0.0.0", "--insecure") as own:
+        assert get(own).status_code == 200
+        assert "clients need no key" in own.log.read_text()
+
+
+def test_an_address_that_shows_wrong_keys_is_refused_for_a_while(tmp_path: Path) -> None:
+    right = new_key(tmp_path, "Ada")["key"]
+    with running_server(tmp_path, "--require-keys", failed_key_limit="3/hour") as own:
+        assert [get(own, key=f"guess{i}").status_code for i in range(5)] == [401, 401, 401, 429, 429]
+        response = get(own, key=right)
+        is_problem(response, 429, "rate-limited")
+        assert 3500 < int(response.headers["retry-after"]) <= 3600
+        assert get(own, "/healthz").status_code == 200
+        is_problem(get(own), 401, "unauthorized")  # no key is no guess
+
+
+def test_every_key_has_a_limit_of_its_own(tmp_path: Path) -> None:
+    first, second = (new_key(tmp_path, name)["key"] for name in ("Ada", "Emmy"))
+    with running_server(tmp_path, "--require-keys", rate_limit="3/hour") as own:
+        answers = [get(own, key=first) for _ in range(4)]
+        assert [answer.status_code for answer in answers] == [200, 200, 200, 429]
+        assert [answer.headers["ratelimit"].split(";")[1] for answer in answers] == ["r=2", "r=1", "r=0", "r=0"]
+        is_problem(answers[-1], 429, "rate-limited")
+        assert answers[-1].headers["ratelimit-policy"] == '"default";q=3;w=3600'
+        assert 3500 < int(answers[-1].headers["retry-after"]) <= 3600
+        assert get(own, key=second).status_code == 200
+        for _ in range(5):
+            assert get(own, "/readyz").status_code == 200
+
+
+def test_without_keys_addresses_are_counted_and_forwarded_ones_are_not_believed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORWARDED_ALLOW_IPS", "*")  # uvicorn's own variable says nothing here
+    with running_server(tmp_path, rate_limit="2/hour") as own:
+        forwarded = [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in range(3)]
+        assert forwarded == [200, 200, 429]
+
+
+def test_a_trusted_proxy_tells_the_address(tmp_path: Path) -> None:
+    with running_server(tmp_path, "--forwarded-allow-ips", "127.0.0.1", rate_limit="1/hour", log_level="debug") as own:
+        assert [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in (1, 1, 2)] == [200, 429, 200]
+    assert '"client": "192.0.2.2"' in own.log.read_text()
+
+
+def test_windows_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def ask() -> list[tuple[bool, int, int]]:
+        rate = rate_of("2/minute")
+        assert rate
+        seen = []
+        for moment in (0, 10, 20, 59, 61):
+            monkeypatch.setattr(time, "time", lambda moment=moment: 1_000_000.0 + moment)
+            allowance = await rate.spend("caller")
+            seen.append((allowance.granted, allowance.left, allowance.reset_s))
+        return seen
+
+    assert asyncio.run(ask()) == [(True, 1, 60), (True, 0, 50), (False, 0, 40), (False, 0, 1), (True, 1, 60)]
+
+
+def test_callers_beyond_those_that_can_be_counted_share_one_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rates, "_MOST_CALLERS", 3)
+
+    async def ask() -> list[bool]:
+        rate = rate_of("2/hour")
+        assert rate
+        return [(await rate.spend(caller)).granted for caller in ("a", "b", "c", "d", "e", "f", "a", "a")]
+
+    assert asyncio.run(ask()) == [True, True, True, True, True, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("host", "network"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2:ffff::1", "2001:db8:1:2::/64"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        (None, "unknown"),
+        ("testclient", "unknown"),
+    ],
+)
+def test_an_address_is_counted_with_what_its_owner_can_change(host: str | None, network: str) -> None:
+    assert network_of(host) == network
+
+
+def test_a_database_that_fails_admits_nobody_and_is_named(tmp_path: Path) -> None:
+    right = new_key(tmp_path, "Ada")["key"]
+    with running_server(tmp_path, "--require-keys") as own:
+        assert get(own, key=right).status_code == 200
+        with sqlite3.connect(tmp_path / "data" / "veselova.db") as database:
+            database.executescript("DROP TABLE api_keys; DROP TABLE jobs")
+        response = get(own, key=right)
+        is_problem(response, 503, "database-unavailable")
+        assert response.headers["retry-after"] == "5"
+        missing = is_problem(get(own, "/readyz"), 503, "not-ready")["detail"]
+        assert "Jobs cannot be stored" in missing
+        assert "The keys cannot be read" in missing
+        assert "worker" not in missing
+        assert get(own, "/healthz").status_code == 200
+
+
+def test_pages_of_other_origins_are_not_invited(server: Server) -> None:
+    response = get(server, origin="https://a.example")
+    assert response.status_code == 200
+    assert not [name for name in response.headers if name.startswith("access-control")]
+    asked = {"origin": "https://a.example", "access-control-request-method": "POST"}
+    is_problem(httpx2.options(f"{server.url}/v1/tori", headers=asked), 405, "method-not-allowed")
+
+
+def test_pages_of_stated_origins_are(guarded: Server, key: str) -> None:
+    asked = {
+        "origin": "https://b.example",
+        "access-control-request-method": "POST",
+        "access-control-request-headers": "authorization, content-type",
+    }
+    allowed = httpx2.options(f"{guarded.url}/v1/tori", headers=asked)
+    assert allowed.status_code == 200
+    assert allowed.headers["access-control-allow-origin"] == "https://b.example"
+    assert "access-control-allow-credentials" not in allowed.headers
+    refused = httpx2.options(f"{guarded.url}/v1/tori", headers={**asked, "origin": "https://c.example"})
+    assert refused.status_code == 400
+    assert "access-control-allow-origin" not in refused.headers
+    for shown in (None, key):  # a page may read why it was refused, too
+        answer = get(guarded, key=shown, origin="https://a.example")
+        assert answer.headers["access-control-allow-origin"] == "https://a.example"
+        assert "X-Request-ID" in answer.headers["access-control-expose-headers"]
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [("/healthz", 200), ("/v1/systems", 200), ("/v2", 404), ("/v1/tori", 405), ("/docs", 200), ("/metrics", 200)],
+)
+def test_every_answer_tells_browsers_to_stay_away(server: Server, path: str, status: int) -> None:
+    response = get(server, path)
+    assert response.status_code == status
+    assert response.headers["x-content-type-options"] == "nosniff"
+    assert response.headers["x-frame-options"] == "DENY"
+    assert response.headers["referrer-policy"] == "no-referrer"
+    assert "default-src 'none'" in response.headers["content-security-policy"]
+    assert "frame-ancestors 'none'" in response.headers["content-security-policy"]
+    assert "server" not in response.headers
+    assert (response.headers.get("cache-control") == "no-store") == (status >= 400)
+
+
+def test_the_documentation_may_run_its_own_script_and_no_other(server: Server) -> None:
+    page = get(server, "/docs")
+    inline = re.findall(r"<script>(.*?)</script>", page.text, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in inline]
+    policy = dict(rule.strip().split(" ", 1) for rule in page.headers["content-security-policy"].split(";"))
+    assert policy["script-src"].split() == ["https://cdn.jsdelivr.net", *(f"'sha256-{digest}'" for digest in digests)]
+    loaded = re.findall(r'(?:src|href)="([^"]+)"', page.text)
+    allowed = " ".join(policy.values())
+    assert loaded
+    assert all(address.startswith("https://") and "/".join(address.split("/")[:3]) in allowed for address in loaded)
+
+
+def test_inventions_are_no_methods(server: Server) -> None:
+    is_problem(httpx2.request("BREW", f"{server.url}/v1/tori"), 501, "unknown-method")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("rate_limit", "often"),
+        ("rate_limit", "0/minute"),
+        ("rate_limit", "1/second; 5/minute"),
+        ("failed_key_limit", "-1/minute"),
+        ("failed_key_limit", "auto"),
+        ("cors_origins", "a.example"),
+        ("cors_origins", "https://a.example/path"),
+        ("keys", "perhaps"),
+        ("log_format", "xml"),
+        ("log_level", "loud"),
+        ("database_url", "mysql://host/name"),
+    ],
+)
+def test_a_setting_that_says_nothing_is_refused_at_the_start(name: str, value: str, tmp_path: Path) -> None:
+    variable = f"VESELOVA_{name.upper()}"
+    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), variable: value}
+    command = [sys.executable, "-m", "veselova", "serve", "--port", "0", *(["--require-keys"] if name == "database_url" else [])]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith(f"veselova: {variable}: required ")
+    assert answer.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (("create", ""), 2, "NAME: required 1 to 100 printable characters"),
+        (("create", "two\nlines"), 2, "NAME: required"),
+        (("revoke", "000000000000"), 2, "ID: required the id of a key"),
+        (("list", "--json"), 0, ""),
+    ],
+)
+def test_mistakes_with_keys_are_one_sentence(arguments: tuple[str, ...], status: int, words: str, tmp_path: Path) -> None:
+    answer = keys(tmp_path, *arguments)
+    assert answer.returncode == status
+    assert words in answer.stderr
+    assert answer.stderr.count("\n") <= 1
+
+
+def test_a_database_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "veselova.db").write_bytes(b"this is no database" * 100)
+    answer = keys(tmp_path, "list")
+    assert answer.returncode == 2
+    assert answer.stderr == "veselova: The keys cannot be read: the database does not answer (DatabaseError).\n"
+
+
+def test_settings_that_contradict_each_other_are_refused() -> None:
+    command = [sys.executable, "-m", "veselova", "serve", "--require-keys", "--insecure"]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 2
+    assert "--insecure: required one of --require-keys and --insecure; given both." in answer.stderr
+
+
+def test_what_clients_may_know_of_the_settings_are_numbers(guarded: Server, key: str) -> None:
+    limits: dict[str, Any] = get(guarded, key=key).json()["limits"]
+    assert limits["max_dimension"] == 64
+    assert all(isinstance(value, (int, float)) for value in limits.values())
