@@ -61,7 +61,16 @@ def test_the_request_of_the_readme_is_answered(server: Server) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["README.md", "ARCHITECTURE.md", "CONVENTIONS.md", "CHANGELOG.md", "SECURITY.md", "docs/container.md", "docs/accuracy.md"],
+    [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CONVENTIONS.md",
+        "CHANGELOG.md",
+        "SECURITY.md",
+        "docs/container.md",
+        "docs/service.md",
+        "docs/accuracy.md",
+    ],
 )
 def test_links_and_named_files_exist(name: str) -> None:
     text = (ROOT / name).read_text()
