@@ -171,6 +171,12 @@ def test_what_cannot_be_served_gets_406(server: Server, accept: str) -> None:
     is_problem(post(server, "/v1/trajectories", GOOD, accept=accept), 406, "not-acceptable")
 
 
+def test_a_parameter_that_says_nothing_is_a_problem_too(server: Server) -> None:
+    document = is_problem(httpx2.delete(f"{server.url}/v1/jobs/none?remove=banana"), 422, "invalid-input")
+    assert document["errors"][0]["pointer"] == "/remove"
+    assert document["detail"].endswith("; given banana.")
+
+
 def test_unknown_paths_and_methods_are_problems_too(server: Server) -> None:
     is_problem(httpx2.get(f"{server.url}/v2"), 404, "not-found")
     response = httpx2.get(f"{server.url}/v1/tori")

@@ -11,11 +11,12 @@ from functools import partial
 import anyio
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
 
-from veselova.mechanics.errors import VeselovaError
+from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
 from veselova.service.access import UNLIMITED, Access, Policy
 from veselova.service.answers import Answers
 from veselova.service.job_routes import job_router
@@ -77,7 +78,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     app.include_router(router(limits, answers, partial(missing_parts, workers, jobs, keys)))
     app.include_router(job_router(limits, jobs))
     add_documentation(app)
-    for kind in (VeselovaError, Refused, HTTPException):
+    for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
         app.add_exception_handler(kind, partial(_answer_problem, metrics))
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
     _surround(app, limits, Policy.of(limits, loopback, keys), metrics)
@@ -115,6 +116,9 @@ async def _warm(workers: Workers) -> None:
 
 
 async def _answer_problem(metrics: Metrics, _: Request, error: Exception) -> Response:
+    if isinstance(error, RequestValidationError):  # parameters and headers, which the framework reads
+        faults = [InvalidInput(item["loc"][1:], item["msg"].lower(), shown(item.get("input"))) for item in error.errors()]
+        error = InvalidRequest(faults)
     response = problem_response(error)
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
