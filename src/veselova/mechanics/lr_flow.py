@@ -17,7 +17,7 @@ from veselova.mechanics.flow import FLOATS, Flow, Operations
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia, applied
 
-__all__ = ["LRFlow", "MomentumFlow", "MultiplierFlow"]
+__all__ = ["LRFlow", "MomentumFlow", "MultiplierFlow", "jacobi_integral", "multipliers_of"]
 
 Array = NDArray[np.float64]
 
@@ -83,10 +83,8 @@ class LRFlow(Flow):
         return np.asarray(self.distribution.velocity(self._operator, W, F, along, self.across), dtype=np.float64)
 
     def jacobi(self, g: Array, omega: Array) -> Array:
-        """Return the Jacobi–Painlevé integral ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v, shape (…)."""
-        momentum = self.inertia(omega)
-        across = self.distribution.components(g, momentum)[1] @ self.across
-        return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - across + (self.potential.value(g) if self.potential else 0.0))
+        """Return the Jacobi–Painlevé integral, shape (…)."""
+        return jacobi_integral(self.distribution, self.inertia, self.across, self.potential, g, omega)
 
     def neighbour(self, distance: float) -> LRFlow:
         """Return the flow of a start moved by about ``distance``, its momentum and constraints in proportion."""
@@ -254,6 +252,15 @@ class MultiplierFlow(LRFlow):
         """Return g and ω."""
         omega, g = self._split(states)
         return self.distribution.group.project(g), omega
+
+
+def jacobi_integral(
+    distribution: Distribution, inertia: Inertia, across: Array, potential: GroupPotential | None, g: Array, omega: Array
+) -> Array:
+    """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape (…)."""
+    momentum = inertia(omega)
+    vertical = distribution.components(g, momentum)[1] @ across
+    return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - vertical + (potential.value(g) if potential else 0.0))
 
 
 def multipliers_of(inverse: Any, F: Any, force: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:

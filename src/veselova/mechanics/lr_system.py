@@ -16,7 +16,7 @@ from veselova.mechanics.exact import plain, read_only, whole_number
 from veselova.mechanics.group import LARGEST, MatrixGroup
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia
-from veselova.mechanics.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, multipliers_of
+from veselova.mechanics.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, jacobi_integral, multipliers_of
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.sphere import INPUT_TOLERANCE
 
@@ -226,10 +226,7 @@ class LRSystem(Problem):
         return np.concatenate([multipliers_of(self.inertia.inverse, self.distribution.seen(h)[1], f)[0] for h, f in parts])
 
     def _jacobi(self, g: Array, omega: Array) -> Array:
-        momentum = self.inertia(omega)
-        across = self.distribution.components(g, momentum)[1] @ self.constraint
-        potential = self.potential.value(g) if self.potential else 0.0
-        return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - across + potential, dtype=np.float64)
+        return jacobi_integral(self.distribution, self.inertia, self.constraint, self.potential, g, omega)
 
     @cached_property
     def _invariant(self) -> tuple[Array, bool]:
