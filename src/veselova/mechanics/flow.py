@@ -5,14 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
-__all__ = ["FLOATS", "Flow", "Operations"]
+__all__ = ["FLOATS", "Flow", "Operations", "PointFlow"]
 
 Array = NDArray[np.float64]
 
@@ -83,3 +83,20 @@ class Flow(ABC):
     def vector_field(self, _time: float, state: Array) -> Array:
         """Return the derivative of a state in floating point."""
         return np.asarray(self.field(state, self.parameters, FLOATS), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class PointFlow(Flow):
+    """The flow of a point of ℝⁿ: its parameters are ``lists`` of n numbers each, and ``further`` single ones behind them."""
+
+    parameters: Array
+    time_unit: float
+    initial: Array
+
+    lists: ClassVar[int] = 1
+    further: ClassVar[int] = 0
+
+    @property
+    def n(self) -> int:
+        """Return the dimension."""
+        return (self.parameters.size - self.further) // self.lists

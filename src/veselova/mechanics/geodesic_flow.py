@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import Flow, Operations
+from veselova.mechanics.flow import Operations, PointFlow
 from veselova.mechanics.natural_frame import orthonormalized
 
 __all__ = ["GeodesicFlow"]
@@ -16,20 +16,11 @@ __all__ = ["GeodesicFlow"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class GeodesicFlow(Flow):
+class GeodesicFlow(PointFlow):
     """X'' = −(V,A⁻¹V)/(X,A⁻²X) A⁻¹X, V = X', with N' = −(q∧dq/ds)N (norms) for N = (n_2 … n_{n−1}), and dτ₁/ds (knorrer).
 
     Flat states (X, V, N, τ₁) in units of the longest semiaxis; parameters are the I_i in these units.
     """
-
-    parameters: Array
-    time_unit: float
-    initial: Array
-
-    @property
-    def _n(self) -> int:
-        return self.parameters.size
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return d(X, V, N, τ₁)/ds."""
@@ -47,14 +38,14 @@ class GeodesicFlow(Flow):
 
     def project(self, state: Array) -> Array:
         """Return the state with X on the ellipsoid, V a unit tangent, N orthonormal and orthogonal to V and the normal."""
-        n = self._n
+        n = self.n
         E = self._frames(state[None])[0]
         X = state[:n] / np.sqrt(state[:n] @ (self.parameters * state[:n]))
         return np.concatenate([X, E[:, -1], E[:, 1:-1].ravel(), state[-1:]])
 
     def neighbour(self, distance: float) -> GeodesicFlow:
         """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(self._n).normal(size=self.initial.size) / np.sqrt(self._n)
+        direction = np.random.default_rng(self.n).normal(size=self.initial.size) / np.sqrt(self.n)
         direction[-1] = 0.0
         return replace(self, initial=self.project(self.initial + distance * direction))
 
@@ -64,7 +55,7 @@ class GeodesicFlow(Flow):
 
     def _frames(self, states: Array) -> Array:
         """Return [q, n_2 … n_{n−1}, V], orthonormal, shape (N, n, n)."""
-        n = self._n
+        n = self.n
         normal = self.parameters * states[:, :n]
         q = normal / np.linalg.norm(normal, axis=1, keepdims=True)
         V = states[:, n : 2 * n] - np.sum(states[:, n : 2 * n] * q, axis=1, keepdims=True) * q

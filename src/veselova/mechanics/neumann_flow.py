@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import Flow, Operations
+from veselova.mechanics.flow import Operations, PointFlow
 from veselova.mechanics.integrals import neumann_velocity
 from veselova.mechanics.natural_frame import orthonormalized
 
@@ -17,17 +17,8 @@ __all__ = ["GaussFlow", "NeumannFlow", "moved"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class NeumannFlow(Flow):
+class NeumannFlow(PointFlow):
     """Neumann's system for flat states (q', E), q the first column of the frame E; parameters are the I_i."""
-
-    parameters: Array
-    time_unit: float
-    initial: Array
-
-    @property
-    def _n(self) -> int:
-        return self.parameters.size
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q'', E')."""
@@ -35,48 +26,41 @@ class NeumannFlow(Flow):
 
     def project(self, state: Array) -> Array:
         """Return the state with E orthonormal, q' tangent, and the energy of the start by one step along its gradient."""
-        v, E = _on_sphere(state, self._n)
+        (v, E), (v_start, E_start) = _on_sphere(state, self.n), _on_sphere(self.initial, self.n)
         q = E[:, 0]
-        energy, wanted = self._energy(q, v), self._energy(*_on_sphere(self.initial, self._n)[::-1])
+        excess = self._energy(q, v) - self._energy(E_start[:, 0], v_start)
         force = self.parameters * q - (q @ (self.parameters * q)) * q
         size = float(force @ force + v @ v)
-        step = (energy - wanted) / size if size > 0 else 0.0
+        step = excess / size if size > 0 else 0.0
         E = np.column_stack([q - step * force, E[:, 1:]])
-        return np.concatenate(_flat(_on_sphere(np.concatenate([v - step * v, E.ravel()]), self._n)))
+        return np.concatenate(_flat(_on_sphere(np.concatenate([v - step * v, E.ravel()]), self.n)))
 
-    def _energy(self, frame: Array, v: Array) -> float:
-        q = frame if frame.ndim == 1 else frame[:, 0]
+    def _energy(self, q: Array, v: Array) -> float:
         return float(v @ v + q @ (self.parameters * q)) / 2
 
     def neighbour(self, distance: float) -> NeumannFlow:
         """Return the flow of a start moved by about ``distance``."""
-        moved_state = moved(self.initial, distance, self._n)
-        return replace(self, initial=np.concatenate(_flat(_on_sphere(moved_state, self._n))))
+        moved_state = moved(self.initial, distance, self.n)
+        return replace(self, initial=np.concatenate(_flat(_on_sphere(moved_state, self.n))))
 
     def unpack(self, states: Array) -> dict[str, Array]:
-        """Return frame, q_dot = dq/dτ₁ and tau1-free series along the principal axes."""
-        v, E = _on_spheres(states, self._n)
+        """Return the frame and q_dot = dq/dτ₁ along the principal axes."""
+        v, E = _on_spheres(states, self.n)
         return {"q_dot": v / self.time_unit, "frame": E}
 
 
-@dataclass(frozen=True)
-class GaussFlow(Flow):
+class GaussFlow(PointFlow):
     """A geodesic on the ellipsoid through its unit normal q (Theorem Kno): states (q', E, τ₁) in arc length.
 
     dτ₁/ds = √J (q,Aq); parameters are the I_i, the A_i and √J, in units of the longest semiaxis.
     """
 
-    parameters: Array
-    time_unit: float
-    initial: Array
-
-    @property
-    def _n(self) -> int:
-        return (self.parameters.size - 1) // 2
+    lists: ClassVar[int] = 2
+    further: ClassVar[int] = 1
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return d(q', E, τ₁)/ds."""
-        n = (parameters.size - 1) // 2
+        n = self.n
         q = state[n:-1].reshape(n, n)[:, 0]
         rate = parameters[-1] * ops.dot(parameters[n:-1] * q, q)
         derivative = np.empty_like(state)
@@ -86,19 +70,19 @@ class GaussFlow(Flow):
 
     def project(self, state: Array) -> Array:
         """Return the state with E orthonormal, q' tangent and F_0 = 0, equation (4.8)."""
-        v, E = _on_sphere(state[:-1], self._n)
-        v = neumann_velocity(self.parameters[self._n : -1], E[:, 0], v)
+        v, E = _on_sphere(state[:-1], self.n)
+        v = neumann_velocity(self.parameters[self.n : -1], E[:, 0], v)
         return np.concatenate([*_flat((v, E)), state[-1:]])
 
     def neighbour(self, distance: float) -> GaussFlow:
         """Return the flow of a start moved by about ``distance``, with the √J that belongs to it."""
-        initial = self.project(np.append(moved(self.initial[:-1], distance, self._n), 0.0))
-        change = 1 + distance * (0.5 if self._n % 2 else -0.5)
+        initial = self.project(np.append(moved(self.initial[:-1], distance, self.n), 0.0))
+        change = 1 + distance * (0.5 if self.n % 2 else -0.5)
         return replace(self, initial=initial, parameters=np.append(self.parameters[:-1], self.parameters[-1] * change))
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return frame and tau1."""
-        _, E = _on_spheres(states[:, :-1], self._n)
+        _, E = _on_spheres(states[:, :-1], self.n)
         return {"frame": E, "tau1": states[:, -1] * self.time_unit}
 
 

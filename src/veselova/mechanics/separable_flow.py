@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.flow import FLOATS, Flow, Operations
+from veselova.mechanics.flow import FLOATS, Operations, PointFlow
 from veselova.mechanics.integrals import sliding_velocity, unit_scale
 
 __all__ = ["SeparableFlow"]
@@ -20,16 +20,14 @@ Array = NDArray[np.float64]
 _NEAREST = 1e-3
 
 
-@dataclass(frozen=True)
-class SeparableFlow(Flow):
+class SeparableFlow(PointFlow):
     """The extended system (extended) for q and p with the tangential force of V = α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
 
     Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det A, in units of time.
     """
 
-    parameters: Array
-    time_unit: float
-    initial: Array
+    lists: ClassVar[int] = 3
+    further: ClassVar[int] = 2
 
     @classmethod
     def of(cls, A: Array, q: Array, q_dot: Array, potential: tuple[float, float, Array], turning: float) -> SeparableFlow:
@@ -43,13 +41,9 @@ class SeparableFlow(Flow):
         forces = [betas * unit, [quartic * unit * 4.0**-k, quadratic * unit * 2.0**-k]]
         return cls(np.concatenate([scaled, inverse, *forces]), 1 / turning, np.concatenate([q, p]))
 
-    @property
-    def _n(self) -> int:
-        return (self.parameters.size - 2) // 3
-
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q̇, ṗ): (extended), and −∂V/∂q along the sphere."""
-        n = self._n
+        n = self.n
         q, p = state[:n], state[n:]
         A, inverse = parameters[:n], parameters[n : 2 * n]
         p_inverse = inverse * p
@@ -61,7 +55,7 @@ class SeparableFlow(Flow):
         return derivative
 
     def _force(self, q: Any, parameters: Any, ops: Operations) -> Any:
-        n = self._n
+        n = self.n
         inverse, betas = parameters[n : 2 * n], parameters[2 * n : 3 * n]
         quartic, quadratic = parameters[3 * n], parameters[3 * n + 1]
         moment = ops.dot(inverse * q, q)
@@ -73,29 +67,29 @@ class SeparableFlow(Flow):
 
     @property
     def _walls(self) -> Array:
-        return self.parameters[2 * self._n : 3 * self._n]
+        return self.parameters[2 * self.n : 3 * self.n]
 
     @property
     def structure(self) -> Any:
         """Return the dimension and where there are walls."""
-        return type(self), self._n, tuple(np.flatnonzero(self._walls))
+        return type(self), self.n, tuple(np.flatnonzero(self._walls))
 
     def _energy(self, q: Array, p: Array) -> float:
-        n, parameters = self._n, self.parameters
+        n, parameters = self.n, self.parameters
         A, inverse, betas = parameters[:n], parameters[n : 2 * n], self._walls
         moment, live = inverse @ (q * q), betas != 0
         potential = parameters[3 * n] * ((inverse * inverse) @ (q * q) - moment * moment) + parameters[3 * n + 1] * moment
         return float(p @ (inverse * p) / (2 * (q @ (A * q))) + potential + np.sum(betas[live] / q[live] ** 2))
 
     def _on_sphere(self, state: Array) -> tuple[Array, Array]:
-        q, p = state[: self._n], state[self._n :]
+        q, p = state[: self.n], state[self.n :]
         q = q / np.linalg.norm(q)
         return q, p - (p @ q) * q
 
     def project(self, state: Array) -> Array:
         """Return the state with |q| = 1, (q,p) = 0 and the energy of the start, by one step along its gradient."""
         q, p = self._on_sphere(state)
-        n = self._n
+        n = self.n
         A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
         qAq = q @ (A * q)
         by_q = -(p @ (inverse * p) / qAq**2) * (A * q) - self._force(q, self.parameters, FLOATS)
@@ -107,13 +101,13 @@ class SeparableFlow(Flow):
 
     def neighbour(self, distance: float) -> SeparableFlow:
         """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(self._n).normal(size=self.initial.size) / np.sqrt(self._n)
-        direction[: self._n] *= np.abs(self.initial[: self._n]) ** (self._walls != 0)  # what is near a wall moves relative to it
+        direction = np.random.default_rng(self.n).normal(size=self.initial.size) / np.sqrt(self.n)
+        direction[: self.n] *= np.abs(self.initial[: self.n]) ** (self._walls != 0)  # what is near a wall moves relative to it
         return replace(self, initial=np.concatenate(self._on_sphere(self.initial + distance * direction)))
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return q and q_dot, on the manifold."""
-        n = self._n
+        n = self.n
         states = np.array([self.project(state) for state in states])
         q, p = states[:, :n], states[:, n:]
         A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
