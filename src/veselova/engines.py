@@ -11,6 +11,7 @@ import numpy as np
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.exact import require_truth_value
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
@@ -66,8 +67,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     """Raise InvalidInput unless the engine has these digits, and bounds where they are asked for."""
     if isinstance(digits, bool) or not isinstance(digits, (int, np.integer)) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
         raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", shown(digits))
-    if not isinstance(certified, bool):
-        raise InvalidInput(("certified",), "true or false", shown(certified))
+    require_truth_value(certified, "certified")
     if engine != "analytic" and digits > FEWEST_DIGITS:
         raise InvalidInput(("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits))
     if engine != "analytic" and certified:

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
-from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_vector, plain, read_only, to_float
+from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.exact import exact_vector, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.flow import Flow
 from veselova.mechanics.geodesic_flow import GeodesicFlow
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
 from veselova.mechanics.neumann_flow import GaussFlow
 from veselova.mechanics.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.problem import Series
-from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, unit
+from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, over_largest, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
@@ -64,8 +64,7 @@ class EllipsoidGeodesic(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
     def __init__(self, A: Any, X: Any, X_dot: Any, *, normalize: bool = False) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         diagonal = positive_numbers(A)
         require_moderate(diagonal, "A")
         n = len(diagonal)
@@ -73,12 +72,8 @@ class EllipsoidGeodesic(TorusProblem):
         for name, vector in (("X", exact_X), ("X_dot", exact_V)):
             if not any(vector):
                 raise InvalidInput((name,), "a vector other than zero", "the zero vector")
-        semiaxes = np.sqrt(to_float(diagonal))
-        x_largest, v_largest = (max(abs(x) for x in vector) for vector in (exact_X, exact_V))
-        x = to_float([a / x_largest if normalize else a for a in exact_X])
-        v = to_float([a / v_largest if normalize else a for a in exact_V])
         if not normalize:
-            _require_on_ellipsoid(x, v, semiaxes)
+            _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(to_float(diagonal)))
         # q ∝ A⁻¹X, and dq ∝ A⁻¹V up to a multiple of q, for V tangent to the ellipsoid.
         q = tuple(a / b for a, b in zip(exact_X, diagonal, strict=True))
         tangent = ExactState(diagonal, q, exact_V, None).tangent
@@ -86,19 +81,12 @@ class EllipsoidGeodesic(TorusProblem):
         if not any(tangent):
             raise InvalidInput(("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal")
         A_float = to_float(diagonal)
-        normal = unit(to_float([a / max(abs(b) for b in q) for a in q]))
-        largest = max(abs(a) for a in exact.tangent)
-        velocity = to_float([a / largest for a in exact.tangent])
-        frame = refined(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent)
-        frame = orthonormalized(frame)
+        normal, velocity = unit(to_float(over_largest(q))), to_float(over_largest(exact.tangent))
+        frame = orthonormalized(refined(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent))
         if frame[:, -1] @ velocity < 0:  # n = 2, where γ has no partner whose sign makes the determinant positive
             frame[:, -1] = -frame[:, -1]
-        arrays = {"A": A_float, "X": position(A_float, normal), "X_dot": frame[:, -1].copy(), "frame": frame}
-        for name, array in arrays.items():
-            object.__setattr__(self, name, read_only(array))
-        object.__setattr__(self, "exact", exact)
-        given = {"A": A, "X": X, "X_dot": X_dot, "normalize": normalize}
-        object.__setattr__(self, "given", {name: plain(value) for name, value in given.items()})
+        self._set(A=A_float, X=position(A_float, normal), X_dot=frame[:, -1], frame=frame, exact=exact)
+        self._set(given=stated(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "X", "X_dot"))

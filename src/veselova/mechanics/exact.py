@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Real
@@ -27,6 +27,8 @@ __all__ = [
     "is_matrix",
     "plain",
     "read_only",
+    "require_truth_value",
+    "stated",
     "to_float",
     "whole_number",
 ]
@@ -129,8 +131,21 @@ def whole_number(value: Any, path: Path, least: int, most: int) -> int:
     return int(value)
 
 
+def require_truth_value(value: Any, name: str) -> None:
+    """Raise InvalidInput, located at ``name``, for anything but true or false."""
+    if not isinstance(value, bool):
+        raise InvalidInput((name,), "true or false", shown(value))
+
+
+def stated(**arguments: Any) -> dict[str, Any]:
+    """Return the arguments that were given, those other than None, in JSON types."""
+    return {name: plain(value) for name, value in arguments.items() if value is not None}
+
+
 def plain(value: Any) -> Any:
-    """Return an accepted number, vector or matrix in JSON types, without rounding: ratios and decimals become strings."""
+    """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding: ratios become strings."""
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):

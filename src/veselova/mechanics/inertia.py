@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, plain, read_only, to_float
+from veselova.mechanics.exact import exact_matrix, exact_vector, read_only, to_float
 from veselova.mechanics.flow import FLOATS, Operations
 from veselova.mechanics.sphere import INPUT_TOLERANCE
 
@@ -105,11 +105,6 @@ class Inertia:
         else:
             inverse = inverse / 2 + inverse.T / 2
         return cls(read_only(operator), read_only(inverse))
-
-    @staticmethod
-    def given(value: Any) -> Any:
-        """Return what ``of`` took, JSON-ready."""
-        return {form: plain(data) for form, data in value.items()}
 
     @property
     def matrix(self) -> Array:

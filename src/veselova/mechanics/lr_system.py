@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.distribution import Distribution
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import plain, read_only, whole_number
+from veselova.mechanics.exact import plain, require_truth_value, whole_number
 from veselova.mechanics.group import LARGEST, MatrixGroup
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia
@@ -85,17 +85,9 @@ class LRSystem(Problem):
             raise InvalidInput(("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", shown(omega))
         operator = Inertia.of(inertia, size)
         self._become(Distribution.of_rank(size, r), operator, g, omega, potential, homogeneous)
-        object.__setattr__(self, "n", size)
-        object.__setattr__(self, "rank", r)
-        given = {
-            "n": size,
-            "rank": r,
-            "inertia": Inertia.given(inertia),
-            "g": None if g is None else plain(g),
-            "omega": plain(omega),
-        }
+        given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
         given |= {"potential": self.potential.given if self.potential else None, "homogeneous": homogeneous}
-        object.__setattr__(self, "given", given)
+        self._set(n=size, rank=r, given=plain(given))
 
     @classmethod
     def on(
@@ -121,18 +113,15 @@ class LRSystem(Problem):
         system = cls.__new__(cls)
         distribution = Distribution.orthogonal_to(group, h)
         system._become(distribution, Inertia.of_matrix(inertia, group.dimension), g, omega, potential, homogeneous)
-        object.__setattr__(system, "n", group.size)
-        object.__setattr__(system, "rank", None)
         arrays = {"basis": group.basis, "inertia": system.inertia.matrix, "g": system.g, "omega": group.element(system.omega)}
         arrays["h"] = group.element(distribution.space[distribution.rank :])
         given = {name: array.tolist() for name, array in arrays.items()}
         given["potential"] = system.potential.given if system.potential else None
-        object.__setattr__(system, "given", given)
+        system._set(n=group.size, rank=None, given=given)
         return system
 
     def _become(self, distribution: Distribution, inertia: Inertia, g: Any, omega: Any, potential: Any, homogeneous: Any) -> None:
-        if not isinstance(homogeneous, bool):
-            raise InvalidInput(("homogeneous",), "true or false", shown(homogeneous))
+        require_truth_value(homogeneous, "homogeneous")
         group = distribution.group
         start = np.eye(group.size) if g is None else group.admitted(g)
         velocity = group.algebra_element(omega, ("omega",))
@@ -144,12 +133,8 @@ class LRSystem(Problem):
         if homogeneous or off <= _ROUNDINGS * np.finfo(float).eps * size:
             across = np.zeros_like(across)
             velocity = distribution.body(start, along, across)
-        arrays = {"g": start, "omega": velocity, "constraint": across}
-        for name, array in arrays.items():
-            object.__setattr__(self, name, read_only(np.array(array)))
-        object.__setattr__(self, "distribution", distribution)
-        object.__setattr__(self, "inertia", inertia)
-        object.__setattr__(self, "potential", None if potential is None else GroupPotential.of(potential, group.size))
+        v = None if potential is None else GroupPotential.of(potential, group.size)
+        self._set(g=start, omega=velocity, constraint=across, distribution=distribution, inertia=inertia, potential=v)
         self._require_finite()
 
     def _require_finite(self) -> None:

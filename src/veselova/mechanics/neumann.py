@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_number, exact_vector, plain, read_only, to_float
+from veselova.mechanics.exact import exact_number, require_truth_value, stated, to_float
 from veselova.mechanics.integrals import energy as veselova_energy
 from veselova.mechanics.integrals import moser_eigenvalues, norm, uhlenbeck_integrals
 from veselova.mechanics.natural_frame import moser_frame, refined
 from veselova.mechanics.neumann_flow import NeumannFlow
 from veselova.mechanics.principal_inertia import positive_numbers
 from veselova.mechanics.problem import Series
-from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, require_on_sphere, unit
+from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, point_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
@@ -65,26 +65,13 @@ class NeumannSystem(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
     def __init__(self, A: Any, q: Any, q_prime: Any, *, normalize: bool = False) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         diagonal = positive_numbers(A)
-        exact_q, exact_v = exact_vector(q, ("q",), len(diagonal)), exact_vector(q_prime, ("q_prime",), len(diagonal))
-        if not any(exact_q):
-            raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
-        largest = max(abs(x) for x in exact_q)
-        position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_v)
-        if not normalize:
-            require_on_sphere(position, velocity, "q_prime")
-        exact = ExactState(diagonal, exact_q, exact_v, None)
-        arrays = {"A": to_float(diagonal), "q": unit(position), "q_prime": to_float(exact.tangent)}
-        _require_representable(arrays["A"], arrays["q_prime"])
-        frame = moser_frame(arrays["A"], arrays["q"], arrays["q_prime"])
-        arrays["frame"] = refined(frame, exact.A, exact.q, exact.tangent, Fraction(1))
-        for name, array in arrays.items():
-            object.__setattr__(self, name, read_only(array))
-        object.__setattr__(self, "exact", exact)
-        given = {"A": A, "q": q, "q_prime": q_prime, "normalize": normalize}
-        object.__setattr__(self, "given", {name: plain(value) for name, value in given.items()})
+        exact, position = point_on_sphere(diagonal, q, q_prime, normalize, "q_prime")
+        self._set(A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact)
+        _require_representable(self.A, self.q_prime)
+        frame = refined(moser_frame(self.A, self.q, self.q_prime), exact.A, exact.q, exact.tangent, Fraction(1))
+        self._set(frame=frame, given=stated(A=A, q=q, q_prime=q_prime, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_prime"))

@@ -78,7 +78,7 @@ class Potential:
         unconditional = False
         if companion is not None:
             unconditional = _paired(terms, companion, inverse if dual else inertia, dual, "companion" in given)
-        return cls(terms, companion, unconditional, {name: _plain(value) for name, value in given.items()})
+        return cls(terms, companion, unconditional, plain(given))
 
     def require_finite(self, gamma: Array) -> None:
         """Raise InvalidInput unless the potential and its force are finite at a point of the sphere."""
@@ -175,12 +175,3 @@ def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int
 
 def _exponents(powers: Mapping[int, int]) -> tuple[int, int, int]:
     return powers.get(0, 0), powers.get(1, 0), powers.get(2, 0)
-
-
-def _plain(value: Any) -> Any:
-    """Return accepted data in JSON types."""
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(item) for item in value]
-    return plain(value)

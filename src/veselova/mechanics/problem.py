@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.exact import read_only
 from veselova.mechanics.flow import Flow
 
 __all__ = ["Problem", "Series"]
@@ -41,6 +42,11 @@ class Problem(ABC):
 
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
+
+    def _set(self, **fields: Any) -> None:
+        """Set attributes once and for all: a problem is immutable, and its arrays are read-only."""
+        for name, value in fields.items():
+            object.__setattr__(self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value)
 
     @abstractmethod
     def flow(self, formulation: str) -> Flow:

@@ -11,15 +11,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, plain, read_only, to_float
+from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, require_truth_value, stated, to_float
 from veselova.mechanics.integrals import unit_scale
 from veselova.mechanics.natural_frame import natural_frame
 from veselova.mechanics.potential import Potential
 from veselova.mechanics.principal_inertia import principal_inertia, require_moderate
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.rigid_body_flow import RigidBodyFlow, momentum
-from veselova.mechanics.sphere import INPUT_TOLERANCE, unit
+from veselova.mechanics.sphere import INPUT_TOLERANCE, over_largest, unit
 from veselova.mechanics.veselova import admissible_frame
 
 __all__ = ["RigidBody"]
@@ -58,8 +58,7 @@ class RigidBody(Problem):
     def __init__(
         self, inertia: Any, gamma: Any, Omega: Any, potential: Any = None, frame: Any = None, *, normalize: bool = False
     ) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         moments, axes, tensor, inverse = _inertia(inertia)
         direction = _direction(gamma, normalize)
         velocity = to_float(exact_vector(Omega, ("Omega",), 3))
@@ -81,14 +80,10 @@ class RigidBody(Problem):
             start = principal.T @ start
         else:
             start = admissible_frame(to_float(exact_matrix(frame, ("frame",), 3)), direction, "gamma")
-        fields = {"moments": moments, "potential": V, "linear": linear}
-        arrays = {"axes": axes, "inertia": tensor, "inverse": inverse, "gamma": direction, "Omega": velocity, "frame": start}
-        fields |= {name: None if array is None else read_only(np.array(array)) for name, array in arrays.items()}
-        given = {"inertia": inertia, "gamma": gamma, "Omega": Omega, "frame": frame, "normalize": normalize}
-        kept = {name: plain(value) for name, value in given.items() if value is not None}
-        fields["given"] = kept if V.given is None else {**kept, "potential": dict(V.given)}
-        for name, value in fields.items():
-            object.__setattr__(self, name, value)
+        self._set(moments=moments, axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
+        self._set(gamma=direction, Omega=velocity, frame=start)
+        given = stated(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
+        self._set(given=given)
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6)}" for name in ("inertia", "gamma", "Omega"))
@@ -164,8 +159,7 @@ def _direction(given: Any, normalize: bool) -> Array:
     exact = exact_vector(given, ("gamma",), 3)
     if not any(exact):
         raise InvalidInput(("gamma",), "a vector of unit length", "the zero vector")
-    largest = max(abs(x) for x in exact)
-    gamma = to_float([x / largest if normalize else x for x in exact])
+    gamma = to_float(over_largest(exact) if normalize else exact)
     length = float(np.linalg.norm(gamma / np.max(np.abs(gamma))) * np.max(np.abs(gamma)))
     if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
         raise InvalidInput(("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")

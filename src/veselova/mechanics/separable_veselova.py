@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_number, exact_vector, plain, read_only, to_float
+from veselova.mechanics.exact import exact_number, exact_vector, require_truth_value, stated, to_float
 from veselova.mechanics.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.separable_flow import SeparableFlow
 from veselova.mechanics.separation import SeparablePotential, separation_constants
-from veselova.mechanics.sphere import ExactState, require_on_sphere, unit
+from veselova.mechanics.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 
 __all__ = ["SeparableVeselova"]
@@ -62,40 +62,26 @@ class SeparableVeselova(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         diagonal = positive_numbers(A)
         require_moderate(diagonal, "A", _WIDEST)
         n = len(diagonal)
         for i, value in enumerate(diagonal):
             if value in diagonal[:i]:
                 raise InvalidInput(("A", i), "a number different from the others", shown(A[i]))
-        exact_q, exact_v = exact_vector(q, ("q",), n), exact_vector(q_dot, ("q_dot",), n)
-        if not any(exact_q):
-            raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
-        largest = max(abs(x) for x in exact_q)
-        position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_v)
-        if not normalize:
-            require_on_sphere(position, velocity)
-        exact = ExactState(diagonal, exact_q, exact_v, None)
+        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
         parts = _potential(potential, n)
         for i, beta in enumerate(parts[2]):
-            if beta and not exact_q[i]:
+            if beta and not exact.q[i]:
                 raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", shown(beta))
-        arrays = {"A": to_float(diagonal), "q": unit(position), "q_dot": to_float(exact.tangent)}
-        for name, array in arrays.items():
-            object.__setattr__(self, name, read_only(array))
-        object.__setattr__(self, "exact", exact)
-        object.__setattr__(self, "potential", parts)
+        self._set(A=to_float(diagonal), q=unit(position), q_dot=to_float(exact.tangent), exact=exact, potential=parts)
         for name, largest in (("potential", _LARGEST), ("q_dot", _LARGEST)):
             values = [*parts[:2], *parts[2]] if name == "potential" else list(exact.tangent)
             if any(abs(x) > largest for x in values):
                 raise InvalidInput((name,), f"numbers up to {float(largest):.0e}", f"{float(max(map(abs, values))):.3g}")
         if not np.isfinite(self.energy):
             raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
-        given = {"A": plain(A), "q": plain(q), "q_dot": plain(q_dot), "normalize": normalize}
-        stated = {} if potential is None else {"potential": {name: plain(value) for name, value in potential.items()}}
-        object.__setattr__(self, "given", {**given, **stated})
+        self._set(given=stated(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))

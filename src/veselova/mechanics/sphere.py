@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.exact import exact_vector, to_float
 
-__all__ = ["INPUT_TOLERANCE", "ExactState", "require_on_sphere", "unit"]
+__all__ = ["INPUT_TOLERANCE", "ExactState", "over_largest", "point_on_sphere", "unit"]
 
 Array = NDArray[np.float64]
 
@@ -49,7 +51,29 @@ def unit(vector: Array) -> Array:
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
-def require_on_sphere(q: Array, velocity: Array, name: str = "q_dot") -> None:
+def over_largest(vector: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+    """Return the vector over its largest entry, so that its floats have squares."""
+    largest = max(abs(x) for x in vector)
+    return tuple(x / largest for x in vector)
+
+
+def point_on_sphere(
+    A: tuple[Fraction, ...], q: Any, velocity: Any, normalize: bool, name: str = "q_dot"
+) -> tuple[ExactState, Array]:
+    """Return a given point and its velocity of that name, exactly, and the point as floats, over its largest entry to normalize.
+
+    Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0 to the tolerance.
+    """
+    state = ExactState(A, exact_vector(q, ("q",), len(A)), exact_vector(velocity, (name,), len(A)), None)
+    if not any(state.q):
+        raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
+    position = to_float(over_largest(state.q) if normalize else state.q)
+    if not normalize:
+        _require_on_sphere(position, to_float(state.q_dot), name)
+    return state, position
+
+
+def _require_on_sphere(q: Array, velocity: Array, name: str) -> None:
     """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to the tolerance."""
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(q))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.body_inertia import BodyInertia, body_inertia
 from veselova.mechanics.cotangent_flow import CotangentFlow, MomentumFlow
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, is_matrix, plain, read_only, to_float
+from veselova.mechanics.exact import exact_matrix, is_matrix, require_truth_value, stated, to_float
 from veselova.mechanics.flow import FLOATS, Flow
 from veselova.mechanics.integrals import norm
 from veselova.mechanics.problem import Problem, Series
@@ -66,8 +66,7 @@ class StiefelFlow(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
 
     def __init__(self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         if (P is None) == (X_dot is None):
             raise InvalidInput(("P",), "either P or X_dot", "neither" if P is None else "both")
         if not is_matrix(X) or len(X) < 2:
@@ -80,13 +79,10 @@ class StiefelFlow(Problem):
         name, values = ("P", P) if X_dot is None else ("X_dot", X_dot)
         tangent = _tangent(columns, to_float(exact_matrix(values, (name,), n, r)), name, normalize)
         momentum = tangent if X_dot is None else _momentum(operator, columns, tangent)
-        object.__setattr__(self, "inertia", operator)
-        object.__setattr__(self, "X", read_only(columns))
-        object.__setattr__(self, "P", read_only(momentum))
+        self._set(inertia=operator, X=columns, P=momentum)
         if not (np.isfinite(self.energy) and np.all(np.isfinite(self.omega)) and bool(np.any(momentum)) == (self.energy > 0)):
             raise InvalidInput((name,), "an energy and angular velocity within the range of a float", f"energy {self.energy}")
-        given = {"inertia": dict(inertia), "X": X, "P": P, "X_dot": X_dot, "normalize": normalize}
-        object.__setattr__(self, "given", {key: _plain(value) for key, value in given.items() if value is not None})
+        self._set(given=stated(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("X", "P"))
@@ -209,7 +205,3 @@ def _momentum(inertia: BodyInertia, X: Array, X_dot: Array) -> Array:
     P = cotangent(X, inertia.apply(angular_velocity(X, X_dot / largest)))
     with np.errstate(over="ignore"):  # refused by the constructor
         return np.asarray(np.ldexp(P * largest, inertia.exponent), dtype=np.float64)
-
-
-def _plain(value: Any) -> Any:
-    return {key: plain(entry) for key, entry in value.items()} if isinstance(value, dict) else plain(value)

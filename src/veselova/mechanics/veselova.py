@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
-from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_matrix, exact_vector, plain, read_only, to_float
+from veselova.mechanics.errors import InvalidInput
+from veselova.mechanics.exact import exact_matrix, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.principal_inertia import principal_inertia
 from veselova.mechanics.problem import Series
 from veselova.mechanics.reduced_flow import ReducedFlow
-from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, require_on_sphere, unit
+from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, point_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
@@ -66,27 +66,19 @@ class Veselova(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False) -> None:
-        if not isinstance(normalize, bool):
-            raise InvalidInput(("normalize",), "true or false", shown(normalize))
+        require_truth_value(normalize, "normalize")
         diagonal, axes = principal_inertia(A)
-        n = len(diagonal)
-        exact_q = exact_vector(q, ("q",), n)
-        exact_q_dot = exact_vector(q_dot, ("q_dot",), n)
-        if not any(exact_q):
-            raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
-        largest = max(abs(x) for x in exact_q)
-        position, velocity = to_float([x / largest if normalize else x for x in exact_q]), to_float(exact_q_dot)
-        if not normalize:
-            require_on_sphere(position, velocity)
-        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), n)
+        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
+        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), len(diagonal))
         given_frame = None if exact_frame is None else to_float(exact_frame)
         if axes is not None:
             with np.errstate(over="ignore", invalid="ignore"):  # refused below
-                position, velocity = axes.T @ position, axes.T @ velocity
+                position, velocity = axes.T @ position, axes.T @ to_float(exact.q_dot)
             given_frame = None if given_frame is None else axes.T @ given_frame
-            _require_finite(velocity, exact_q_dot)
-            exact_q, exact_q_dot = tuple(map(Fraction, position.tolist())), tuple(map(Fraction, velocity.tolist()))
-        exact = ExactState(diagonal, exact_q, exact_q_dot, exact_frame)
+            _require_finite(velocity, exact.q_dot)
+            q_along, q_dot_along = (tuple(map(Fraction, vector.tolist())) for vector in (position, velocity))
+            exact = replace(exact, q=q_along, q_dot=q_dot_along)
+        exact = replace(exact, frame=exact_frame)
         position, velocity = unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
@@ -94,10 +86,8 @@ class Veselova(TorusProblem):
             start_frame = refined(natural_frame(A_float, position, velocity), exact.A, exact.q, exact.tangent)
         else:
             start_frame = admissible_frame(given_frame, position)
-        self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes)
-        object.__setattr__(self, "exact", exact)
-        given = {"A": A, "q": q, "q_dot": q_dot, "frame": frame, "normalize": normalize}
-        object.__setattr__(self, "given", {name: plain(value) for name, value in given.items() if value is not None})
+        given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
+        self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes, exact=exact, given=given)
 
     @classmethod
     def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
@@ -122,13 +112,6 @@ class Veselova(TorusProblem):
         if not self.moves:
             raise InvalidInput(("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector")
         return NeumannSystem(self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True)
-
-    def _set(self, **arrays: Array | None) -> None:
-        for name, value in arrays.items():
-            if value is not None:
-                value = np.array(value)
-                value.setflags(write=False)
-            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         # Vectors along the principal axes, to the digits that recognise them.
