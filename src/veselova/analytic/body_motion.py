@@ -6,8 +6,7 @@ coordinate lines by one more integral along the orbit.
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -15,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.motion import Motion
 from veselova.analytic.panel_integral import PanelIntegral
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import exact_number, exact_vector
-from veselova.mechanics.times import validated_times
-from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.problem import Series
+from veselova.mechanics.separation import family_polynomial
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
 __all__ = ["BodyMotion"]
@@ -35,14 +35,8 @@ _APART = Fraction(1, 10**30)
 _STEP = 1e-6
 
 
-@dataclass(frozen=True)
-class BodyMotion:
+class BodyMotion(Motion[VeselovaSO3]):
     """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or (Ω,γ) ≠ 0."""
-
-    problem: VeselovaSO3
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"problem": self.problem}  # what was computed stays behind when it is pickled
 
     @cached_property
     def _order(self) -> NDArray[np.intp]:
@@ -50,7 +44,8 @@ class BodyMotion:
         return np.array(sorted(range(3), key=lambda i: self.problem.moments[i]))
 
     @cached_property
-    def _start(self) -> SeparableStart:
+    def _orbit(self) -> SeparableOrbit:
+        """Return the orbit of the exact start along these axes."""
         problem, order = self.problem, self._order
         if problem.linear != 0:
             raise Unsolved("not-separable", f"the closed form has (Ω,γ) = 0, here {problem.linear:.6g}; integrate numerically")
@@ -69,46 +64,26 @@ class BodyMotion:
         x, w = ([Fraction(float(v[i])) for i in order] for v in (gamma, Omega))
         handed = 1 if order[1] - order[0] in (1, -2) else -1  # whether the sorted axes keep the sense of rotation
         velocity = [handed * (x[(i + 1) % 3] * w[(i + 2) % 3] - x[(i + 2) % 3] * w[(i + 1) % 3]) for i in range(3)]
-        first, second = sum(moments), moments[0] * moments[1] + moments[1] * moments[2] + moments[2] * moments[0]
-        quartic, quadratic = alphas[:2]
-        # v of (3.5): −α₁λ(λ²−σ₁λ+σ₂) + α₂λ(σ₁−λ)
-        v = (Fraction(0), quadratic * first - quartic * second, quartic * first - quadratic, -quartic)
-        return SeparableStart(tuple(moments), tuple(x), tuple(velocity), v, tuple(alphas[2 + i] for i in order))
+        v, walls = family_polynomial(moments, *alphas[:2]), tuple(alphas[2 + i] for i in order)
+        return SeparableOrbit(SeparableStart(tuple(moments), tuple(x), tuple(velocity), v, walls))
 
     def _principal(self, vector: Array) -> Array:
         return vector if self.problem.axes is None else self.problem.axes.T @ vector
 
-    @cached_property
-    def _orbit(self) -> SeparableOrbit:
-        return SeparableOrbit(self._start)
-
-    def __call__(self, times: Any) -> Trajectory:
-        """Return the trajectory at times."""
-        began, grid = time.perf_counter(), validated_times(times)
-        if not self.problem.moves:
-            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
-            return Trajectory.at_rest(self.problem, grid, provenance, self)
+    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
         clock = orbit.clock(grid)
         tau, z = clock.tau1(grid)
         largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
         low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
         panels = PanelIntegral(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
-        phi = inversion.invert(z)
-        at = motion.attitude(phi)
-        velocity = np.sum(at.normals * at.components[:, None, :], axis=2) / orbit.rate.at(phi)[:, None]
+        at, velocity = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
         error, along = orbit.error(tau, clock, self._turning_steepness)
         error = error + panels.error(tau) + panels.mean_size * along
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
-        details = {
-            "clock": clock.name,
-            "clock_size": clock.size,
-            "degree": len(self._start.factor) + self._start.centrifugal.count(0),
-        }
-        provenance = Provenance.since(began, "analytic", "angles", details)
-        return Trajectory(self.problem, grid, error, series, provenance, dense=self)
+        return series, error, "angles", orbit.details(clock)
 
     def _to_body(self, values: Array) -> Array:
         """Return vectors (N, 3), or columns (N, 3, k), along sorted axes in those of the body."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
 from veselova.analytic.fourier_clock import FourierClock
-from veselova.analytic.frame import slopes
+from veselova.analytic.frame import Attitude, slopes
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.precision import DOUBLE
@@ -38,6 +38,7 @@ class SeparableOrbit:
 
     def __init__(self, start: SeparableStart) -> None:
         self.motion = SeparableMotion(start)
+        self._degree = start.degree
         self.rate = SeparatedRate(self.motion)
         self.inversion = self.motion.inversion
         origin = self.inversion.map(self.motion.angles[None, :])[0]
@@ -58,6 +59,16 @@ class SeparableOrbit:
         if cycles > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
             return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
         return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+
+    def states(self, z: Array) -> tuple[Attitude, Array]:
+        """Return positions and coordinate lines at phases (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
+        phi = self.inversion.invert(z)
+        at = self.motion.attitude(phi)
+        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[:, None]
+
+    def details(self, clock: Clock) -> dict[str, Any]:
+        """Return what a trajectory's provenance says of the orbit."""
+        return {"clock": clock.name, "clock_size": clock.size, "degree": self._degree}
 
     @cached_property
     def sample(self) -> Array:

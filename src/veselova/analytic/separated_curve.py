@@ -102,6 +102,11 @@ class SeparableStart:
                 parts.append([-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])])
         return trimmed(total(parts))
 
+    @property
+    def degree(self) -> int:
+        """Return the degree of R."""
+        return len(self.factor) + self.centrifugal.count(Fraction())
+
     @cached_property
     def spheroconic(self) -> list[Fraction]:
         """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits."""

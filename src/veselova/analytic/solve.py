@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from veselova.analytic.body_motion import BodyMotion
 from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
+from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
 from veselova.analytic.solution import METHODS, Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus_problem import TorusProblem
-from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova import Veselova
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
@@ -65,7 +67,7 @@ def solve(
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
-        return _Motion(problem, method, clock)(grid)
+        return _TorusMotion(problem, method, clock)(grid)
     if certified and method == "theta":
         raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
     if clock is not None:
@@ -89,15 +91,9 @@ def _separable_motion(
 
 
 @dataclass(frozen=True)
-class _Motion:
-    """A motion that can be asked for times; the solution is kept, and made again where it was left behind by pickling."""
-
-    problem: TorusProblem
+class _TorusMotion(Motion[TorusProblem]):
     method: str | None
     clock: str | None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"problem": self.problem, "method": self.method, "clock": self.clock}
 
     @cached_property
     def _solution(self) -> Solution:
@@ -109,17 +105,12 @@ class _Motion:
             return ()
         return tuple(Solution(self.problem, sign * _DATA_ROUNDING) for sign in (1, -1))
 
-    def __call__(self, times: Any) -> Trajectory:
-        """Return the trajectory at times."""
-        began, grid = time.perf_counter(), validated_times(times)
-        if not self.problem.moves:
-            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
-            return Trajectory.at_rest(self.problem, grid, provenance, self)
+    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         solution, route = self._solution, self.method or self._solution.default_method()
         clock = solution.clock(grid, self.clock)
-        tau1, states, error = _evaluated(solution, clock, grid, route)
+        tau1, states, error = _states(solution, clock, grid, route)
         for neighbour in self._neighbours:
-            other = _evaluated(neighbour, neighbour.clock(grid, self.clock), grid, route)[1]
+            other = _states(neighbour, neighbour.clock(grid, self.clock), grid, route)[1]
             error = np.maximum(error, np.max(np.abs(other[1] - states[1]), axis=(1, 2)))
         lost = np.flatnonzero(~(error <= _NO_DIGIT))
         if lost.size:
@@ -135,12 +126,11 @@ class _Motion:
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
-        provenance = Provenance.since(began, "analytic", route, details)
         series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
-        return Trajectory(self.problem, grid, self.problem.bound(series, error), series, provenance, dense=self)
+        return series, self.problem.bound(series, error), route, details
 
 
-def _evaluated(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:
+def _states(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:
     """Return τ₁, the states (q̇, frame, λ) and their error."""
     tau1, z = clock.tau1(grid)
     states = solution.states(solution.attitude(z, route))

@@ -16,7 +16,7 @@ from veselova.mechanics.exact import exact_number, exact_vector, require_truth_v
 from veselova.mechanics.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.separable_flow import SeparableFlow
-from veselova.mechanics.separation import SeparablePotential, separation_constants
+from veselova.mechanics.separation import SeparablePotential, family_polynomial, separation_constants
 from veselova.mechanics.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 
@@ -100,11 +100,7 @@ class SeparableVeselova(Problem):
     @property
     def polynomial(self) -> tuple[Fraction, ...]:
         """Return the coefficients of v(λ), lowest first: V = Σ v(λ_k)/Π_{s≠k}(λ_k−λ_s), the β_i apart."""
-        quartic, quadratic, _ = self.potential
-        inverse = [1 / a for a in self.exact.A]
-        first = sum(inverse, Fraction())
-        second = (first * first - sum((x * x for x in inverse), Fraction())) / 2
-        return (*([Fraction(0)] * (self.n - 2)), quadratic * first - quartic * second, quartic * first - quadratic, -quartic)
+        return family_polynomial([1 / a for a in self.exact.A], *self.potential[:2])
 
     @property
     def separable_potential(self) -> SeparablePotential:

@@ -12,16 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
+from veselova.mechanics.exact import to_float
 from veselova.mechanics.integrals import energy
 
 __all__ = [
     "SeparablePotential",
+    "family_polynomial",
     "separated_family",
     "separation_constants",
     "separation_polynomial",
@@ -61,15 +65,20 @@ class SeparablePotential:
 
 
 def separated_family(A: Array, alphas: Sequence[float]) -> SeparablePotential:
-    """Return the potential (3.5), n = 3, 𝓘 = A⁻¹: v(λ) = −α₁λ(λ²−σ₁λ+σ₂) + α₂λ(σ₁−λ) and β_i = α_{i+2}.
+    """Return the potential (3.5), n = 3, 𝓘 = A⁻¹: v(λ) of ``family_polynomial``, and β_i = α_{i+2}."""
+    quartic, quadratic = (Fraction(alpha) for alpha in alphas[:2])
+    v = family_polynomial([1 / Fraction(a) for a in A.tolist()], quartic, quadratic)
+    return SeparablePotential(to_float(v), np.array(alphas[2:], dtype=np.float64))
 
-    σ₁, σ₂ are the elementary symmetric functions of the I_i.
+
+def family_polynomial(inverse: Sequence[Fraction], quartic: Fraction, quadratic: Fraction) -> tuple[Fraction, ...]:
+    """Return the coefficients of v(λ) = λⁿ⁻²[α₂(σ₁−λ) − α₁(λ²−σ₁λ+σ₂)], n+1 numbers, lowest first, of n ≥ 2 numbers I_i.
+
+    σ₁, σ₂ are their elementary symmetric functions. V = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q), for n = 3 that of (3.5).
     """
-    I = 1 / A
-    first, second = np.sum(I), I[0] * I[1] + I[1] * I[2] + I[2] * I[0]
-    quartic, quadratic = alphas[:2]
-    v = [0.0, -quartic * second + quadratic * first, quartic * first - quadratic, -quartic]
-    return SeparablePotential(np.array(v), np.array(alphas[2:], dtype=np.float64))
+    first, second = sum(inverse, Fraction()), sum((x * y for x, y in combinations(inverse, 2)), Fraction())
+    below = [Fraction()] * (len(inverse) - 2)
+    return (*below, quadratic * first - quartic * second, quartic * first - quadratic, -quartic)
 
 
 def spheroconic_polynomial(A: Array, q: Array) -> Array:

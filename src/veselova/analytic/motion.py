@@ -1,0 +1,46 @@
+"""A motion in closed form that can be asked for times: what rest, provenance and pickling are for every kind of it."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.problem import Problem, Series
+from veselova.mechanics.times import validated_times
+from veselova.mechanics.trajectory import Provenance, Trajectory
+
+__all__ = ["Motion"]
+
+Array = NDArray[np.float64]
+
+P = TypeVar("P", bound=Problem)
+
+
+@dataclass(frozen=True)
+class Motion(ABC, Generic[P]):
+    """The motion of a problem; what was computed for it is kept, and made again where it was left behind by pickling."""
+
+    problem: P
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times."""
+        began, grid = time.perf_counter(), validated_times(times)
+        if not self.problem.moves:
+            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
+            return Trajectory.at_rest(self.problem, grid, provenance, self)
+        series, error, method, details = self._evaluated(grid)
+        provenance = Provenance.since(began, "analytic", method, details)
+        return Trajectory(self.problem, grid, error, series, provenance, dense=self)
+
+    @abstractmethod
+    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        """Return the series of a problem that moves, their error, the method, and what it has to say of itself."""
