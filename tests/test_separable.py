@@ -123,7 +123,7 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     assert np.allclose(at.q[0], np.array([float(x) for x in q]) / length, atol=1e-13)
     frame = np.column_stack([at.q[0], at.normals[0]])
     assert np.allclose(frame.T @ frame, np.eye(n), atol=1e-12)
-    rate = SeparatedRate(motion).at(motion.angles[None])[0]
+    rate = SeparatedRate(motion.inversion).at(motion.angles[None])[0]
     assert np.allclose(at.normals[0] @ at.components[0] / rate, np.array([float(x) for x in v]) / length, atol=1e-12)
     # dq/dτ along the linear flow on the torus is q' itself: the whole inversion at once.
     origin, step = motion.inversion.map(motion.angles[None])[0], 1e-5

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.precision import DOUBLE, Arithmetic, Sums, Values
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
@@ -35,23 +36,6 @@ _SETTLED, _STALLED = 8.0, 1e4
 #: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each of its stations.
 _FIRST_STRETCH, _LEAST_STRETCH = 0.25, 1e-9
 _NEAR_STEPS = 12
-
-
-class AngleSeries(Protocol):
-    """What the map needs of periods: dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, and how narrow the gaps are."""
-
-    @property
-    def arithmetic(self) -> Arithmetic: ...
-    @property
-    def genus(self) -> int: ...
-    @property
-    def cut_series(self) -> tuple[Values, ...]: ...
-    @property
-    def angle_series(self) -> Values: ...
-    @property
-    def series_truncation(self) -> Values: ...
-    @property
-    def narrowest_gap(self) -> float: ...
 
 
 P = TypeVar("P", bound=AngleSeries)

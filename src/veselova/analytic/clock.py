@@ -10,44 +10,71 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["Clock", "ClockRate", "clock_rate"]
+__all__ = ["Clock", "ClockRate", "Rate", "clock_rate"]
 
 Array = NDArray[np.float64]
 
-
-class Rate(Protocol):
-    """What the Fourier clock needs of a rate: its Fourier coefficients as determinants of one-variable integrals."""
-
-    @property
-    def inversion(self) -> AbelJacobi[Any]: ...
-    @property
-    def scale(self) -> Any: ...
-    @property
-    def mean(self) -> Any: ...
-    def columns(self, count: int) -> list[tuple[Values, Values]]: ...
+P = TypeVar("P", bound=AngleSeries)
 
 
 @dataclass(frozen=True)
-class ClockRate:
-    """d(time)/dτ₁ = scale · Π_s φ(λ_s) on the torus of one motion; the factors φ are at most one at any genus.
+class Rate(ABC, Generic[P]):
+    """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion."""
+
+    inversion: AbelJacobi[P]
+    scale: Any
+
+    @abstractmethod
+    def at(self, psi: Values) -> Values:
+        """Return dt/dτ₁ at angles of shape (N, g)."""
+
+    @abstractmethod
+    def _weighted_forms(self, s: int, psi: Values) -> Values:
+        """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
+
+    def columns(self, count: int) -> list[tuple[Values, Values]]:
+        """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
+
+        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ · e^{−2πi m·z} over the torus is
+        F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹: one-variable integrals only.
+        """
+        periods, result = self.inversion.periods, []
+        psi = periods.arithmetic.nodes(count)
+        for s in range(periods.genus):
+            angles = np.zeros((count, periods.genus), dtype=psi.dtype)
+            angles[:, s] = psi
+            weights = periods.inverse_cycles @ self._weighted_forms(s, psi) * (2 * periods.arithmetic.pi / count)
+            result.append((weights, self.inversion.map(angles)))
+        return result
+
+    @cached_property
+    def mean(self) -> Any:
+        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
+        periods = self.inversion.periods
+        means = [np.sum(weights, axis=1) for weights, _ in self.columns(periods.longest)]
+        return self.scale * periods.arithmetic.determinant(np.stack(means, axis=1))
+
+
+@dataclass(frozen=True)
+class ClockRate(Rate[Periods]):
+    """The rate of t, s or τ₁ itself on a hyperelliptic torus; its factors φ_s are at most one at any genus.
 
     time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
     """
 
-    inversion: AbelJacobi[Periods]
-    scale: Any
     time: str
 
     @classmethod
@@ -71,30 +98,11 @@ class ClockRate:
         point = curve.branch_points[2 * s + 1] + below
         return np.asarray(_factor(curve, s, point, self.time, curve.arithmetic))
 
-    def columns(self, count: int) -> list[tuple[Values, Values]]:
-        """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
-
-        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ · e^{−2πi m·z} over the torus is
-        F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹: one-variable integrals only.
-        """
+    def _weighted_forms(self, s: int, psi: Values) -> Values:
         periods = self.inversion.periods
-        g, result = periods.genus, []
-        for s, cut in enumerate(periods.cuts):
-            psi = periods.arithmetic.nodes(count)
-            below, above = cut.distances(psi)
-            forms = cut.forms(below, above) * self._factor(s, below)
-            angles = np.zeros((count, g), dtype=psi.dtype)
-            angles[:, s] = psi
-            measure = (-1) ** (g - s - 1) * 2 * periods.arithmetic.pi / count
-            result.append((periods.inverse_cycles @ forms * measure, self.inversion.map(angles)))
-        return result
-
-    @cached_property
-    def mean(self) -> Any:
-        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
-        count = max(series.shape[1] for series in self.inversion.periods.cut_series)
-        means = [np.sum(weights, axis=1) for weights, _ in self.columns(count)]
-        return self.scale * self.inversion.periods.arithmetic.determinant(np.stack(means, axis=1))
+        below, above = periods.cuts[s].distances(psi)
+        sign = (-1) ** (periods.genus - s - 1)
+        return np.asarray(sign * periods.cuts[s].forms(below, above) * self._factor(s, below))
 
 
 def _factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:

@@ -50,7 +50,7 @@ class FourierClock(Clock):
 
     name: ClassVar[str] = "fourier"
 
-    def __init__(self, rate: Rate, in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
+    def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
         self._in_tau1, self._in_time, self._mean = in_tau1, in_time, mean
         modes, coefficients = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
@@ -115,7 +115,7 @@ class FourierClock(Clock):
         return times / self._mean + delta, z
 
 
-def _significant_modes(rate: Rate) -> tuple[Array, Array]:
+def _significant_modes(rate: Rate[Any]) -> tuple[Array, Array]:
     """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
     columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
 
@@ -129,10 +129,10 @@ def _significant_modes(rate: Rate) -> tuple[Array, Array]:
 
 
 class ColumnsForModes:
-    """``ClockRate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
+    """``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
 
-    def __init__(self, rate: Rate) -> None:
-        self._rate, self._longest = rate, max(series.shape[1] for series in rate.inversion.periods.cut_series)
+    def __init__(self, rate: Rate[Any]) -> None:
+        self._rate, self._longest = rate, rate.inversion.periods.longest
         self._count, self._columns = 0, list[tuple[Values, Values]]()
 
     def __call__(self, modes: NDArray[np.int64]) -> list[tuple[Values, Values]]:

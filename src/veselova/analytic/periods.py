@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.interval import Interval
 from veselova.analytic.precision import Arithmetic, Values
@@ -24,7 +25,7 @@ _EXTRA_NODES = 4
 
 
 @dataclass(frozen=True)
-class Periods:
+class Periods(AngleSeries):
     """The period data of a curve in the curve's arithmetic."""
 
     curve: Curve
@@ -96,16 +97,6 @@ class Periods:
         return tuple((-1) ** (self.genus - s) * self._series(cut) for s, cut in enumerate(self.cuts, start=1))
 
     @cached_property
-    def cycles(self) -> Values:
-        """Return a, shape (g, g)."""
-        return np.stack([2 * self.arithmetic.pi * series[:, 0] for series in self.cut_series], axis=1)
-
-    @cached_property
-    def inverse_cycles(self) -> Values:
-        """Return a⁻¹."""
-        return self.arithmetic.inverse(self.cycles)
-
-    @cached_property
     def cancellation(self) -> Values:
         """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's over many orders cancel."""
         return np.asarray(sum(np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=1) for series in self.cut_series))
@@ -129,17 +120,3 @@ class Periods:
         """Return T, symmetric, with Riemann matrix τ = iT."""
         raw = self.inverse_cycles @ self.conjugate_cycles
         return np.asarray((raw + raw.T) / 2)
-
-    @cached_property
-    def frequencies(self) -> Values:
-        """Return f = a⁻¹e_g, cycles per unit τ₁: z(τ₁) = z⁰ + fτ₁."""
-        return self.inverse_cycles[:, self.genus - 1]
-
-    @cached_property
-    def angle_series(self) -> Values:
-        """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the longest cut."""
-        longest = max(series.shape[1] for series in self.cut_series)
-        padded = np.zeros((self.genus, self.genus, longest), dtype=self.cycles.dtype)
-        for s, series in enumerate(self.cut_series):
-            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
-        return padded

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.clock import Rate
 from veselova.analytic.frame import Attitude
 from veselova.analytic.separated_curve import SeparableStart, SeparatedCut, separated_cuts
 from veselova.analytic.separated_periods import SeparatedPeriods
@@ -48,10 +47,6 @@ class SeparableMotion:
         if position == 0:
             return (1 if velocity > 0 else -1) * (1 if lower else -1)
         return (1 if position > 0 else -1) * (1 if self.angles[s] >= 0 or not lower else -1)
-
-    def points(self, phi: Array) -> Array:
-        """Return λ_s at angles (N, g)."""
-        return np.stack([cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1)
 
     def between(self, phi: Array) -> Array:
         """Return |λ_s−λ_j|, one for s = j, shape (N, g, g), from the ends of the cuts."""
@@ -103,7 +98,7 @@ class SeparableMotion:
             other = self.cuts[s].axes[1 if lower else 0]
             mate = own[:, s, other] if other is not None else 1.0
             tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
-        return Attitude(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.points(phi))
+        return Attitude(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi))
 
     def _components(self, phi: Array, y_rest: Array) -> Array:
         """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of the ends that are I's."""
@@ -138,34 +133,15 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
 
 
 @dataclass(frozen=True)
-class SeparatedRate:
-    """dt/dτ = √(λ_1…λ_g) on the torus, with its Fourier coefficients as determinants; attributes as those of ClockRate."""
+class SeparatedRate(Rate[SeparatedPeriods]):
+    """dt/dτ = √(λ_1…λ_g) on the torus of a separable motion."""
 
-    motion: SeparableMotion
     scale: float = 1.0
 
-    @property
-    def inversion(self) -> AbelJacobi[SeparatedPeriods]:
-        """Return the Abel–Jacobi map."""
-        return self.motion.inversion
-
-    def at(self, phi: Array) -> Array:
+    def at(self, psi: Array) -> Array:
         """Return dt/dτ at angles of shape (N, g)."""
-        return np.asarray(np.sqrt(np.prod(self.motion.points(phi), axis=1)))
+        return np.asarray(np.sqrt(np.prod(self.inversion.periods.points(psi), axis=1)))
 
-    def columns(self, count: int) -> list[tuple[Array, Array]]:
-        """Return, per cut, (weights, shape (g, N); G_s at the nodes, shape (N, g)); see ClockRate.columns."""
-        periods, result = self.motion.periods, []
-        for s, cut in enumerate(self.motion.cuts):
-            phi: Any = periods.arithmetic.nodes(count)
-            angles = np.zeros((count, periods.genus))
-            angles[:, s] = phi
-            forms = periods.forms(s, phi) * np.sqrt(cut.lower + cut.point(phi)[0])
-            result.append((periods.inverse_cycles @ forms * (2 * np.pi / count), self.inversion.map(angles)))
-        return result
-
-    @cached_property
-    def mean(self) -> float:
-        """Return the mean of dt/dτ over the torus."""
-        count = max(series.shape[1] for series in self.motion.periods.cut_series)
-        return float(np.linalg.det(np.stack([np.sum(weights, axis=1) for weights, _ in self.columns(count)], axis=1)))
+    def _weighted_forms(self, s: int, psi: Array) -> Array:
+        periods = self.inversion.periods
+        return periods.forms(s, psi) * np.sqrt(periods.cuts[s].lower + periods.cuts[s].point(psi)[0])

@@ -39,7 +39,7 @@ class SeparableOrbit:
     def __init__(self, start: SeparableStart) -> None:
         self.motion = SeparableMotion(start)
         self._degree = start.degree
-        self.rate = SeparatedRate(self.motion)
+        self.rate = SeparatedRate(self.motion.inversion)
         self.inversion = self.motion.inversion
         origin = self.inversion.map(self.motion.angles[None, :])[0]
         self.in_tau = LinearFlow.of(origin, self.motion.periods.frequencies)

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.precision import DOUBLE, Double
 from veselova.analytic.separated_curve import SeparatedCut
 from veselova.mechanics.errors import Unsolved
@@ -30,11 +31,15 @@ _RESOLVED = 1e-15
 
 
 @dataclass(frozen=True)
-class SeparatedPeriods:
-    """The period data of g cuts; attributes as those of analytic.periods.Periods."""
+class SeparatedPeriods(AngleSeries):
+    """The period data of the cuts of a separable motion, in double precision."""
 
     cuts: Sequence[SeparatedCut]
-    arithmetic: Double = DOUBLE
+
+    @property
+    def arithmetic(self) -> Double:
+        """Return double precision."""
+        return DOUBLE
 
     @property
     def genus(self) -> int:
@@ -47,6 +52,10 @@ class SeparatedPeriods:
         ends = [(cut.lower, cut.lower + cut.width, cut.width) for cut in self.cuts]
         ratios = ((c - b) / (c - b + max(width, other)) for (_, b, width), (c, _, other) in itertools.pairwise(ends))
         return min(ratios, default=1.0)
+
+    def points(self, phi: Array) -> Array:
+        """Return λ_s at angles (N, g)."""
+        return np.stack([cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1)
 
     def forms(self, s: int, phi: Array) -> Array:
         """Return du_k/dψ = ±p_k dλ/(2√R dψ) on cut s, shape (g, N): p_g = Π(λ−ζ_l) with ζ_l mid-gap, p_k = p_g/(λ−ζ_k)."""
@@ -80,31 +89,7 @@ class SeparatedPeriods:
         raise Unsolved("separatrix", "a turning point is nearly a double root: the series of its angle does not end")
 
     @cached_property
-    def cycles(self) -> Array:
-        """Return a, shape (g, g)."""
-        return np.stack([2 * np.pi * series[:, 0] for series in self.cut_series], axis=1)
-
-    @cached_property
-    def inverse_cycles(self) -> Array:
-        """Return a⁻¹."""
-        return self.arithmetic.inverse(self.cycles)
-
-    @cached_property
-    def frequencies(self) -> Array:
-        """Return f = a⁻¹e_g, cycles per unit τ."""
-        return np.asarray(self.inverse_cycles[:, -1])
-
-    @cached_property
     def series_truncation(self) -> Array:
         """Return what the angle series leave out of z_k, about, shape (g,)."""
         left_out = sum(_RESOLVED * np.max(np.abs(series), axis=1) for series in self.cut_series)
         return np.asarray(np.abs(self.inverse_cycles) @ left_out)
-
-    @cached_property
-    def angle_series(self) -> Array:
-        """Return g_{ksm}, shape (g, g, M): dz_k/dφ_s = Σ_m g_{ksm} cos mφ_s."""
-        longest = max(series.shape[1] for series in self.cut_series)
-        padded = np.zeros((self.genus, self.genus, longest))
-        for s, series in enumerate(self.cut_series):
-            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
-        return padded
