@@ -205,3 +205,14 @@ def test_attracting_planes_end_a_motion_by_name() -> None:
     for options in ({}, {"engine": "numeric"}, {"engine": "numeric", "method": "taylor"}):
         with pytest.raises(Unsolved, match="collision"):
             solve(problem, [0.0, 50.0], **options)  # type: ignore[arg-type]
+
+
+def test_the_point_and_the_body_run_into_a_plane_at_the_same_time() -> None:
+    gamma = np.array([0.6, 0.48, 0.64])
+    Omega = np.cross(gamma, [0.1, 0.5, 0.2])
+    body = VeselovaSO3([0.5, 1, 2], gamma, Omega, {"family": [0, 0, -0.1, 0, 0]})
+    q = SeparableVeselova([2, 1, 0.5], gamma, np.cross(gamma, Omega), {"centrifugal": [-0.1, 0, 0]}, normalize=True)
+    for problem in (body, q):
+        for method in ("dop853", "taylor"):
+            with pytest.raises(Unsolved, match=r"collision: .*\[0\] = 0 at about t = 1\.394818,"):
+                solve(problem, [20.0], "numeric", method)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.distribution import Distribution, combined
-from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.flow import FLOATS, Flow, Operations
+from veselova.mechanics.flow import FLOATS, Operations
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia, applied
+from veselova.mechanics.singular_flow import SingularFlow
 
 __all__ = ["LRFlow", "MomentumFlow", "MultiplierFlow", "jacobi_integral", "multipliers_of"]
 
@@ -26,14 +26,11 @@ _LARGEST_SYMBOLIC = 66
 
 #: The energy is restored along its gradient where that is at least this part of |ω||𝓘ω|: near a steady rotation it vanishes.
 _STEEP = 1e-2
-
-#: An attracting zero of g_ij is taken for reached when it is this near, in units of time at the speed of approach.
-_LEFT = 1e-8
 _TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
-class LRFlow(Flow):
+class LRFlow(SingularFlow):
     """An LR system in scaled units: moments of inertia near one, angular velocities near one.
 
     along (d,)   m_k = ⟨𝓘ω, 𝒲_k⟩ at the start · across (m,)  the constants c_s = ⟨ω, ℱ_s⟩ of the constraints
@@ -96,38 +93,18 @@ class LRFlow(Flow):
         side = distance * float(np.linalg.norm(self.along)) * rng.normal(size=along.size) / np.sqrt(max(along.size, 1))
         return replace(self, g=g, along=along + side, across=across)
 
-    @property
-    def endless(self) -> bool:
-        """Return whether the potential is finite everywhere."""
-        return not self._singular
+    def _coordinates(self, state: Array) -> tuple[Array, Array]:
+        """Return g and ġ."""
+        g, omega = (part[0] for part in self.motion(state[None]))
+        return g, g @ self.distribution.group.element(omega)
 
     @cached_property
-    def _singular(self) -> dict[tuple[int, int], GroupPotential]:
-        """Return, for each entry of g that v is infinite at the zero of, the monomials that are."""
-        return {entry: self.potential.singular_part(entry) for entry in self.potential.singular_entries} if self.potential else {}
+    def _singular(self) -> Mapping[tuple[int, int], Callable[[Array], Any]]:
+        v = self.potential
+        return {} if v is None else {entry: v.singular_part(entry).value for entry in v.singular_entries}
 
-    def _approach(self, state: Array) -> tuple[Array, Array]:
-        """Return the entries of g, positive on the side of the start, and their derivatives."""
-        g, omega = (part[0] for part in self.motion(state[None]))
-        side = np.sign(self.g)
-        return g * side, g @ self.distribution.group.element(omega) * side
-
-    def clearance(self, state: Array) -> float:
-        """Return the distance |g_ij| to the nearest singular zero, less what an attracting one makes good at once."""
-        distance, speed = self._approach(state)
-        g = distance * np.sign(self.g)
-        left = (distance[e] - _LEFT * abs(speed[e]) * (float(v.value(g)) < 0) for e, v in self._singular.items())
-        return float(min(left, default=1.0))
-
-    def ending(self, time: float, state: Array) -> Unsolved:
-        """Return what happened at the nearest singular zero: a collision, or a barrier that was stepped over."""
-        distance, speed = self._approach(state)
-        i, j = min(self._singular, key=lambda entry: distance[entry])
-        arrival = (time - distance[i, j] / speed[i, j]) * self.time_unit
-        place = f"g_{i + 1}{j + 1} = 0 at about t = {arrival:.7g}, where the potential is infinite"
-        if self._singular[i, j].value(np.abs(distance) * np.sign(self.g)) < 0:
-            return Unsolved("collision", f"the motion runs into {place}; ask for earlier times")
-        return Unsolved("thin-barrier", f"the motion turns back nearer than the integration resolves to {place}")
+    def _plane(self, index: tuple[int, int]) -> str:
+        return f"g_{index[0] + 1}{index[1] + 1}"
 
     @abstractmethod
     def motion(self, states: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,18 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.flow import Flow, Operations
+from veselova.mechanics.flow import Operations
 from veselova.mechanics.laurent import LaurentPolynomial, monomials
 from veselova.mechanics.natural_frame import orthonormalized
+from veselova.mechanics.singular_flow import SingularFlow
 
 __all__ = ["RigidBodyFlow", "angular_velocity", "momentum"]
 
 Array = NDArray[np.float64]
-
-#: Units of time left to an attracting singular plane at which a motion counts as having run into it: steps are still thousands of
-#: roundings of the time, and the rest of the way does not show in the seven digits of the time that is named.
-_LEFT = 1e-8
 
 #: Constants whose gradients turn into each other by less than this (near steady rotations, at rest) are not restored separately:
 #: the step, their defect divided by it, would do more harm than good.
@@ -29,7 +25,7 @@ _PARALLEL = 0.1
 
 
 @dataclass(frozen=True)
-class RigidBodyFlow(Flow):
+class RigidBodyFlow(SingularFlow):
     """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E = [e_1 e_2 e_3], e_1 = γ.
 
     inertia, inverse  the tensor and its inverse, (3, 3) · potential  V(γ) · Omega, frame  the start, all in scaled units
@@ -155,39 +151,18 @@ class RigidBodyFlow(Flow):
             Omega = self._on_constraint(Omega, E[..., 0])
         return {"Omega": Omega / self.time_unit, "frame": E}
 
-    @property
-    def endless(self) -> bool:
-        """Return whether the potential is finite everywhere."""
-        return not self.potential.singular_axes
-
-    def clearance(self, state: Array) -> float:
-        """Return the distance |γ_i| to the nearest singular plane, less what an attracting one makes good at once."""
-        distance, speed = self._approach(state)
-        gamma = state[3::3]
-        left = (distance[i] - _LEFT * abs(speed[i]) * (V.value(gamma) < 0) for i, V in self._singular.items())
-        return float(min(left, default=1.0))
-
-    def _approach(self, state: Array) -> tuple[Array, Array]:
-        """Return the distances γ_i from the planes γ_i = 0, positive on the side of the start, and their derivatives."""
-        E, side = state[3:].reshape(3, 3), np.sign(self.frame[:, 0])
+    def _coordinates(self, state: Array) -> tuple[Array, Array]:
+        """Return γ and γ̇."""
+        E = state[3:].reshape(3, 3)
         Omega = angular_velocity(self.inverse, E @ state[:3], E[:, 0], self.constrained) if self.spatial else state[:3]
-        return E[:, 0] * side, np.cross(E[:, 0], Omega) * side
+        return E[:, 0].copy(), np.cross(E[:, 0], Omega)
 
     @cached_property
-    def _singular(self) -> dict[int, LaurentPolynomial]:
-        """Return, for each singular plane, the terms that are infinite there."""
-        return {i: self.potential.singular_part(i) for i in self.potential.singular_axes}
+    def _singular(self) -> Mapping[int, Callable[[Array], Array]]:
+        return {i: self.potential.singular_part(i).value for i in self.potential.singular_axes}
 
-    def ending(self, time: float, state: Array) -> Unsolved:
-        """Return what happened at the nearest singular plane: a collision, or a barrier that was stepped over."""
-        distance, speed = self._approach(state)
-        axis = min(self._singular, key=lambda i: distance[i])
-        arrival = (time - distance[axis] / speed[axis]) * self.time_unit
-        place = f"the singular plane gamma[{axis}] = 0 at about t = {arrival:.7g}"
-        # Beyond the plane odd powers have changed sign: look at it from the side of the start.
-        if self._singular[axis].value(np.abs(distance) * np.sign(self.frame[:, 0])) < 0:
-            return Unsolved("collision", f"the motion runs into {place}, where its speed is infinite; ask for earlier times")
-        return Unsolved("thin-barrier", f"the motion turns back nearer than the integration resolves to {place}")
+    def _plane(self, index: int) -> str:
+        return f"the singular plane gamma[{index}]"
 
 
 def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> Array:

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.flow import FLOATS, Operations, PointFlow
 from veselova.mechanics.integrals import sliding_velocity, unit_scale
+from veselova.mechanics.singular_flow import SingularFlow
 
 __all__ = ["SeparableFlow"]
 
 Array = NDArray[np.float64]
 
-#: A coordinate with an attracting wall is followed to this part of its start: beyond, the speed grows like its inverse.
-_NEAREST = 1e-3
 
-
-class SeparableFlow(PointFlow):
+class SeparableFlow(PointFlow, SingularFlow):
     """The extended system (extended) for q and p with the tangential force of V = α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
 
     Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det A, in units of time.
@@ -115,21 +114,18 @@ class SeparableFlow(PointFlow):
         q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / np.sum(q * A * q, axis=1, keepdims=True)
         return {"q": q, "q_dot": q_dot / self.time_unit}
 
-    @property
-    def endless(self) -> bool:
-        """Return whether no plane attracts."""
-        return not np.any(self._walls < 0)
+    def _coordinates(self, state: Array) -> tuple[Array, Array]:
+        """Return q and q̇."""
+        return state[: self.n].copy(), self.vector_field(0.0, state)[: self.n]
 
-    def clearance(self, state: Array) -> float:
-        """Return how far the nearest attracting plane is, less where a motion is given up."""
-        attracting = np.flatnonzero(self._walls < 0)
-        if not attracting.size:
-            return 1.0
-        return float(np.min(np.abs(state[attracting] / self.initial[attracting]))) - _NEAREST
+    @cached_property
+    def _singular(self) -> Mapping[int, Callable[[Array], float]]:
+        return {i: partial(_wall, self._walls[i], i) for i in np.flatnonzero(self._walls).tolist()}
 
-    def ending(self, time: float, state: Array) -> Unsolved:
-        """Return the collision."""
-        attracting = np.flatnonzero(self._walls < 0)
-        axis = int(attracting[np.argmin(np.abs(state[attracting] / self.initial[attracting]))])
-        when = f"at about t = {time * self.time_unit:.4g}"
-        return Unsolved("collision", f"the motion runs into the plane q[{axis}] = 0 {when}, where V is −∞; ask for earlier times")
+    def _plane(self, index: int) -> str:
+        return f"the plane q[{index}]"
+
+
+def _wall(beta: float, axis: int, q: Array) -> float:
+    """Return β_i/q_i²."""
+    return float(beta / q[axis] ** 2)
