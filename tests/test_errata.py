@@ -15,11 +15,12 @@ from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
 from veselova.analytic.solution import Solution
 from veselova.mechanics import integrals, measure, rank_one
-from veselova.mechanics.body_inertia import body_inertia, coefficients, skew
+from veselova.mechanics.body_inertia import body_inertia
 from veselova.mechanics.flow import FLOATS
 from veselova.mechanics.moser import lax_matrix, lax_partner
 from veselova.mechanics.multiplier import ChaplyginMultiplier
 from veselova.mechanics.reduction import ChaplyginReduction
+from veselova.mechanics.skew import coefficients, skew
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.stiefel_geometry import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
 

@@ -11,9 +11,10 @@ from scipy.integrate import solve_ivp
 
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Unsolved, Veselova, solve
-from veselova.mechanics.body_inertia import BodyInertia, body_inertia, coefficients, skew
+from veselova.mechanics.body_inertia import BodyInertia, body_inertia
 from veselova.mechanics.cotangent_flow import CotangentFlow
 from veselova.mechanics.flow import FLOATS
+from veselova.mechanics.skew import coefficients, skew
 from veselova.mechanics.stiefel_geometry import (
     ad_invariants,
     admissible_basis,

@@ -1,7 +1,6 @@
 """Inertia operators on so(n): the special one (4.5) of a diagonal A, and any other, as a symmetric positive definite matrix.
 
 Both are kept in units 2^exponent near their own size, so that neither det A nor the unit of the input leaves the float range.
-Coefficients are those of the basis E_i∧E_j, i < j, in lexicographic order.
 """
 
 from __future__ import annotations
@@ -17,24 +16,11 @@ from numpy.typing import NDArray
 from veselova.mechanics.flow import Operations
 from veselova.mechanics.inertia import Inertia
 from veselova.mechanics.integrals import unit_scale
+from veselova.mechanics.skew import coefficients, skew
 
-__all__ = ["BodyInertia", "MatrixInertia", "SpecialInertia", "body_inertia", "coefficients", "skew"]
+__all__ = ["BodyInertia", "MatrixInertia", "SpecialInertia", "body_inertia"]
 
 Array = NDArray[np.float64]
-
-
-def skew(vector: Any, n: int) -> Array:
-    """Return Σ c_ij E_i∧E_j of coefficients (..., n(n−1)/2), shape (..., n, n)."""
-    matrix = np.zeros((*vector.shape[:-1], n, n))
-    rows, columns = np.triu_indices(n, 1)
-    matrix[..., rows, columns] = vector
-    matrix[..., columns, rows] = -vector
-    return matrix
-
-
-def coefficients(matrix: Array) -> Array:
-    """Return the coefficients of skew matrices (..., n, n) in the basis E_i∧E_j, shape (..., n(n−1)/2)."""
-    return np.asarray(matrix[(..., *np.triu_indices(matrix.shape[-1], 1))], dtype=np.float64)
 
 
 def _wedge(X: Any, transposed: Any, ops: Operations) -> Any:

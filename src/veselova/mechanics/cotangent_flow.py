@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.body_inertia import BodyInertia, coefficients, skew
+from veselova.mechanics.body_inertia import BodyInertia
 from veselova.mechanics.flow import FLOATS, Flow, Operations
+from veselova.mechanics.skew import coefficients, skew
 from veselova.mechanics.stiefel_geometry import (
     admissible_part,
     cotangent,

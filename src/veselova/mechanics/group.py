@@ -14,6 +14,7 @@ from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_number, read_only, whole_number
 from veselova.mechanics.flow import FLOATS, Operations
 from veselova.mechanics.group_projection import GroupProjection
+from veselova.mechanics.skew import skew
 from veselova.mechanics.sphere import INPUT_TOLERANCE
 
 __all__ = ["LARGEST", "MatrixGroup"]
@@ -60,11 +61,8 @@ class MatrixGroup:
     def so(cls, n: int) -> MatrixGroup:
         """Return SO(n), n ≥ 2, with the basis E_i∧E_j, i < j, in lexicographic order."""
         size = whole_number(n, ("n",), 2, LARGEST)
-        rows, columns = np.triu_indices(size, 1)
-        basis, index = np.zeros((rows.size, size, size)), np.arange(rows.size)
-        basis[index, rows, columns], basis[index, columns, rows] = 1.0, -1.0
         group = cls.__new__(cls)
-        group._become(basis, 1.0, full=True)
+        group._become(skew(np.eye(size * (size - 1) // 2), size), 1.0, full=True)
         return group
 
     @classmethod
@@ -194,9 +192,9 @@ class MatrixGroup:
         x = self.coordinates((unit - unit.T) / 2)
         distance = float(np.max(np.abs(self.element(x) - unit)))
         if distance > INPUT_TOLERANCE:
-            skew = float(np.max(np.abs(unit + unit.T)))
-            kind = "a skew matrix" if self._full or skew > INPUT_TOLERANCE else "a matrix of the group's Lie algebra"
-            defect = skew if kind == "a skew matrix" else distance
+            symmetric = float(np.max(np.abs(unit + unit.T)))
+            kind = "a skew matrix" if self._full or symmetric > INPUT_TOLERANCE else "a matrix of the group's Lie algebra"
+            defect = symmetric if kind == "a skew matrix" else distance
             raise InvalidInput(path, f"{kind} to 1e-9 of its largest entry", f"one that is off by {defect:.3g} of it")
         return np.asarray(largest * x, dtype=np.float64)
 

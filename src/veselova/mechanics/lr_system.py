@@ -19,6 +19,7 @@ from veselova.mechanics.inertia import Inertia
 from veselova.mechanics.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, jacobi_integral, multipliers_of
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.sphere import INPUT_TOLERANCE
+from veselova.mechanics.stiefel_geometry import trace_integrals
 
 __all__ = ["LRSystem"]
 
@@ -255,15 +256,8 @@ class LRSystem(Problem):
         return {**found, "group": self.distribution.group.defect(g)}
 
     def _traces(self, g: Array, omega: Array) -> Array:
-        """Return the even coefficients of tr(𝓜 + λΓ)^k; those of odd powers of the skew 𝓜 vanish."""
+        """Return the coefficients of tr(𝓜/s + λΓ)^k."""
         start = self.distribution.momentum(self.inertia, self.g, self.omega)
         size = float(np.max(np.abs(start))) or 1.0
         M = self.distribution.group.element(self.distribution.momentum(self.inertia, g, omega) / size)
-        rows = g[..., : self.rank, :]
-        Gamma, one = np.swapaxes(rows, -1, -2) @ rows, np.broadcast_to(np.eye(self.n), M.shape)
-        power, found = [one], []
-        for k in range(1, self.n + 1):  # power[j] is the coefficient with j factors 𝓜 and k − j factors Γ
-            zero = np.zeros_like(M)
-            power = [(power[j - 1] @ M if j else zero) + (power[j] @ Gamma if j < k else zero) for j in range(k + 1)]
-            found += [np.trace(power[j], axis1=-2, axis2=-1) for j in range(2, k + 1, 2)]
-        return np.stack(found, axis=-1)
+        return trace_integrals(np.swapaxes(g[..., : self.rank, :], -1, -2), M)
