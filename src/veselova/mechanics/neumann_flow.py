@@ -12,7 +12,7 @@ from veselova.mechanics.flow import Operations, PointFlow
 from veselova.mechanics.integrals import neumann_velocity
 from veselova.mechanics.natural_frame import orthonormalized
 
-__all__ = ["GaussFlow", "NeumannFlow", "moved"]
+__all__ = ["GaussFlow", "NeumannFlow"]
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,8 @@ class NeumannFlow(PointFlow):
 
     def neighbour(self, distance: float) -> NeumannFlow:
         """Return the flow of a start moved by about ``distance``."""
-        moved_state = moved(self.initial, distance, self.n)
-        return replace(self, initial=np.concatenate(_flat(_on_sphere(moved_state, self.n))))
+        moved = _on_sphere(_moved(self.initial, distance, self.n), self.n)
+        return replace(self, initial=np.concatenate(_flat(moved)))
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return the frame and q_dot = dq/dτ₁ along the principal axes."""
@@ -75,10 +75,11 @@ class GaussFlow(PointFlow):
         return np.concatenate([*_flat((v, E)), state[-1:]])
 
     def neighbour(self, distance: float) -> GaussFlow:
-        """Return the flow of a start moved by about ``distance``, with the √J that belongs to it."""
-        initial = self.project(np.append(moved(self.initial[:-1], distance, self.n), 0.0))
-        change = 1 + distance * (0.5 if self.n % 2 else -0.5)
-        return replace(self, initial=initial, parameters=np.append(self.parameters[:-1], self.parameters[-1] * change))
+        """Return the flow of a start moved by about ``distance``, and √J, a datum of its own here, by half of it."""
+        initial = self.project(np.append(_moved(self.initial[:-1], distance, self.n), 0.0))
+        side = 1 if self.n % 2 else -1  # either would do, and not always the same one
+        root_J = self.parameters[-1] * (1 + side * distance / 2)
+        return replace(self, initial=initial, parameters=np.append(self.parameters[:-1], root_J))
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return frame and tau1."""
@@ -96,7 +97,7 @@ def _neumann_field(state: Any, inverse: Any, ops: Operations) -> Any:
     return np.concatenate([multiplier * q - inverse * q, turned.ravel()])
 
 
-def moved(state: Array, distance: float, n: int) -> Array:
+def _moved(state: Array, distance: float, n: int) -> Array:
     """Return a state (a vector, then a frame) whose vector and first column are moved by about ``distance``."""
     direction = np.random.default_rng(n).normal(size=(2, n)) / np.sqrt(n)
     size = max(float(np.linalg.norm(state[:n])), 1.0)

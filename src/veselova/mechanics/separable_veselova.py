@@ -75,10 +75,10 @@ class SeparableVeselova(Problem):
             if beta and not exact.q[i]:
                 raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", shown(beta))
         self._set(A=to_float(diagonal), q=unit(position), q_dot=to_float(exact.tangent), exact=exact, potential=parts)
-        for name, largest in (("potential", _LARGEST), ("q_dot", _LARGEST)):
-            values = [*parts[:2], *parts[2]] if name == "potential" else list(exact.tangent)
-            if any(abs(x) > largest for x in values):
-                raise InvalidInput((name,), f"numbers up to {float(largest):.0e}", f"{float(max(map(abs, values))):.3g}")
+        for name, values in {"potential": (*parts[:2], *parts[2]), "q_dot": exact.tangent}.items():
+            largest = max(abs(x) for x in values)
+            if largest > _LARGEST:
+                raise InvalidInput((name,), f"numbers up to {float(_LARGEST):.0e}", f"{float(largest):.3g}")
         if not np.isfinite(self.energy):
             raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
         self._set(given=stated(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
