@@ -274,6 +274,14 @@ def test_collisions_with_a_singular_potential_are_named(formulation: str, method
     assert trajectory.drift["energy"] < DRIFT
 
 
+def test_a_collision_is_named_where_other_entries_of_the_potential_start_at_zero() -> None:
+    potential = monomial([1, 1, -2], [1, 2, 2], coefficient=-0.1)
+    system = LRSystem(3, 2, {"special": [1, 2, 3]}, None, [[0, 1, 0.1], [-1, 0, 0], [-0.1, 0, 0]], potential)
+    for formulation in LRSystem.formulations:
+        with pytest.raises(Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.08041,"):
+            solve(system, [5.0], formulation=formulation)
+
+
 def test_momentum_is_kept_along_what_leaves_the_potential_alone(rng: np.random.Generator) -> None:
     """Noether: v(g) = c g_11 is constant under rotations of space about E_1, of which E_2∧E_3 lies in 𝔡 for r = 2 and n = 3."""
     system = random_lr(rng, 3, 2, potential=monomial([1, 1, 1], coefficient=0.3))
