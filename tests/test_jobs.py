@@ -15,10 +15,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx2
+import pyarrow.ipc
 import pytest
 from pyarrow import parquet
 
+import veselova
 from conftest import Server, free_port, running_server
 from test_http import is_problem, post
 
@@ -32,6 +35,8 @@ LONG = {
     "times": {"start": 0, "stop": 9, "count": 1000},
     "outputs": ["q"],
 }
+
+BASE_FIELDS = ("problem", "vary")
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +116,55 @@ def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
     assert post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"] == first.headers["location"]
     other = post(jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"})
     assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
+
+
+def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
+    link = post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [2, 3.5]}}).headers["location"]
+    wait_for(jobs_server, link, finished)
+    expected = table(jobs_server, link)
+    url = f"{jobs_server.url}{link}/result"
+    csv = httpx2.get(url, headers={"accept": "text/csv"})
+    assert csv.headers["content-type"].startswith("text/csv")
+    assert csv.text.splitlines()[0].startswith('"row","A.0"')
+    assert len(csv.text.splitlines()) == 3
+    arrow = httpx2.get(url, headers={"accept": "application/vnd.apache.arrow.stream"})
+    assert pyarrow.ipc.open_stream(arrow.content).read_all().to_pylist() == expected
+    is_problem(httpx2.get(url, headers={"accept": "image/png"}), 406, "not-acceptable")
+
+
+def test_the_client_sweeps_as_the_library_does(jobs_server: Server, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"samples": 2, "seed": 3, "times": [0, 1], "outputs": ["q"], "trajectories": True}
+    said: list[tuple[int, int]] = []
+    expected = veselova.sweep(BASE, {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}, folder=tmp_path, **options)
+    with veselova.Client(jobs_server.url) as client:
+        job = client.sweep(BASE, {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}, **options)
+        assert job.dataset(progress=lambda done, total: said.append((done, total))).identical(expected)
+        assert said[-1] == (4, 4)
+        assert client.job(job.id).status()["state"] == "finished"
+        job.download(tmp_path / "table.parquet")
+        assert parquet.read_table(tmp_path / "table.parquet").num_rows == 4
+        job.remove()
+        with pytest.raises(veselova.ProblemResponse, match="There is no job"):
+            job.status()
+        with pytest.raises(veselova.InvalidRequest, match=r"vary\./B"):
+            client.sweep(BASE, {"/B": [1]})
+
+
+def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
+    async def ask() -> tuple[Any, Any]:
+        async with veselova.AsyncClient(jobs_server.url) as client:
+            job = await client.sweep(
+                LONG["problem"], LONG["vary"], **{k: v for k, v in LONG.items() if k not in BASE_FIELDS}, seed=5
+            )
+            document = await job.cancel()
+            with pytest.raises(veselova.ServiceError, match="is cancelled"):
+                await job.wait()
+            other = await client.sweep(BASE, {"/A/0": [2, 3]})
+            return document, await other.dataset()
+
+    document, dataset = anyio.run(ask)
+    assert document["state"] == "cancelled"
+    assert dataset.outcome.values.tolist() == ["solved", "solved"]
 
 
 def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:

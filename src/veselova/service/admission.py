@@ -102,10 +102,6 @@ def admit(request: TorusRequest, settings: Settings) -> None:
         )
     if request.budget_s > settings.max_budget_s:
         raise InvalidInput(("budget_s",), f"at most {settings.max_budget_s:g} on this server", f"{request.budget_s:g}")
-    if not isinstance(request, ComparisonRequest):
-        return
-    if request.digits > settings.max_digits:
-        raise InvalidInput(("digits",), f"at most {settings.max_digits} on this server", str(request.digits))
     count = request.time_count()
     if count > settings.max_times:
         raise InvalidInput(("times",), f"at most {settings.max_times} times on this server", str(count)[:30])
@@ -113,4 +109,7 @@ def admit(request: TorusRequest, settings: Settings) -> None:
         raise InvalidInput(
             ("times",), f"at most {settings.max_values} frame entries (times × n²) on this server", str(count * n * n)
         )
-    require_hope(request, settings)
+    if isinstance(request, ComparisonRequest):
+        if request.digits > settings.max_digits:
+            raise InvalidInput(("digits",), f"at most {settings.max_digits} on this server", str(request.digits))
+        require_hope(request, settings)

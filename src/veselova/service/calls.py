@@ -32,11 +32,12 @@ class Call(Generic[T]):
     """
 
     path: str
-    body: Mapping[str, Any]
+    body: Mapping[str, Any] | None
     budget_s: float
     result: Callable[[Any], T]
     accept: str = "application/json"
     sink: Sink | None = None
+    method: str = "POST"
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:

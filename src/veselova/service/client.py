@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
+import anyio
 import httpx2 as httpx
 import orjson
 import stamina
 from anyio import to_thread
 
 from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
+from veselova.mechanics.problem import Problem
 from veselova.service.calls import Call, compare_call, download_call, torus_call, trajectory_call
+from veselova.service.remote_job import Flow, Pause, RemoteJob, sweep_flow
 
 __all__ = ["AsyncClient", "Client"]
 
@@ -66,24 +70,28 @@ class _Core:
         self._attempts = attempts
         self._credentials = _credentials(os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key)
 
+    def job(self, job_id: str) -> RemoteJob:
+        """Return a job of the server by its id."""
+        return RemoteJob(self, job_id)  # type: ignore[arg-type]
+
     def _retries(self) -> Any:
         """Return a fresh retry context; one belongs to one call."""
         return stamina.retry_context(on=_pause_before_retry, attempts=self._attempts, timeout=None, wait_initial=0.2)
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
-        headers = {
-            "content-type": "application/json",
-            "accept": f"{call.accept}, application/problem+json;q=0.1",
-            **self._credentials,
-        }
+        headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
         timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
-        return {"method": "POST", "url": call.path, "content": orjson.dumps(call.body), "headers": headers, "timeout": timeout}
+        request = {"method": call.method, "url": call.path, "headers": headers, "timeout": timeout}
+        if call.body is not None:
+            headers["content-type"] = "application/json"
+            request["content"] = orjson.dumps(call.body)
+        return request
 
     def _result(self, call: Call[T], response: httpx.Response) -> T:
         """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
-        if response.status_code == httpx.codes.OK:
+        if response.is_success:
             try:
-                return call.result(orjson.loads(response.content) if call.sink is None else response.headers)
+                return call.result(orjson.loads(response.content or b"null") if call.sink is None else response.headers)
             except (ValueError, KeyError, TypeError):
                 raise ServiceError(f"{self._base_url}{call.path} answered with something else than a result") from None
         try:
@@ -163,6 +171,29 @@ class Client(_Core):
     compare = _method(compare_call)
     torus = _method(torus_call)
 
+    def run(self, flow: Flow) -> Any:
+        """Carry out a flow of calls and pauses, and return what it ends with."""
+        answer: Any = None
+        while True:
+            try:
+                step = flow.send(answer)
+            except StopIteration as end:
+                return end.value
+            if isinstance(step, Pause):
+                time.sleep(step.seconds)
+            else:
+                answer = self._send(step)
+
+    def sweep(
+        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+    ) -> RemoteJob:
+        """Begin a sweep and return its job; arguments as those of ``veselova.sweep`` that say what is asked for.
+
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end.
+        """
+        job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
+        return job
+
     def close(self) -> None:
         """Close the connections."""
         self._http.close()
@@ -225,6 +256,26 @@ class AsyncClient(_Core):
     download = _method(download_call)
     compare = _method(compare_call)
     torus = _method(torus_call)
+
+    async def run(self, flow: Flow) -> Any:
+        """Carry out a flow of calls and pauses, and return what it ends with."""
+        answer: Any = None
+        while True:
+            try:
+                step = flow.send(answer)
+            except StopIteration as end:
+                return end.value
+            if isinstance(step, Pause):
+                await anyio.sleep(step.seconds)
+            else:
+                answer = await self._send(step)
+
+    async def sweep(
+        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+    ) -> RemoteJob:
+        """Begin a sweep and return its job, whose methods are to be awaited (see ``Client.sweep``)."""
+        job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
+        return job
 
     async def close(self) -> None:
         """Close the connections."""

@@ -83,11 +83,17 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
             processes=processes,
             memory_limit=settings.sweep_worker_memory_mb * 1_000_000 if processes else 0,
             host="127.0.0.1" if processes else None,
-            dashboard_address=None,
+            # Dask serves pages of its own; they stay on this machine, at any free port.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            worker_dashboard_address="127.0.0.1:0",
             asynchronous=True,
             silence_logs=50,
         )
-        async with local as cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
+        try:
+            cluster = await local
+        except RuntimeError as error:
+            raise OSError(f"no workers could be started: {error}") from error
+        async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
             if processes:
                 await client.run(_stand_back)
             yield client

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import anyio
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.admission import admit, read_json, require_acceptable
 from veselova.service.job_document import JobDocument, job_document
 from veselova.service.job_service import JobService
+from veselova.service.negotiation import accepted_type
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
@@ -36,91 +38,128 @@ _BODY = {
 }
 _JOB: dict[int | str, dict[str, Any]] = {200: {"model": JobDocument, "description": "The job"}}
 _ACCEPTED: dict[int | str, dict[str, Any]] = {202: {"model": JobDocument, "description": "The job, at Location"}}
+_REMOVED: dict[int | str, dict[str, Any]] = {204: {"description": "The job is forgotten"}}
+
+#: Formats of a table: media type → how its file ends.
+_TABLES = {"application/vnd.apache.parquet": "parquet", "text/csv": "csv", "application/vnd.apache.arrow.stream": "arrow"}
+_TABLE: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {name: {"schema": {"type": "string", "format": "binary"}} for name in _TABLES}}
+}
+_ARCHIVE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Zarr store in one file",
+        "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 _Key = Annotated[str | None, Header(description="a request that comes again with its key never makes a second job")]
+_Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
 
 def job_router(settings: Settings, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
-    routes = APIRouter(tags=["sweeps"])
+    routes, jobs = APIRouter(tags=["sweeps"]), _JobRoutes(settings, service)
+    table: tuple[tuple[str, str, Any, str, dict[str, Any], dict[int | str, Any]], ...] = (
+        ("POST", "/v1/sweeps", jobs.sweep, "Solve many problems", {"status_code": 202, "openapi_extra": _BODY}, _ACCEPTED),
+        ("GET", "/v1/jobs", jobs.listed, "List the jobs, newest first", {}, {}),
+        ("GET", "/v1/jobs/{job_id}", jobs.job, "Tell how far a job is", {}, _JOB),
+        ("GET", "/v1/jobs/{job_id}/result", jobs.result, "Give the table of a finished job", {}, _TABLE),
+        ("GET", "/v1/jobs/{job_id}/trajectories", jobs.trajectories, "Give the trajectories that a job kept", {}, _ARCHIVE),
+        ("DELETE", "/v1/jobs/{job_id}", jobs.end, "Cancel a job, or remove it", {}, {**_JOB, **_REMOVED}),
+    )
+    for method, path, endpoint, summary, options, responses in table:
+        routes.add_api_route(path, endpoint, methods=[method], summary=summary, responses=responses, **options)
+    # The check comes before the stream: an event stream that has begun can no longer be refused.
+    routes.add_api_route(
+        "/v1/jobs/{job_id}/events",
+        jobs.events,
+        summary="Tell each time that a job moves on",
+        response_class=EventSourceResponse,
+        dependencies=[Depends(jobs.require)],
+    )
+    return routes
 
-    @routes.post("/v1/sweeps", status_code=202, summary="Solve many problems", openapi_extra=_BODY, responses=_ACCEPTED)
-    async def sweep(request: Request, idempotency_key: _Key = None) -> Response:
+
+class _JobRoutes:
+    """The endpoints, over one server's settings and jobs."""
+
+    def __init__(self, settings: Settings, service: JobService) -> None:
+        self._settings = settings
+        self._service = service
+
+    async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
+        """Make a job, or find the one that the same request made."""
         require_acceptable(request.headers.get("accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")
-        document = await read_json(request, settings)
+        document = await read_json(request, self._settings)
         asked = await anyio.to_thread.run_sync(read_request, SweepRequest, document)
-        admit(asked, settings)
-        job = await service.ask(lambda jobs: jobs.submit(asked, idempotency_key))
+        admit(asked, self._settings)
+        job = await self._service.ask(lambda jobs: jobs.submit(asked, idempotency_key))
         if not job.ended:
-            (await service.sweeps()).begin(job.id)
-        return _json(await _document(job.id, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
+            (await self._service.sweeps()).begin(job.id)
+        return _json(await self._document(job.id, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
 
-    @routes.get("/v1/jobs", summary="List the jobs, newest first")
-    async def listed() -> Response:
-        found = await service.ask(lambda jobs: jobs.newest())
-        return _json({"jobs": [await _document(job_id, whole=False) for job_id in found]})
+    async def listed(self) -> Response:
+        """List the last jobs."""
+        found = await self._service.ask(lambda jobs: jobs.newest())
+        return _json({"jobs": [await self._document(job_id, whole=False) for job_id in found]})
 
-    @routes.get("/v1/jobs/{job_id}", summary="Tell how far a job is", responses=_JOB)
-    async def job(job_id: str) -> Response:
-        return _json(await _document(job_id))
+    async def job(self, job_id: str) -> Response:
+        """Tell all of a job, its request included."""
+        return _json(await self._document(job_id))
 
-    async def known(job_id: str) -> None:
-        await service.ask(lambda jobs: jobs.get(job_id))
+    async def require(self, job_id: str) -> None:
+        """Raise Refused unless there is such a job."""
+        await self._service.ask(lambda jobs: jobs.get(job_id))
 
-    # The check comes before the stream: an event stream that has begun can no longer be refused.
-    @routes.get(
-        "/v1/jobs/{job_id}/events",
-        summary="Tell each time that a job moves on",
-        response_class=EventSourceResponse,
-        dependencies=[Depends(known)],
-    )
-    async def events(job_id: str) -> AsyncIterator[ServerSentEvent]:
+    async def events(self, job_id: str) -> AsyncIterator[ServerSentEvent]:
+        """Tell how far a job is until it has ended."""
         while True:
-            document = await _document(job_id, whole=False)
+            document = await self._document(job_id, whole=False)
             yield ServerSentEvent(data=document, event=document["state"])
             if document["finished_at"] is not None:
                 return
-            await (await service.sweeps()).changed(_REPEAT_S)
+            await (await self._service.sweeps()).changed(_REPEAT_S)
 
-    @routes.get("/v1/jobs/{job_id}/result", summary="Give the table of a finished job", response_class=FileResponse)
-    async def result(job_id: str) -> Response:
-        await _require_finished(job_id)
-        path = await service.ask(lambda jobs: jobs.result_path(job_id))
-        return FileResponse(path, media_type="application/vnd.apache.parquet", filename=f"{job_id}.parquet")
+    async def result(self, job_id: str, request: Request) -> Response:
+        """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
+        media_type = accepted_type(request.headers.get("accept"), list(_TABLES))
+        await self._require_finished(job_id)
+        path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
+        name = f"{job_id}.{_TABLES[media_type]}"
+        if media_type == "application/vnd.apache.parquet":
+            return FileResponse(path, media_type=media_type, filename=name)
+        from veselova.service.results import table_stream
 
-    @routes.get(
-        "/v1/jobs/{job_id}/trajectories", summary="Give the kept trajectories, Zarr in a zip", response_class=FileResponse
-    )
-    async def trajectories(job_id: str) -> Response:
-        await _require_finished(job_id)
-        path = await service.ask(lambda jobs: jobs.packed_path(job_id))
+        headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+        return StreamingResponse(table_stream(path, _TABLES[media_type]), media_type=media_type, headers=headers)
+
+    async def trajectories(self, job_id: str) -> Response:
+        """Give the Zarr store of a finished job in one file."""
+        await self._require_finished(job_id)
+        path: Path = await self._service.ask(lambda jobs: jobs.packed_path(job_id))
         if not path.is_file():
             raise Refused("no-such-resource", "The sweep did not ask for its trajectories to be kept, or none could be computed.")
         return FileResponse(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
 
-    @routes.delete("/v1/jobs/{job_id}", summary="Cancel a job, or remove it", responses={**_JOB, 204: {"description": "Removed"}})
-    async def end(
-        job_id: str, remove: Annotated[bool, Query(description="forget the job and its results, too")] = False
-    ) -> Response:
-        await known(job_id)
-        await (await service.sweeps()).cancel(job_id)
+    async def end(self, job_id: str, remove: _Remove = False) -> Response:
+        """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
+        await self.require(job_id)
+        await (await self._service.sweeps()).cancel(job_id)
         if not remove:
-            return _json(await _document(job_id))
-        await service.ask(lambda jobs: jobs.remove(job_id))
+            return _json(await self._document(job_id, whole=False))
+        await self._service.ask(lambda jobs: jobs.remove(job_id))
         return Response(status_code=204)
 
-    async def _document(job_id: str, whole: bool = True) -> dict[str, Any]:
-        found = await service.ask(lambda jobs: jobs.get(job_id))
-        return job_document(found, (await service.sweeps()).progress(job_id), whole)
+    async def _document(self, job_id: str, whole: bool = True) -> dict[str, Any]:
+        found = await self._service.ask(lambda jobs: jobs.get(job_id))
+        return job_document(found, (await self._service.sweeps()).progress(job_id), whole)
 
-    async def _require_finished(job_id: str) -> None:
-        found = await service.ask(lambda jobs: jobs.get(job_id))
+    async def _require_finished(self, job_id: str) -> None:
+        found = await self._service.ask(lambda jobs: jobs.get(job_id))
         if found.state != "finished":
             raise Refused("not-finished", f"The job is {found.state}; its result is there when it has finished.", retry_after=2)
-
-    return routes
 
 
 def _json(document: dict[str, Any], status: int = 200, headers: dict[str, str] | None = None) -> Response:

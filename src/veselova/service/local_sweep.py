@@ -8,19 +8,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
-from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
 from veselova.service.schemas import read_request
+from veselova.service.serving import settings_of_environment
 from veselova.service.settings import Settings
-from veselova.service.sweep_request import SweepRequest
+from veselova.service.sweep_request import SweepRequest, sweep_document
 
 if TYPE_CHECKING:
     from veselova.service.jobs import Job, Jobs
 
-__all__ = ["run_sweep", "sweep", "sweep_request"]
+__all__ = ["local_settings", "run_sweep", "sweep"]
 
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], None]
@@ -61,7 +59,7 @@ def sweep(
     from there. ``workers``: processes; all processors when left out. ``progress(done, total)`` is called a few times a second.
     Raises InvalidInput or InvalidRequest for bad input, BackendMissing without the extra ``sweeps``.
     """
-    asked = sweep_request(problem, vary, times)
+    asked = sweep_document(problem, vary, times)
     options: dict[str, Any] = {"samples": samples, "seed": seed, "engine": engine, "method": method, "formulation": formulation}
     options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
     request = read_request(SweepRequest, {**asked, **options})
@@ -73,21 +71,9 @@ def sweep(
     return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
 
 
-def sweep_request(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
-    """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
-    if not isinstance(problem, (Problem, Mapping)):
-        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", shown(problem))
-    if not isinstance(vary, Mapping):
-        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
-    stated = {place: plain(values) if isinstance(values, (np.ndarray, list, tuple)) else values for place, values in vary.items()}
-    if times is not None and not isinstance(times, Mapping):
-        times = plain(times)
-    return {"problem": problem.as_dict() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
-
-
 def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     """Return the settings of sweeps in this process; those of a server in the environment hold, but for the folder."""
-    settings = Settings()
+    settings = settings_of_environment()
     home = Path(folder) if folder is not None else settings.data_dir / "local"
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
     if workers is not None:

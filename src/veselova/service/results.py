@@ -13,7 +13,7 @@ from typing import Any
 from veselova.service.jobs import Job, Jobs
 from veselova.service.summaries import Chunk
 
-__all__ = ["Result"]
+__all__ = ["Result", "table_stream"]
 
 #: Rows of one row group: what a reader has in memory at a time. It does not depend on the chunks of the computation.
 _GROUP_ROWS = 65_536
@@ -59,6 +59,29 @@ class Result:
         store = self._jobs.trajectories_path(self._job.id)
         if store.is_dir():
             _pack(store, self._jobs.packed_path(self._job.id))
+
+
+def table_stream(path: Path, form: str) -> Iterator[bytes]:
+    """Yield the table of a finished job as ``csv`` or as an ``arrow`` stream, a group of rows at a time."""
+    import pyarrow as pa
+    from pyarrow import csv, ipc, parquet
+
+    buffer = io.BytesIO()
+    with parquet.ParquetFile(path) as file:
+        writer = (csv.CSVWriter if form == "csv" else ipc.new_stream)(buffer, file.schema_arrow)
+        with writer:
+            for batch in file.iter_batches(_GROUP_ROWS):
+                writer.write(pa.Table.from_batches([batch]))
+                yield _taken(buffer)
+    yield _taken(buffer)
+
+
+def _taken(buffer: io.BytesIO) -> bytes:
+    """Return what was written since the last time."""
+    content = buffer.getvalue()
+    buffer.seek(0)
+    buffer.truncate()
+    return content
 
 
 def _joined(parts: list[Chunk]) -> bytes:

@@ -44,6 +44,10 @@ class TorusRequest(Request):
         """Return what is wrong with the request for the system that it asks of."""
         return []
 
+    def time_count(self) -> int:
+        """Return how many times are asked for, without building them."""
+        return 0
+
 
 class ComparisonRequest(TorusRequest):
     """A motion asked of both engines."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -12,7 +12,9 @@ import numpy as np
 import orjson
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.mechanics.errors import InvalidInput, VeselovaError
+from veselova.mechanics.errors import InvalidInput, VeselovaError, shown
+from veselova.mechanics.exact import plain
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.service.examples import BODY4_PROBLEM
 from veselova.service.parameters import Axis, Draw, Parameter, Path, components, parameters, replaced, tabulated
@@ -20,7 +22,7 @@ from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_reque
 from veselova.service.systems import SYSTEMS, Times
 from veselova.version import __version__
 
-__all__ = ["SweepRequest"]
+__all__ = ["SweepRequest", "sweep_document"]
 
 _NUMBER = {"type": "number"}
 _PAIR = {"type": "array", "items": {"anyOf": [_NUMBER, {"type": "string"}]}, "minItems": 2, "maxItems": 2}
@@ -200,3 +202,15 @@ class SweepRequest(TorusRequest):
     def id(self) -> str:
         """Return the hash of the request and the version of the engines."""
         return hashlib.sha256(self.canonical + __version__.encode()).hexdigest()[:32]
+
+
+def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
+    """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
+    if not isinstance(problem, (Problem, Mapping)):
+        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", shown(problem))
+    if not isinstance(vary, Mapping):
+        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
+    stated = {place: plain(values) if isinstance(values, (np.ndarray, list, tuple)) else values for place, values in vary.items()}
+    if times is not None and not isinstance(times, Mapping):
+        times = plain(times)
+    return {"problem": problem.as_dict() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
