@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -108,6 +109,18 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
     # The same request is the same job, finished already.
     again = post(jobs_server, "/v1/sweeps", body)
     assert (again.headers["location"], again.json()["state"]) == (link, "finished")
+
+
+def test_a_job_whose_files_are_gone_is_run_again(jobs_server: Server) -> None:
+    body = {"problem": BASE, "vary": {"/A/0": [2.25]}}
+    link = post(jobs_server, "/v1/sweeps", body).headers["location"]
+    wait_for(jobs_server, link, finished)
+    expected = table(jobs_server, link)
+    shutil.rmtree(jobs_server.log.parent / "data" / "jobs" / link.rsplit("/", 1)[1])
+    is_problem(httpx2.get(f"{jobs_server.url}{link}/result"), 404, "no-such-resource")
+    assert post(jobs_server, "/v1/sweeps", body).json()["state"] == "queued"
+    wait_for(jobs_server, link, finished)
+    assert table(jobs_server, link) == expected
 
 
 def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:

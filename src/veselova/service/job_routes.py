@@ -126,7 +126,9 @@ class _JobRoutes:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
         media_type = accepted_type(request.headers.get("accept"), list(_TABLES))
         await self._require_finished(job_id)
-        path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
+        path: Path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
+        if not path.is_file():
+            raise Refused("no-such-resource", "The files of this job are gone; POST its request again.")
         name = f"{job_id}.{_TABLES[media_type]}"
         if media_type == "application/vnd.apache.parquet":
             return FileResponse(path, media_type=media_type, filename=name)

@@ -78,7 +78,8 @@ class Jobs:
         self._engine.dispose()
 
     def submit(self, sweep: SweepRequest, key: str | None = None) -> Job:
-        """Return the job of a sweep: a new one, or the one that the same request made, which goes on if it had been stopped.
+        """Return the job of a sweep: a new one, or the one that the same request made, which goes on if it had been stopped,
+        and is run again if its results were lost.
 
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or beyond the limits of the settings,
         Refused (``too-many-jobs``, ``storage-full``) while others take the room.
@@ -90,7 +91,7 @@ class Jobs:
             if state is None:
                 self._admit(connection, sweep)
                 connection.execute(sa.insert(jobs).values(_new(sweep)))
-            elif state in ("failed", "cancelled"):
+            elif state in ("failed", "cancelled") or (state == "finished" and not self.result_path(sweep.id).exists()):
                 again = {"state": "queued", "detail": "", "finished_at": None}
                 connection.execute(sa.update(jobs).where(jobs.c.id == sweep.id).values(again))
             if key is not None and not _job_of(connection, key):

@@ -6,6 +6,7 @@ import io
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from veselova.mechanics.trajectory import Trajectory
 from veselova.service.parameters import components
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
 from veselova.service.sweep_request import SweepRequest
-from veselova.service.tasks import requested_trajectory
+from veselova.service.tasks import requested_trajectory, warm_up
 from veselova.service.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
@@ -54,9 +55,16 @@ def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk
     """
     if version != __version__:
         raise RuntimeError(f"a worker runs veselova {__version__}, the server {version}")
+    _warm_up()
     sweep = read_request(SweepRequest, orjson.loads(request))
     answers = [_answer(sweep, row) for row in range(start, stop)]
     return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
+
+
+@cache
+def _warm_up() -> None:
+    """Load and run both engines once in this process, so that the budget of its first problem is spent on the problem."""
+    warm_up()
 
 
 def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
