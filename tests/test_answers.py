@@ -36,6 +36,10 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
+def get(address: str, **headers: str) -> httpx2.Response:
+    return httpx2.get(address, headers=headers, timeout=60)
+
+
 def columns(kind: str, content: bytes) -> dict[str, Any]:
     """Return what a body holds, by the names of the flat table where it is one."""
     if kind == "json":
@@ -169,19 +173,19 @@ def test_a_trajectory_is_kept_at_its_own_address_in_every_format(own: Server) ->
     assert "cache-status" not in made.headers
     expected = solve(PROBLEM, [0, 3, 4])
     for kind, media_type in TYPES.items():
-        kept = httpx2.get(address, headers={"accept": media_type})
+        kept = get(address, accept=media_type)
         assert kept.status_code == 200
         assert kept.headers["cache-control"] == "private, max-age=31536000, immutable"
         assert kept.headers["cache-status"] == "veselova; hit"
         assert kept.headers["veselova-provenance"] == made.headers["veselova-provenance"]
         found = columns(kind, kept.content)
         assert np.array_equal(found["frame" if kind in ("json", "npz") else "frame_1_1"].__getitem__(-1), _last(expected, kind))
-        unchanged = httpx2.get(address, headers={"accept": media_type, "if-none-match": kept.headers["etag"]})
+        unchanged = get(address, **{"accept": media_type, "if-none-match": kept.headers["etag"]})
         assert (unchanged.status_code, unchanged.content) == (304, b"")
         assert unchanged.headers["etag"] == kept.headers["etag"]
-        head = httpx2.head(address, headers={"accept": media_type})
+        head = httpx2.head(address, headers={"accept": media_type}, timeout=60)
         assert (head.status_code, head.content, head.headers["etag"]) == (200, b"", kept.headers["etag"])
-    assert httpx2.get(address).json() == made.json()
+    assert get(address).json() == made.json()
     again = post(own, "/v1/trajectories", body)
     assert again.headers["cache-status"] == "veselova; hit"
     assert again.content == made.content
@@ -201,7 +205,7 @@ def test_a_post_of_what_the_client_has_is_answered_with_412(own: Server) -> None
 
 @pytest.mark.parametrize("name", ["0" * 64, "0", "..%2f..%2fetc%2fpasswd", "A" * 64])
 def test_what_is_not_kept_is_a_404_problem(own: Server, name: str) -> None:
-    response = httpx2.get(f"{own.url}/v1/trajectories/{name}")
+    response = get(f"{own.url}/v1/trajectories/{name}")
     is_problem(response, 404, "not-found" if "%2f" in name else "no-such-answer")
 
 
@@ -217,7 +221,7 @@ def test_a_damaged_entry_is_removed_and_computed_again(tmp_path: Path, damage: s
         content = bytearray(path.read_bytes())
         content[len(content) // 3] ^= 0xFF
         path.write_bytes({"flipped": bytes(content), "truncated": bytes(content[:-100]), "emptied": b""}[damage])
-        is_problem(httpx2.get(f"{own.url}{made.headers['content-location']}"), 404, "no-such-answer")
+        is_problem(get(f"{own.url}{made.headers['content-location']}"), 404, "no-such-answer")
         assert not kept_files(tmp_path)
         assert "is damaged and was removed" in own.log.read_text()
         again = post(own, "/v1/trajectories", GOOD)
@@ -233,7 +237,7 @@ def test_servers_share_what_they_keep(tmp_path: Path) -> None:
     with running_server(tmp_path / "one", workers="1", data_dir=shared) as one:
         made = post(one, "/v1/trajectories", GOOD)
         with running_server(tmp_path / "two", workers="1", data_dir=shared) as two:
-            assert httpx2.get(f"{two.url}{made.headers['content-location']}").content == made.content
+            assert get(f"{two.url}{made.headers['content-location']}").content == made.content
 
 
 @pytest.mark.parametrize("obstacle", ["a file in its place", "a folder that is too small", "no size at all"])
