@@ -82,15 +82,18 @@ def test_the_slack_of_estimates_is_a_setting() -> None:
         ({"max_budget_s": "5"}, {**GOOD, "budget_s": 6}, "/budget_s"),
     ],
 )
-def test_every_limit_is_a_setting(limit: dict[str, str], body: dict[str, Any], pointer: str, monkeypatch: Any) -> None:
+def test_every_limit_is_a_setting(
+    limit: dict[str, str], body: dict[str, Any], pointer: str, monkeypatch: Any, tmp_path: Path
+) -> None:
     from fastapi.testclient import TestClient
 
     from veselova.service.app import create_app
 
     ((name, value),) = limit.items()
     monkeypatch.setenv(f"VESELOVA_{name.upper()}", value)
+    monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path))
     # Without its lifespan the application has no worker: what is refused is refused before one is needed.
-    response = TestClient(create_app()).post("/v1/trajectories", json=body)
+    response = TestClient(create_app(loopback=True)).post("/v1/trajectories", json=body)
     document = is_problem(response, 422, "invalid-input")  # type: ignore[arg-type]
     assert document["errors"][0]["pointer"] == pointer
     assert value in document["detail"]
