@@ -169,7 +169,8 @@ def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: 
 
 def test_what_is_counted_is_what_was_asked(own: Server) -> None:
     before = numbers(own)
-    post(own, "/v1/trajectories", GOOD)
+    for _ in range(2):  # the second is answered from the cache
+        post(own, "/v1/trajectories", {**GOOD, "times": [0, 0.4711]})
     post(own, "/v1/trajectories", {**GOOD, "times": [1e40]})
     post(own, "/v1/tori", {"problem": GOOD["problem"]})
     post(own, "/v1/tori", b"{", accept="text/html")
@@ -182,7 +183,9 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
     assert grown[("veselova_work_seconds_count", "analytic", "trajectory")] == 2
     assert 0 < grown[("veselova_work_seconds_sum", "analytic", "trajectory")] < 20
     assert grown[("veselova_refusals_total", "not-acceptable")] == 1
-    assert grown[("http_requests_total", "/v1/trajectories", "POST", "200")] == 1
+    assert grown[("veselova_cache_total", "hit")] == 1
+    assert grown[("veselova_cache_total", "miss")] == 2
+    assert grown[("http_requests_total", "/v1/trajectories", "POST", "200")] == 2
     assert grown[("http_requests_total", "/v1/trajectories", "POST", "422")] == 1
     assert grown[("http_requests_total", "none", "GET", "404")] == 1  # whatever the path
     assert grown[("http_request_duration_seconds_count", "/v1/tori", "POST")] == 2
