@@ -33,6 +33,14 @@ CHECKS = [
         ("/v1/trajectories/{name}", "GET"),
         ("/v1/comparisons", "POST"),
         ("/v1/tori", "POST"),
+        ("/v1/sweeps", "POST"),
+        ("/v1/jobs", "GET"),
+        ("/v1/jobs/{job_id}", "GET"),
+        ("/v1/jobs/{job_id}", "DELETE"),
+        ("/v1/jobs/{job_id}/result", "GET"),
+        ("/v1/jobs/{job_id}/trajectories", "GET"),
+        ("/v1/systems", "GET"),
+        ("/readyz", "GET"),
     ],
 )
 def test_answers_are_what_the_document_says(server: Server, path: str, method: str) -> None:

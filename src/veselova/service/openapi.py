@@ -144,6 +144,17 @@ _REFUSALS = {
 _PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
 _KEPT_REFUSALS = {404: "Not kept, or not any more", **{status: _REFUSALS[status] for status in (406, 500, 503, 504, 507)}}
 
+#: Refusals of the resources of jobs, and of those that every other path has.
+_JOB_REFUSALS = {
+    **{status: _REFUSALS[status] for status in (401, 422, 429, 500, 501)},
+    404: "No such job",
+    406: "No acceptable representation",
+    409: "The job has not finished",
+    503: "Jobs cannot be stored or read at present; see Retry-After",
+}
+_SWEEP_REFUSALS = {status: _REFUSALS[status] for status in (400, 401, 406, 413, 415, 422, 429, 500, 501, 503, 507)}
+_COMMON_REFUSALS = {status: _REFUSALS[status] for status in (401, 429, 500, 503)}
+
 _TEXT = {"schema": {"type": "string"}}
 #: Header fields of a trajectory, in every format.
 _FIELDS: dict[str, dict[str, Any]] = {
@@ -183,11 +194,21 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         schemas.update(definitions["$defs"], **_ANSWERS)
         for path, (kind, _, content) in RESOURCES.items():
             _describe(document["paths"][path]["post"], kind, content)
+        for path, operations in document["paths"].items():
+            for operation in operations.values():
+                if path not in RESOURCES:
+                    _refuse(operation, _refusals(path))
         document["paths"][KEPT] = {"get": _kept(), "head": _kept_head()}
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
         app.openapi_schema = document
     return app.openapi_schema
+
+
+def _refusals(path: str) -> dict[int, str]:
+    if path == "/v1/sweeps":
+        return _SWEEP_REFUSALS
+    return _JOB_REFUSALS if path.startswith("/v1/jobs") else _COMMON_REFUSALS
 
 
 def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
