@@ -42,12 +42,12 @@ class Server:
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
         return [int(child) for child in children]
 
-    def wait_ready(self) -> None:
-        """Wait until a worker is warm."""
+    def wait_ready(self, path: str = "/readyz") -> None:
+        """Wait until a worker is warm and all parts are there, or by another path for less."""
         deadline = time.monotonic() + 60
         while time.monotonic() < deadline:
             try:
-                if httpx2.get(f"{self.url}/readyz").status_code == 200:
+                if httpx2.get(f"{self.url}{path}").status_code == 200:
                     return
             except httpx2.TransportError:
                 pass
@@ -64,8 +64,8 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_server(folder: Path, *arguments: str, **limits: str) -> Iterator[Server]:
-    """Run a server with arguments of its command and settings from the environment, and end it."""
+def running_server(folder: Path, *arguments: str, awaited: str = "/readyz", **limits: str) -> Iterator[Server]:
+    """Run a server with arguments of its command and settings from the environment, once it answers at a path, and end it."""
     port = free_port()
     limits.setdefault("data_dir", str(folder / "data"))
     environment = {**os.environ, **{f"VESELOVA_{name.upper()}": value for name, value in limits.items()}}
@@ -75,7 +75,7 @@ def running_server(folder: Path, *arguments: str, **limits: str) -> Iterator[Ser
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
-            server.wait_ready()
+            server.wait_ready(awaited)
             yield server
         finally:
             if process.poll() is None:

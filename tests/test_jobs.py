@@ -251,7 +251,8 @@ def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undistur
 
 def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
-    with running_server(tmp_path, data_dir=str(tmp_path / "file")) as server:
+    with running_server(tmp_path, awaited="/healthz", data_dir=str(tmp_path / "file")) as server:
+        assert "Jobs cannot be stored" in is_problem(httpx2.get(f"{server.url}/readyz"), 503, "not-ready")["detail"]
         assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
         refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
         assert "Jobs cannot be stored at present" in is_problem(refused, 503, "storage-unavailable")["detail"]

@@ -27,9 +27,9 @@ from veselova.mechanics.stiefel_geometry import (
     tangent_part,
     trace_integrals,
 )
-from veselova.service.documents import trajectory_of
+from veselova.service.documents import encoded, trajectory_of
 from veselova.service.systems import SYSTEMS
-from veselova.service.tasks import answer
+from veselova.service.tasks import TASKS
 
 RANKS = [(n, r) for n in range(2, 6) for r in range(1, n + 1)]
 SLACK = 2.0
@@ -281,7 +281,8 @@ def test_the_json_of_a_problem_gives_the_problem_back(rng: np.random.Generator) 
 def test_the_service_answers_and_its_answer_is_the_trajectory() -> None:
     problem = {"system": "stiefel", "inertia": A, "X": X, "P": P}
     request = {"problem": problem, "times": [0, 1.5], "outputs": ["X", "P", "omega"], "formulation": "momentum"}
-    document = json.loads(answer("trajectory", request))
+    model, compute = TASKS["trajectory"]
+    document = json.loads(encoded(compute(model.model_validate(request))))
     direct = solve(StiefelFlow(A, X, P), [0, 1.5], formulation="momentum")
     again = trajectory_of(StiefelFlow(A, X, P), document)
     for name in ("X", "P", "omega"):

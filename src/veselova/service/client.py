@@ -187,9 +187,9 @@ class Client(_Core):
     def sweep(
         self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
     ) -> RemoteJob:
-        """Begin a sweep and return its job; arguments as those of ``veselova.sweep`` that say what is asked for.
+        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
 
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end.
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
         """
         job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
         return job
@@ -273,7 +273,10 @@ class AsyncClient(_Core):
     async def sweep(
         self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
     ) -> RemoteJob:
-        """Begin a sweep and return its job, whose methods are to be awaited (see ``Client.sweep``)."""
+        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
+
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
+        """
         job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
         return job
 

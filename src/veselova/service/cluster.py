@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -56,6 +57,8 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
     except ImportError:
         raise BackendMissing("distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
 
+    # Every start and stop of a worker would be told; what goes wrong comes back as an exception, or as a lost chunk.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if settings.dask_scheduler:
         files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
         ca, cert, key = (None if path is None else str(path) for path in files)
@@ -87,7 +90,7 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             worker_dashboard_address="127.0.0.1:0",
             asynchronous=True,
-            silence_logs=50,
+            silence_logs=logging.CRITICAL,
         )
         try:
             cluster = await local
