@@ -25,14 +25,16 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_python_of_the_readme_runs(server: Server) -> None:
+def test_the_python_of_the_readme_runs(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     scope: dict[str, Any] = {}
     sources = blocks(README, "python")
-    assert len(sources) == 4
+    assert len(sources) == 5
     for source in sources:
         exec(source.replace("http://127.0.0.1:8000", server.url), scope)
     assert scope["comparison"].agrees
     assert scope["torus"].n == 4
+    assert (scope["dataset"].outcome == "solved").all()
     assert scope["certified"].certified
     assert scope["geodesic"].quadrics.shape == (1,)
     assert scope["body"].system == "veselova-so3"
@@ -40,12 +42,13 @@ def test_the_python_of_the_readme_runs(server: Server) -> None:
 
 def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
+    environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     commands = next(block for block in blocks(README, "sh") if "veselova demo" in block).splitlines()
     assert commands[-1] == "veselova serve"
     for command in commands[:-1]:
         words = shlex.split(command)
         assert words[0] == "veselova"
-        answer = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=120)
+        answer = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=120, env=environment)
         assert answer.returncode == 0, answer.stderr
     assert (tmp_path / "motion.png").exists()
     assert (tmp_path / "motion.csv").exists()

@@ -17,9 +17,6 @@ __all__ = ["open_cluster", "require_scheduler"]
 #: Seconds for a connection to the scheduler, and for the first worker to come up.
 _CONNECT_S = 30
 
-#: Interactive requests go before sweeps where both want the processors.
-_NICENESS = 10
-
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -44,9 +41,10 @@ def require_scheduler(settings: Settings) -> None:
 
 
 @asynccontextmanager
-async def open_cluster(settings: Settings, processes: bool = True) -> AsyncIterator[Any]:
+async def open_cluster(settings: Settings, processes: bool = True, niceness: int = 0) -> AsyncIterator[Any]:
     """Give a Dask client in the running event loop; ``processes=False`` computes in threads of this process.
 
+    ``niceness``: how far the processes of this machine stand back behind others.
     Raises InvalidInput for an address that is refused, OSError where the scheduler cannot be reached.
     """
     require_scheduler(settings)
@@ -68,6 +66,7 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
         ) as client:
             yield client
         return
+    niceness = niceness if processes and hasattr(os, "setpriority") else 0
     quiet = {
         # A worker at its limit is ended. Paused, as Dask would have it before that, it would never go on.
         "distributed.worker.memory.target": False,
@@ -77,6 +76,8 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
         "distributed.comm.timeouts.connect": _CONNECT_S,
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.worker.profile.enabled": False,
+        # A worker that replaces another is started in the same way.
+        "distributed.worker.preload": [f"import os\nos.setpriority(os.PRIO_PROCESS, 0, {niceness})"] if niceness else [],
         "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
     }
     with dask.config.set(quiet):
@@ -97,10 +98,4 @@ async def open_cluster(settings: Settings, processes: bool = True) -> AsyncItera
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error
         async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
-            if processes:
-                await client.run(_stand_back)
             yield client
-
-
-def _stand_back() -> None:
-    os.nice(_NICENESS)

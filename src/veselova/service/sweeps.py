@@ -55,8 +55,9 @@ class Progress:
 class Sweeps:
     """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its process, whatever ends that."""
 
-    def __init__(self, settings: Settings, jobs: Jobs, processes: bool = True) -> None:
+    def __init__(self, settings: Settings, jobs: Jobs, processes: bool = True, niceness: int = 0) -> None:
         self.jobs = jobs
+        self._niceness = niceness
         self._settings = settings
         self._processes = processes
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -208,7 +209,9 @@ class Sweeps:
     async def _open_cluster(self) -> Any:
         async with self._opening:
             if self._cluster is None:
-                self._cluster = await self._stack.enter_async_context(open_cluster(self._settings, self._processes))
+                self._cluster = await self._stack.enter_async_context(
+                    open_cluster(self._settings, self._processes, self._niceness)
+                )
             return self._cluster
 
     async def _close_cluster(self, lost: Any) -> None:
