@@ -116,6 +116,8 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ({"vary": {}}, "vary"),
         ({"vary": [1]}, "vary"),
         ({"samples": 0}, "samples"),
+        ({"samples": 2**63}, "samples"),
+        ({"samples": 10**6, "vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**6}, "/q_dot": {"normal": [0, 1]}}}, "vary"),
         ({"samples": 2, "vary": {"/A/0": [1, 2]}}, "samples"),
         ({"seed": -1}, "seed"),
         ({"engine": "analytic"}, "engine"),

@@ -51,6 +51,9 @@ _VARY = {
 #: An axis of more values is no axis, whatever the server allows.
 _MOST_VALUES = 1_000_000
 
+#: Beyond this many problems no sweep is looked at, whatever the server allows.
+_MOST_PROBLEMS = 1_000_000_000
+
 #: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be valid.
 _LOOKED_AT = 16
 
@@ -76,7 +79,7 @@ class SweepRequest(TorusRequest):
             "component is drawn; lists and grids are combined with one another"
         ),
     ]
-    samples: Annotated[int, Field(ge=1, description="random draws for each combination")] = 1
+    samples: Annotated[int, Field(ge=1, le=_MOST_PROBLEMS, description="random draws for each combination")] = 1
     seed: Annotated[int, Field(ge=0, lt=2**63, description="of the random draws; the same seed gives the same problems")] = 0
     times: Annotated[
         Times | None,
@@ -96,6 +99,8 @@ class SweepRequest(TorusRequest):
         try:
             if not isinstance(self.samples, int) or (self.samples > 1 and not self.draws):
                 raise InvalidInput(("samples",), "1 where nothing is drawn at random", str(self.samples))
+            if self.total > _MOST_PROBLEMS:
+                raise InvalidInput(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
             kind = SYSTEMS[self.problem.system].problem_class
             if self.times is None and not issubclass(kind, TorusProblem):
                 raise InvalidInput(("times",), f"this field, for system {kind.system} has no torus to summarise", "nothing")
