@@ -180,6 +180,11 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
     assert dataset.outcome.values.tolist() == ["solved", "solved"]
 
 
+def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
+    for path, methods in (("/v1/jobs/x", "DELETE, GET"), ("/v1/trajectories/x", "GET, HEAD"), ("/v1/tori", "POST")):
+        assert httpx2.put(f"{jobs_server.url}{path}").headers["allow"] == methods
+
+
 def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
     fault = is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/B": [1]}}), 422, "invalid-input")
     assert fault["errors"][0]["pointer"] == "/vary/~1B"

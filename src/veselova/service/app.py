@@ -7,6 +7,7 @@ import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
+from http import HTTPStatus
 
 import anyio
 from asgi_correlation_id import CorrelationIdMiddleware
@@ -15,6 +16,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
+from starlette.routing import BaseRoute, Match, Route
 
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
 from veselova.service.access import UNLIMITED, Access, Policy
@@ -75,11 +77,12 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         redoc_url=None,
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
-    app.include_router(router(limits, answers, partial(missing_parts, workers, jobs, keys)))
-    app.include_router(job_router(limits, jobs))
+    routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(limits, jobs))
+    for part in routers:
+        app.include_router(part)
     add_documentation(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
-        app.add_exception_handler(kind, partial(_answer_problem, metrics))
+        app.add_exception_handler(kind, partial(_answer_problem, metrics, [route for part in routers for route in part.routes]))
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
     _surround(app, limits, Policy.of(limits, loopback, keys), metrics)
     return app
@@ -115,14 +118,22 @@ async def _warm(workers: Workers) -> None:
         _LOG.exception("the first worker could not be started; /readyz stays at 503")
 
 
-async def _answer_problem(metrics: Metrics, _: Request, error: Exception) -> Response:
+async def _answer_problem(metrics: Metrics, routes: list[BaseRoute], request: Request, error: Exception) -> Response:
     if isinstance(error, RequestValidationError):  # parameters and headers, which the framework reads
         faults = [InvalidInput(item["loc"][1:], item["msg"].lower(), shown(item.get("input"))) for item in error.errors()]
         error = InvalidRequest(faults)
     response = problem_response(error)
+    if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED and (methods := _methods(routes, request)):
+        response.headers["Allow"] = ", ".join(sorted(methods))  # the framework names those of one route alone
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
         metrics.refused(error.code)
     elif response.status_code >= 500:
         _LOG.error("a request failed", exc_info=error)
     return response
+
+
+def _methods(routes: list[BaseRoute], request: Request) -> set[str]:
+    """Return the methods that some route has for the path of a request."""
+    found = (route for route in routes if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE)
+    return {method for route in found for method in route.methods or ()}
