@@ -240,6 +240,21 @@ def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
     assert said[-1] == (12, 12)
 
 
+def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
+    """Not in that of the alphabet, in which the request is kept."""
+    dataset = vs.sweep(BASE, {"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, folder=tmp_path)
+    assert dataset["energy"].dims == ("q_dot.1", "A.0")
+    for w in (0.5, 1):
+        for a in (3, 4, 5):
+            problem = vs.Veselova([a, "1.5", 1], [0.6, 0, 0.8], [0, w, 0])
+            assert dataset["energy"].sel({"q_dot.1": w, "A.0": a}) == vs.torus(problem).energy
+    sweep = request(vary={"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, samples=1)
+    other = request(vary={"/A/0": [3, 4, 5], "/q_dot/1": [0.5, 1]}, samples=1)
+    assert sweep.id != other.id
+    kept = read_request(SweepRequest, json.loads(sweep.canonical))
+    assert [dict(kept.columns(row)) for row in range(6)] == [dict(sweep.columns(row)) for row in range(6)]
+
+
 def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One run in this process; another by two workers, which is interrupted and then goes on."""
     sweep = request(samples=100, times=[0, 1], outputs=["q"], trajectories=True)

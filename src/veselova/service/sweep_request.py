@@ -200,8 +200,13 @@ class SweepRequest(TorusRequest):
 
     @property
     def canonical(self) -> bytes:
-        """Return the request as JSON, defaults filled in and fields sorted: equal for requests that mean the same."""
-        return orjson.dumps(self.model_dump(), option=orjson.OPT_SORT_KEYS)
+        """Return the request as JSON, defaults filled in and fields sorted: equal for requests that mean the same.
+
+        The places that vary keep their order, for it is that of the rows.
+        """
+        document = orjson.loads(orjson.dumps(self.model_dump(), option=orjson.OPT_SORT_KEYS))
+        document["vary"] = {place: document["vary"][place] for place in self.vary}
+        return orjson.dumps(document)
 
     @property
     def id(self) -> str:
