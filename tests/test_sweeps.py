@@ -8,6 +8,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +17,18 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 import xarray
+import zarr
 
 import veselova as vs
 from veselova.mechanics.errors import InvalidInput, InvalidRequest
 from veselova.service import sweeps as running
 from veselova.service.database import connect, schema_differences
-from veselova.service.jobs import Jobs
+from veselova.service.jobs import Job, Jobs
 from veselova.service.local_sweep import local_settings, run_sweep
+from veselova.service.results import Result
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
-from veselova.service.summaries import computed_chunk, lost_chunk
+from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
@@ -314,6 +318,34 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, mon
     job, _ = run_sweep(request(), settings, lambda done, total: None)
     assert refused.is_set()
     assert (job.state, job.done) == ("finished", 15)
+
+
+def together(call: Callable[[int], Any], count: int) -> list[Any]:
+    """Return what a call gives in so many threads that begin at once."""
+    begin = threading.Barrier(count)
+
+    def one(i: int) -> Any:
+        begin.wait()
+        return call(i)
+
+    with ThreadPoolExecutor(count) as pool:
+        return list(pool.map(one, range(count)))
+
+
+def test_the_first_chunks_of_a_job_may_be_stored_at_once(tmp_path: Path) -> None:
+    jobs = Jobs(Settings(data_dir=tmp_path))
+    for seed in range(5):
+        sweep = request(samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True)
+        job = jobs.submit(sweep)
+        result = Result(jobs, job)
+
+        def store(position: int, job: Job = job, result: Result = result) -> None:
+            start, stop = job.rows(position)
+            result.store(position, [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})])
+
+        together(store, job.chunk_count)
+        kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
+        assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
 
 
 def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:
