@@ -332,6 +332,15 @@ def together(call: Callable[[int], Any], count: int) -> list[Any]:
         return list(pool.map(one, range(count)))
 
 
+def test_a_sweep_that_many_ask_for_at_once_is_one_job(tmp_path: Path) -> None:
+    jobs = Jobs(Settings(data_dir=tmp_path))
+    for seed in range(5):
+        sweep = request(seed=seed)
+        submitted = together(lambda _, sweep=sweep, key=f"key {seed}": jobs.submit(sweep, key), 8)
+        assert {job.id for job in submitted} == {sweep.id}
+    assert jobs.counts() == {"queued": 5}
+
+
 def test_the_first_chunks_of_a_job_may_be_stored_at_once(tmp_path: Path) -> None:
     jobs = Jobs(Settings(data_dir=tmp_path))
     for seed in range(5):

@@ -84,6 +84,13 @@ class Jobs:
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or beyond the limits of the settings,
         Refused (``too-many-jobs``, ``storage-full``) while others take the room.
         """
+        try:
+            self._submit(sweep, key)
+        except sa.exc.IntegrityError:  # another asked for the same at the same moment: by now the job, or the key, is there
+            self._submit(sweep, key)
+        return self.get(sweep.id)
+
+    def _submit(self, sweep: SweepRequest, key: str | None) -> None:
         with self._engine.begin() as connection:
             if key is not None:
                 self._claim(connection, key, sweep)
@@ -96,7 +103,6 @@ class Jobs:
                 connection.execute(sa.update(jobs).where(jobs.c.id == sweep.id).values(again))
             if key is not None and not _job_of(connection, key):
                 connection.execute(sa.insert(idempotency_keys).values(key=key, job_id=sweep.id))
-        return self.get(sweep.id)
 
     def _claim(self, connection: sa.Connection, key: str, sweep: SweepRequest) -> None:
         if _job_of(connection, key) not in (None, sweep.id):
