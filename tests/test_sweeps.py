@@ -20,11 +20,12 @@ import xarray
 import zarr
 
 import veselova as vs
-from veselova.mechanics.errors import InvalidInput, InvalidRequest
+from veselova.mechanics.errors import InvalidInput, InvalidRequest, Unsolved
 from veselova.service import sweeps as running
 from veselova.service.database import connect, schema_differences
 from veselova.service.jobs import Job, Jobs
 from veselova.service.local_sweep import local_settings, run_sweep
+from veselova.service.problem_details import Refused
 from veselova.service.results import Result
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
@@ -355,6 +356,39 @@ def test_the_first_chunks_of_a_job_may_be_stored_at_once(tmp_path: Path) -> None
         together(store, job.chunk_count)
         kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
         assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
+
+
+@pytest.mark.parametrize("removed", [False, True])
+def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    sweep, settings, stored = request(samples=30), local_settings(tmp_path, 1), list[int]()
+    elsewhere, store = Jobs(settings), Jobs.store
+
+    def end_after_first(self: Jobs, job_id: str, position: int, *rest: Any) -> None:
+        store(self, job_id, position, *rest)
+        stored.append(position)
+        elsewhere.advance(job_id, "cancelled")
+        if removed:
+            elsewhere.remove(job_id)
+
+    monkeypatch.setattr(Jobs, "store", end_after_first)
+    with pytest.raises((Unsolved, Refused), match="There is no job" if removed else "the sweep is cancelled"):
+        run_sweep(sweep, settings, lambda done, total: None)
+    assert stored == [0]
+    assert (elsewhere.folder / sweep.id).exists() is not removed
+
+
+def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:
+    jobs = Jobs(Settings(data_dir=tmp_path))
+    job = jobs.submit(request())
+    jobs.store(job.id, 0, 15, b"a table")
+    with pytest.raises(Refused, match="goes on"):
+        jobs.remove(job.id)
+    assert jobs.chunk_path(job.id, 0).exists()
+    jobs.advance(job.id, "cancelled")
+    jobs.remove(job.id)
+    assert not jobs.chunk_path(job.id, 0).exists()
 
 
 def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
 from veselova.service.sweep_request import SweepRequest
 
-__all__ = ["ENDED", "Job", "Jobs"]
+__all__ = ["ENDED", "Job", "JobEnded", "Jobs"]
 
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
@@ -62,6 +62,10 @@ class Job:
     def rows(self, position: int) -> tuple[int, int]:
         """Return the first problem of a chunk, and the one after its last."""
         return position * self.chunk_rows, min((position + 1) * self.chunk_rows, self.total)
+
+
+class JobEnded(Exception):
+    """A job that goes on no more: it was cancelled or removed, perhaps by another server, while this one worked at it."""
 
 
 class Jobs:
@@ -168,13 +172,19 @@ class Jobs:
             return connection.execute(query).rowcount > 0
 
     def remove(self, job_id: str) -> None:
-        """Forget an ended job and its results."""
+        """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on, asked for again meanwhile."""
         with self._engine.begin() as connection:
-            connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED)))
+            removed = connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED))).rowcount
+        if not removed:
+            raise Refused("not-finished", "The job has been asked for again and goes on; cancel it first.", retry_after=2)
         shutil.rmtree(self.folder / job_id, ignore_errors=True)
 
     def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
-        """Keep a finished chunk: first its file, whole or not at all, then its hash."""
+        """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises JobEnded for a job that has ended."""
+        with self._engine.connect() as connection:
+            state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
+        if state is None or state in ENDED:
+            raise JobEnded(f"the job is {state or 'removed'}")
         write_whole(self.chunk_path(job_id, position), table)
         values = {"job_id": job_id, "position": position, "rows": rows, "sha256": hashlib.sha256(table).hexdigest()}
         with self._engine.begin() as connection:

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.cluster import open_cluster
-from veselova.service.jobs import Job, Jobs
+from veselova.service.jobs import Job, JobEnded, Jobs
 from veselova.service.results import Result
 from veselova.service.settings import Settings
 from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
@@ -129,6 +129,8 @@ class Sweeps:
                 _LOG.info("job %s runs in another process", job_id)
             except asyncio.CancelledError:
                 raise
+            except JobEnded as error:
+                _LOG.info("job %s is given up: %s", job_id, error)
             except Exception:
                 _LOG.exception("job %s failed", job_id)
                 await self._persist(job_id, self.jobs.advance, job_id, "failed", "an unexpected error; it has been logged")
