@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import subprocess
@@ -377,6 +378,39 @@ def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Pa
         run_sweep(sweep, settings, lambda done, total: None)
     assert stored == [0]
     assert (elsewhere.folder / sweep.id).exists() is not removed
+
+
+def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread that stores a chunk is waited for, and nothing of the job goes on behind it."""
+    settings = local_settings(tmp_path, 1)
+    jobs, storing, go_on = Jobs(settings), threading.Event(), threading.Event()
+    job = jobs.submit(request())
+    store = Jobs.store
+
+    def held(self: Jobs, *arguments: Any) -> None:
+        storing.set()
+        go_on.wait(30)
+        store(self, *arguments)
+
+    monkeypatch.setattr(Jobs, "store", held)
+
+    async def run() -> None:
+        sweeps = running.Sweeps(settings, jobs, processes=False)
+        sweeps.begin(job.id)
+        await asyncio.to_thread(storing.wait, 30)
+        cancelling = asyncio.create_task(sweeps.cancel(job.id))
+        while not jobs.get(job.id).ended:
+            await asyncio.sleep(0.01)
+        jobs.submit(request())
+        sweeps.begin(job.id)
+        assert not cancelling.done()
+        go_on.set()
+        await cancelling
+        await sweeps.ended(job.id)
+        await sweeps.close()
+
+    asyncio.run(run())
+    assert jobs.get(job.id).state == "finished"
 
 
 def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:

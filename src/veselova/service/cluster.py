@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
@@ -93,9 +94,13 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
             asynchronous=True,
             silence_logs=logging.CRITICAL,
         )
+        starting = asyncio.ensure_future(local)
         try:
-            cluster = await local
+            cluster = await asyncio.shield(starting)
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error
+        except asyncio.CancelledError:  # workers that are half started would outlive their cluster
+            async with await starting:
+                raise
         async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
             yield client

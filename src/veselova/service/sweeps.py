@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelled
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import anyio
@@ -61,6 +62,7 @@ class Sweeps:
         self._settings = settings
         self._processes = processes
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._again: set[str] = set()
         self._progress: dict[str, Progress] = {}
         self._changed = asyncio.Condition()
         self._turns = asyncio.Semaphore(settings.max_running_jobs)
@@ -84,10 +86,18 @@ class Sweeps:
             self.begin(job_id)
 
     def begin(self, job_id: str) -> None:
-        """Run a job, unless it runs already."""
-        if job_id not in self._tasks:
-            task = self._tasks[job_id] = asyncio.create_task(self._run(job_id), name=f"job {job_id}")
-            task.add_done_callback(lambda _: self._tasks.pop(job_id, None))
+        """Run a job; one that runs already is looked at again at its end, for it may be stopping just now."""
+        if job_id in self._tasks:
+            self._again.add(job_id)
+            return
+        task = self._tasks[job_id] = asyncio.create_task(self._run(job_id), name=f"job {job_id}")
+        task.add_done_callback(lambda _: self._left(job_id))
+
+    def _left(self, job_id: str) -> None:
+        del self._tasks[job_id]
+        if job_id in self._again and not self._closing:
+            self._again.remove(job_id)
+            self.begin(job_id)
 
     async def cancel(self, job_id: str) -> None:
         """Stop a job; its finished chunks stay."""
@@ -119,14 +129,15 @@ class Sweeps:
             self._changed.notify_all()
 
     async def _run(self, job_id: str) -> None:
-        folder = self.jobs.folder / job_id
+        lock = FileLock(self.jobs.folder / job_id / "lock", timeout=0, thread_local=False)
         async with self._turns:
             try:
-                folder.mkdir(parents=True, exist_ok=True)
-                with FileLock(folder / "lock", timeout=0):
+                if (await self._persist(job_id, self.jobs.get, job_id)).ended:
+                    return
+                if await self._persist(job_id, _taken, lock):
                     await self._run_locked(job_id)
-            except Timeout:
-                _LOG.info("job %s runs in another process", job_id)
+                else:
+                    _LOG.info("job %s runs in another process", job_id)
             except asyncio.CancelledError:
                 raise
             except JobEnded as error:
@@ -135,6 +146,7 @@ class Sweeps:
                 _LOG.exception("job %s failed", job_id)
                 await self._persist(job_id, self.jobs.advance, job_id, "failed", "an unexpected error; it has been logged")
             finally:
+                lock.release()
                 self._progress.pop(job_id, None)
                 await self._tell()
 
@@ -228,11 +240,18 @@ class Sweeps:
                 _LOG.warning("the cluster did not close in order", exc_info=True)
 
     async def _persist(self, job_id: str, call: Callable[..., T], *arguments: Any) -> T:
-        """Return what a call that stores or reads gives, trying again for as long as the disk or the database refuse."""
+        """Return what a call that stores or reads gives, trying again for as long as the disk or the database refuse.
+
+        A cancellation waits for the call, whose thread would go on behind it.
+        """
         pause = _FIRST_PAUSE_S
         while True:
+            calling = asyncio.ensure_future(anyio.to_thread.run_sync(call, *arguments))
             try:
-                answer = await anyio.to_thread.run_sync(call, *arguments)
+                answer = await asyncio.shield(calling)
+            except asyncio.CancelledError:
+                await asyncio.wait([calling])
+                raise
             except (OSError, SQLAlchemyError) as error:
                 reason = str(getattr(error, "orig", None) or error)
                 _LOG.warning("job %s waits for its storage: %s", job_id, reason)
@@ -245,6 +264,16 @@ class Sweeps:
                 if progress := self._progress.get(job_id):
                     progress.waits_for = ""
                 return answer
+
+
+def _taken(lock: FileLock) -> bool:
+    """Take the lock of a job, whose folder is made first; return whether no other process holds it."""
+    Path(lock.lock_file).parent.mkdir(parents=True, exist_ok=True)
+    try:
+        lock.acquire()
+    except Timeout:
+        return False
+    return True
 
 
 async def _stop(client: Any, future: Any) -> None:
