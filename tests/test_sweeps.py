@@ -110,6 +110,11 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 0}}}, "vary./A/0.count"),
         ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**9}}}, "vary./A/0.count"),
         ({"vary": {"/A/0": {"start": 1, "stop": "x", "count": 3}}}, "vary./A/0.stop"),
+        ({"vary": {"/A/0": {"start": -1e308, "stop": 1e308, "count": 3}}}, "vary./A/0"),
+        ({"vary": {f"/A/{i}": {"start": 1, "stop": 2, "count": 400_000} for i in range(3)}}, "vary"),
+        ({"vary": {"/A/0": [3, math.nan]}}, "vary./A/0[1]"),
+        ({"vary": {"/A/0": [3, "\ud800"]}, "samples": 1}, "the request"),
+        ({"vary": {"/\ud800": [3]}}, "vary./\\ud800"),
         ({"vary": {"/A/0": {"start": 0, "stop": 2, "count": 3, "spacing": "log"}}}, "vary./A/0"),
         ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 3, "spacing": "cubic"}}}, "vary./A/0.spacing"),
         ({"vary": {"/A/0": {"uniform": [2, 1]}}}, "vary./A/0.uniform"),
@@ -259,6 +264,18 @@ def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
     assert sweep.id != other.id
     kept = read_request(SweepRequest, json.loads(sweep.canonical))
     assert [dict(kept.columns(row)) for row in range(6)] == [dict(sweep.columns(row)) for row in range(6)]
+
+
+def test_integers_of_any_length_are_kept_exactly() -> None:
+    sweep = request(vary={"/A/0": [10**30]}, samples=1)
+    kept = read_request(SweepRequest, json.loads(sweep.canonical))
+    assert kept.request_of(0).problem.problem().as_dict()["A"] == [str(10**30), "1.5", 1]
+
+
+def test_a_place_varies_by_the_numbers_of_numpy(tmp_path: Path) -> None:
+    grid = {"start": np.float64(2), "stop": np.float32(3), "count": np.int64(2)}
+    dataset = vs.sweep(BASE, {"/A/0": grid, "/q_dot": {"uniform": (0.1, np.float64(1))}}, folder=tmp_path)
+    assert dataset["A.0"].values.tolist() == [2, 3]
 
 
 def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,17 +66,20 @@ def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[
     """Return the parameters of a sweep over a problem, in the order given.
 
     Raises InvalidInput for a place that the problem has not, for two places one inside the other, and for values, grids and
-    distributions that are none; an axis has at most ``most_values`` values.
+    distributions that are none; all axes together have at most ``most_values`` values.
     """
     if not isinstance(vary, Mapping) or not vary or len(vary) > _MOST_PARAMETERS:
         raise InvalidInput(("vary",), f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem", shown(vary))
     found: list[Parameter] = []
     for pointer, stated in vary.items():
-        where = ("vary", str(pointer)[:100])
+        where = ("vary", str(pointer)[:100].encode("utf-8", "backslashreplace").decode("utf-8"))
         path = _path(pointer, problem, where)
         if other := next((p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None):
             raise InvalidInput(where, "a place of its own", f"a place that overlaps with {other.name}")
         found.append(_parameter(path, stated, _value_at(problem, path), where, most_values))
+        count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
+        if count > most_values:
+            raise InvalidInput(("vary",), f"lists and grids of at most {most_values} values, all together", str(count))
     return found
 
 
@@ -151,8 +154,11 @@ def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
         raise InvalidInput(where, f"1 to {most} values", str(len(stated)))
     names = [name for name, _ in components("", base)]
     for i, value in enumerate(stated):
-        if [name for name, _ in components("", value)] != names or isinstance(value, Mapping):
+        scalars = dict(components("", value))
+        if list(scalars) != names or isinstance(value, Mapping):
             raise InvalidInput((*where, i), "a value of the same shape as in the problem", shown(value))
+        if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
+            raise InvalidInput((*where, i), "finite numbers", shown(value))
     return stated
 
 
@@ -163,6 +169,8 @@ def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
     if spacing not in _SPACINGS:
         raise InvalidInput((*where, "spacing"), f"one of {', '.join(_SPACINGS)}", shown(spacing))
     start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
+    if not math.isfinite(stop - start):
+        raise InvalidInput(where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}")
     if spacing == "linear":
         return [float(value) for value in np.linspace(start, stop, count)]
     if min(start, stop) <= 0:

@@ -48,7 +48,7 @@ _VARY = {
     "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, _GRID, *_DRAWS]},
 }
 
-#: An axis of more values is no axis, whatever the server allows.
+#: Axes of more values, all together, are none, whatever the server allows.
 _MOST_VALUES = 1_000_000
 
 #: Beyond this many problems no sweep is looked at, whatever the server allows.
@@ -110,8 +110,11 @@ class SweepRequest(TorusRequest):
                         raise InvalidInput((name,), "times as well (without them no motion is computed)", "no times")
             looked_at = np.unique(np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)).tolist()
             self._require_one_valid(looked_at)
+            _ = self.canonical
         except InvalidInput as fault:
             return [fault]
+        except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
+            return [InvalidInput((), "texts of whole characters", "half of a surrogate pair")]
         except VeselovaError as error:
             return list(getattr(error, "faults", ()))
         return []
@@ -204,7 +207,7 @@ class SweepRequest(TorusRequest):
 
         The places that vary keep their order, for it is that of the rows.
         """
-        document = orjson.loads(orjson.dumps(self.model_dump(), option=orjson.OPT_SORT_KEYS))
+        document = orjson.loads(orjson.dumps(plain(self.model_dump()), option=orjson.OPT_SORT_KEYS))
         document["vary"] = {place: document["vary"][place] for place in self.vary}
         return orjson.dumps(document)
 
@@ -220,7 +223,7 @@ def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any]
         raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", shown(problem))
     if not isinstance(vary, Mapping):
         raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
-    stated = {place: plain(values) if isinstance(values, (np.ndarray, list, tuple)) else values for place, values in vary.items()}
+    stated = plain(vary)
     if times is not None and not isinstance(times, Mapping):
         times = plain(times)
     return {"problem": problem.as_dict() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
