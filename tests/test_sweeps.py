@@ -442,6 +442,29 @@ def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:
     assert not jobs.chunk_path(job.id, 0).exists()
 
 
+def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file has been made by then, and must not be made again of what is left."""
+    jobs = Jobs(Settings(data_dir=tmp_path))
+    job = jobs.submit(request(times=[0, 1], outputs=["tau1"], trajectories=True))
+    result = Result(jobs, job)
+    result.store(0, [computed_chunk(job.request, 0, 15, __version__)])
+
+    def die(store: Path) -> None:
+        for chunk in store.glob("tau1/c/**/*"):
+            if chunk.is_file():
+                chunk.unlink()
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("veselova.service.results.shutil.rmtree", die)
+        with pytest.raises(KeyboardInterrupt):
+            result.finish()
+    result.finish()
+    packed = zarr.open_group(zarr.storage.ZipStore(jobs.packed_path(job.id), mode="r"), mode="r")
+    assert np.all(np.isfinite(packed["tau1"][:]))
+    assert not jobs.trajectories_path(job.id).exists()
+
+
 def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
         Jobs(Settings(data_dir=tmp_path, max_sweep_problems=10)).submit(request())

@@ -54,14 +54,17 @@ class Result:
             array[row : row + part.rows] = values
 
     def finish(self) -> None:
-        """Make the table of all problems, and of the trajectories one file, and remove the chunks they were made of."""
+        """Make the table of all problems, and of the trajectories one file; what was made before is left as it is."""
         path = self._jobs.result_path(self._job.id)
         chunks = [self._jobs.chunk_path(self._job.id, position) for position in range(self._job.chunk_count)]
         if not path.exists():
             _concatenate(chunks, path)
         store = self._jobs.trajectories_path(self._job.id)
+        packed = self._jobs.packed_path(self._job.id)
         if store.is_dir():
-            _pack(store, self._jobs.packed_path(self._job.id))
+            if not packed.exists():
+                _pack(store, packed)
+            shutil.rmtree(store)
 
 
 def table_stream(path: Path, form: str) -> Iterator[bytes]:
@@ -136,5 +139,6 @@ def _pack(store: Path, target: Path) -> None:
         for path in sorted(path for path in store.rglob("*") if path.is_file()):
             with path.open("rb") as source, archive.open(zipfile.ZipInfo(path.relative_to(store).as_posix()), "w") as entry:
                 shutil.copyfileobj(source, entry)
+    with unfinished.open("rb") as file:
+        os.fsync(file.fileno())
     unfinished.replace(target)
-    shutil.rmtree(store)
