@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +96,6 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
 
     jobs = Jobs(settings)
-    job = jobs.submit(request)
 
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes=request.total > _FEW or bool(settings.dask_scheduler))
@@ -109,12 +109,14 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         finally:
             await sweeps.close()
 
-    if not job.ended:
-        _in_a_loop_of_its_own(run)
-    job = jobs.get(job.id)
-    if job.state != "finished":
-        raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
-    report(job.total, job.total)
+    with closing(jobs):
+        job = jobs.submit(request)
+        if not job.ended:
+            _in_a_loop_of_its_own(run)
+        job = jobs.get(job.id)
+        if job.state != "finished":
+            raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
+        report(job.total, job.total)
     return job, jobs
 
 
