@@ -19,6 +19,7 @@ import pytest
 import sqlalchemy as sa
 import xarray
 import zarr
+from pyarrow import parquet
 
 import veselova as vs
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, Unsolved
@@ -440,6 +441,20 @@ def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:
     jobs.advance(job.id, "cancelled")
     jobs.remove(job.id)
     assert not jobs.chunk_path(job.id, 0).exists()
+
+
+def test_a_value_that_is_a_text_may_come_in_a_later_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table is the same as that of one chunk: the column has texts."""
+    sweep = request(vary={"/A/0": [2, 2.5, "x"]}, samples=1)
+
+    def column(folder: str) -> Any:
+        job, jobs = run_sweep(sweep, local_settings(tmp_path / folder, 1), lambda done, total: None)
+        return parquet.read_table(jobs.result_path(job.id))["A.0"].to_pylist()
+
+    expected = column("one chunk")
+    assert expected[2] == "x"
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 1)
+    assert column("three chunks") == expected
 
 
 def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -172,7 +172,15 @@ class SweepRequest(TorusRequest):
         """Yield the values of the parameters in one problem by the names of their columns, component by component."""
         for path, value in self.values(row).items():
             for name, scalar in components(".".join(map(str, path)), value):
-                yield name, tabulated(scalar)
+                found = tabulated(scalar)
+                yield name, str(found) if name in self._texts and found is not None else found
+
+    @cached_property
+    def _texts(self) -> frozenset[str]:
+        """Return the columns of which any value states no number: they have texts in every chunk."""
+        scalars = (item for axis in self.axes for value in axis.values for item in components(axis.name, value))
+        stated = ((name, scalar) for name, scalar in scalars if isinstance(scalar, (str, bool)))
+        return frozenset(name for name, scalar in stated if isinstance(tabulated(scalar), str))
 
     def request_of(self, row: int) -> TorusRequest | TrajectoryRequest:
         """Return the request of one problem: for its motion where there are times, for its torus else. Raises InvalidRequest."""
