@@ -62,13 +62,26 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
         files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
         ca, cert, key = (None if path is None else str(path) for path in files)
         security = Security(tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key, require_encryption=True) if ca else None
-        async with Client(
-            settings.dask_scheduler, asynchronous=True, security=security, timeout=_CONNECT_S, set_as_default=False
-        ) as client:
+        options = {"asynchronous": True, "security": security, "timeout": _CONNECT_S, "set_as_default": False}
+        async with Client(settings.dask_scheduler, **options) as client:
             yield client
         return
-    niceness = niceness if processes and hasattr(os, "setpriority") else 0
-    quiet = {
+    with dask.config.set(_configuration(niceness if processes and hasattr(os, "setpriority") else 0)):
+        starting = asyncio.ensure_future(LocalCluster(**_machine(settings, processes)))
+        try:
+            cluster = await asyncio.shield(starting)
+        except RuntimeError as error:
+            raise OSError(f"no workers could be started: {error}") from error
+        except asyncio.CancelledError:  # workers that are half started would outlive their cluster
+            async with await starting:
+                raise
+        async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
+            yield client
+
+
+def _configuration(niceness: int) -> dict[str, Any]:
+    """Return what Dask is to do otherwise than by default."""
+    return {
         # A worker at its limit is ended. Paused, as Dask would have it before that, it would never go on.
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
@@ -81,26 +94,19 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
         "distributed.worker.preload": [f"import os\nos.setpriority(os.PRIO_PROCESS, 0, {niceness})"] if niceness else [],
         "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
     }
-    with dask.config.set(quiet):
-        local = LocalCluster(
-            n_workers=settings.sweep_workers if processes else 1,
-            threads_per_worker=1,
-            processes=processes,
-            memory_limit=settings.sweep_worker_memory_mb * 1_000_000 if processes else 0,
-            host="127.0.0.1" if processes else None,
-            # Dask serves pages of its own; they stay on this machine, at any free port.
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            worker_dashboard_address="127.0.0.1:0",
-            asynchronous=True,
-            silence_logs=logging.CRITICAL,
-        )
-        starting = asyncio.ensure_future(local)
-        try:
-            cluster = await asyncio.shield(starting)
-        except RuntimeError as error:
-            raise OSError(f"no workers could be started: {error}") from error
-        except asyncio.CancelledError:  # workers that are half started would outlive their cluster
-            async with await starting:
-                raise
-        async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
-            yield client
+
+
+def _machine(settings: Settings, processes: bool) -> dict[str, Any]:
+    """Return the cluster of this machine, as LocalCluster takes it."""
+    return {
+        "n_workers": settings.sweep_workers if processes else 1,
+        "threads_per_worker": 1,
+        "processes": processes,
+        "memory_limit": settings.sweep_worker_memory_mb * 1_000_000 if processes else 0,
+        "host": "127.0.0.1" if processes else None,
+        # Dask serves pages of its own; they stay on this machine, at any free port.
+        "scheduler_kwargs": {"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+        "worker_dashboard_address": "127.0.0.1:0",
+        "asynchronous": True,
+        "silence_logs": logging.CRITICAL,
+    }

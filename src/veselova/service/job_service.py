@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -34,6 +35,7 @@ class JobService:
         self._settings = settings
         self._opening = anyio.Lock()
         self._sweeps: Sweeps | None = None
+        self._watching: asyncio.Task[None] | None = None
         #: Why there is no store, where there is none.
         self.failure = "not opened yet"
 
@@ -47,7 +49,8 @@ class JobService:
         try:
             yield
         finally:
-            if self._sweeps is not None:
+            if self._sweeps is not None and self._watching is not None:
+                self._watching.cancel()
                 await self._sweeps.close()
                 self._sweeps.jobs.close()
 
@@ -71,6 +74,7 @@ class JobService:
             jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
             sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
             await sweeps.resume()
+            self._watching = asyncio.create_task(sweeps.watch())
         except (OSError, SQLAlchemyError) as error:
             self.failure = _reason(error)
             raise Refused("storage-unavailable", f"Jobs cannot be stored at present: {self.failure}.", retry_after=30) from None

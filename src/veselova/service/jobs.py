@@ -152,7 +152,8 @@ class Jobs:
             return list(connection.execute(query).scalars())
 
     def require_writable(self) -> None:
-        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written."""
+        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless the folder can."""
+        write_whole(self.folder / "probe", bytes(4096))
         with self._engine.begin() as connection:
             connection.execute(sa.update(jobs).where(jobs.c.id == "").values(detail=""))
 
@@ -193,6 +194,10 @@ class Jobs:
 
     def missing(self, job: Job) -> list[int]:
         """Return the chunks that are still to be computed; those whose file is lost or damaged are forgotten first."""
+        for path in (self.folder / job.id).rglob("*.part"):  # of a process that died
+            path.unlink(missing_ok=True)
+        if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
+            return []
         with self._engine.connect() as connection:
             query = sa.select(chunks.c.position, chunks.c.sha256).where(chunks.c.job_id == job.id)
             stored = {int(position): str(digest) for position, digest in connection.execute(query).all()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -26,6 +27,9 @@ Report = Callable[[int, int], None]
 
 #: Fewer problems than this are computed in this process: starting others takes seconds.
 _FEW = 50
+
+#: How often workers are asked for. A server goes on asking; here somebody waits.
+_TRIES = 3
 
 #: Seconds between two reports.
 _REPORT_S = 0.2
@@ -95,10 +99,13 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
     except ImportError as error:
         raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
 
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        # A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.
+        raise RuntimeError('in a script, call veselova.sweep below `if __name__ == "__main__":`')
     jobs = Jobs(settings)
 
     async def run() -> None:
-        sweeps = Sweeps(settings, jobs, processes=request.total > _FEW or bool(settings.dask_scheduler))
+        sweeps = Sweeps(settings, jobs, request.total > _FEW or bool(settings.dask_scheduler), tries=_TRIES)
         sweeps.begin(job.id)
         ending = asyncio.ensure_future(sweeps.ended(job.id))
         try:

@@ -35,6 +35,8 @@ class Result:
             if part.arrays:
                 self._store_arrays(row, part)
             row += part.rows
+        if any(part.arrays for part in parts):
+            os.sync()  # Zarr leaves it to the system when its files reach the disk
         self._jobs.store(self._job.id, position, sum(part.rows for part in parts), _joined(parts))
 
     def _store_arrays(self, row: int, part: Chunk) -> None:
@@ -54,7 +56,10 @@ class Result:
             array[row : row + part.rows] = values
 
     def finish(self) -> None:
-        """Make the table of all problems, and of the trajectories one file; what was made before is left as it is."""
+        """Make the table of all problems, and of the trajectories one file; what was made before is left as it is.
+
+        At last the chunks go, of which all was made.
+        """
         path = self._jobs.result_path(self._job.id)
         chunks = [self._jobs.chunk_path(self._job.id, position) for position in range(self._job.chunk_count)]
         if not path.exists():
@@ -65,6 +70,7 @@ class Result:
             if not packed.exists():
                 _pack(store, packed)
             shutil.rmtree(store)
+        shutil.rmtree(chunks[0].parent, ignore_errors=True)
 
 
 def table_stream(path: Path, form: str) -> Iterator[bytes]:

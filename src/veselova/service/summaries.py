@@ -25,7 +25,7 @@ from veselova.service.tasks import requested_trajectory, warm_up
 from veselova.service.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
-__all__ = ["SOLVED", "Chunk", "computed_chunk", "lost_chunk"]
+__all__ = ["SOLVED", "Chunk", "OtherVersion", "computed_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
@@ -47,14 +47,18 @@ class Chunk:
     arrays: Mapping[str, np.ndarray[Any, Any]] = field(default_factory=dict)
 
 
+class OtherVersion(Exception):
+    """A worker whose engines could give other numbers than those of the process that asks."""
+
+
 def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
     """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
 
-    A problem that cannot be solved is a row that says why. Raises RuntimeError where this process has another version of the
+    A problem that cannot be solved is a row that says why. Raises OtherVersion where this process has another version of the
     engines than the one that asks.
     """
     if version != __version__:
-        raise RuntimeError(f"a worker runs veselova {__version__}, the server {version}")
+        raise OtherVersion(f"a worker of the cluster runs veselova {__version__}, and this is {version}")
     _warm_up()
     sweep = read_request(SweepRequest, orjson.loads(request))
     answers = [_answer(sweep, row) for row in range(start, stop)]

@@ -30,7 +30,11 @@ def run(document: Any, json: bool, output: Path | None, folder: Path | None, wor
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("problems,"), TimeRemainingColumn(), TextColumn("left"))
     with Progress(*columns, console=terminal, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("sweep", total=request.total)
-        job, jobs = run_sweep(request, local_settings(folder, workers), lambda done, _: bar.update(task, completed=done))
+        try:
+            job, jobs = run_sweep(request, local_settings(folder, workers), lambda done, _: bar.update(task, completed=done))
+        except KeyboardInterrupt:
+            terminal.print("What is done is kept; the same command goes on from there.")
+            raise
     table = jobs.result_path(job.id)
     if output is not None:
         _write(request, table, jobs.packed_path(job.id), output)

@@ -6,7 +6,6 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError as FutureCancelled
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +16,11 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.cluster import open_cluster
+from veselova.service.dispatch import answers
 from veselova.service.jobs import Job, JobEnded, Jobs
 from veselova.service.results import Result
 from veselova.service.settings import Settings
-from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
-from veselova.version import __version__
+from veselova.service.summaries import OtherVersion
 
 __all__ = ["Progress", "Sweeps"]
 
@@ -33,6 +32,9 @@ _AHEAD = 2
 #: Seconds between two tries to store, or to reach the cluster: doubled from the first to the last.
 _FIRST_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 30.0
+
+#: Seconds between two looks at what other servers have left.
+_WATCH_S = 30.0
 
 T = TypeVar("T")
 
@@ -53,12 +55,20 @@ class Progress:
         return (self.done - self.before) / passed if passed > 0 else 0.0
 
 
+class _NoCluster(Exception):
+    """No cluster could be opened, or kept, as often as was to be tried."""
+
+
 class Sweeps:
     """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its process, whatever ends that."""
 
-    def __init__(self, settings: Settings, jobs: Jobs, processes: bool = True, niceness: int = 0) -> None:
+    def __init__(
+        self, settings: Settings, jobs: Jobs, processes: bool = True, niceness: int = 0, tries: int | None = None
+    ) -> None:
+        """``tries``: how often a job asks for a cluster before it fails; for ever when left out."""
         self.jobs = jobs
         self._niceness = niceness
+        self._tries = tries
         self._settings = settings
         self._processes = processes
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -83,7 +93,17 @@ class Sweeps:
     async def resume(self) -> None:
         """Begin every job that another process left unfinished."""
         for job_id in await anyio.to_thread.run_sync(self.jobs.unfinished):
-            self.begin(job_id)
+            if job_id not in self._tasks:
+                self.begin(job_id)
+
+    async def watch(self) -> None:
+        """Take up, for ever, what another server begins or leaves unfinished."""
+        while True:
+            await asyncio.sleep(_WATCH_S)
+            try:
+                await self.resume()
+            except (OSError, SQLAlchemyError) as error:
+                _LOG.warning("the unfinished jobs could not be read: %s", error)
 
     def begin(self, job_id: str) -> None:
         """Run a job; one that runs already is looked at again at its end, for it may be stopping just now."""
@@ -140,6 +160,8 @@ class Sweeps:
                     _LOG.info("job %s runs in another process", job_id)
             except asyncio.CancelledError:
                 raise
+            except (_NoCluster, OtherVersion) as error:
+                await self._persist(job_id, self.jobs.advance, job_id, "failed", str(error))
             except JobEnded as error:
                 _LOG.info("job %s is given up: %s", job_id, error)
             except Exception:
@@ -158,9 +180,9 @@ class Sweeps:
         if not await self._persist(job_id, self.jobs.advance, job_id, "running"):
             return
         result = Result(self.jobs, job)
-        pause = _FIRST_PAUSE_S
+        pause, tries = _FIRST_PAUSE_S, 0
         while missing:
-            client = None
+            client, tries = None, tries + 1
             try:
                 client = await self._open_cluster()
                 await self._compute(client, job, result, missing)
@@ -169,6 +191,8 @@ class Sweeps:
                 self._progress[job_id].waits_for = f"the cluster ({error})"
                 _LOG.warning("job %s waits for the cluster: %s", job_id, error)
                 await self._close_cluster(client)
+                if tries == self._tries:
+                    raise _NoCluster(str(error)) from None
                 await asyncio.sleep(pause)
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
             missing = await self._persist(job_id, self.jobs.missing, job)
@@ -194,31 +218,11 @@ class Sweeps:
 
     async def _chunk(self, client: Any, job: Job, result: Result, position: int) -> None:
         start, stop = job.rows(position)
-        parts = await self._parts(client, job, start, stop)
+        parts = await answers(client, job, start, stop, lambda: self._closing)
         await self._persist(job.id, result.store, position, parts)
         progress = self._progress[job.id]
         progress.done += stop - start
         await self._tell()
-
-    async def _parts(self, client: Any, job: Job, start: int, stop: int) -> list[Chunk]:
-        """Return the answers to some problems; where their worker dies over them, one by one, to find out over which."""
-        from distributed.scheduler import KilledWorker
-
-        future = client.submit(computed_chunk, job.request, start, stop, __version__, pure=False)
-        try:
-            return [await future]
-        except KilledWorker:
-            if stop - start == 1:
-                return [lost_chunk(job.sweep, start)]
-            return [part for row in range(start, stop) for part in await self._parts(client, job, row, row + 1)]
-        except FutureCancelled as error:
-            raise ConnectionError(f"the cluster dropped the work: {error}") from None
-        except asyncio.CancelledError:
-            if not self._closing:  # at the end the workers of this machine are ended with their cluster
-                await _stop(client, future)
-            raise
-        finally:
-            future.release()
 
     async def _open_cluster(self) -> Any:
         async with self._opening:
@@ -274,13 +278,3 @@ def _taken(lock: FileLock) -> bool:
     except Timeout:
         return False
     return True
-
-
-async def _stop(client: Any, future: Any) -> None:
-    """End work that nobody waits for: a worker that is in the midst of it is restarted, for a thread cannot be stopped."""
-    if client.scheduler_info(n_workers=1)["address"].startswith("inproc"):
-        return
-    where = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
-    await future.cancel(force=True)
-    if where:
-        await client.restart_workers(where, raise_for_error=False)
