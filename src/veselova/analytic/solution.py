@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
+from veselova.analytic.costs import GUARDED_FROM, PANEL_CYCLES, Costs
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
@@ -24,6 +25,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.theta import Theta
+from veselova.analytic.windows import NODES, Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
 from veselova.mechanics.spheroconic import to_spheroconic
@@ -52,19 +54,11 @@ _NARROW_GAP_HIGH_GENUS = 1e-12
 #: Largest genus at which theta sums are taken there all the same.
 _SEPARATRIX_GENUS = 7
 
-#: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
-_GUARDED_FROM = 200.0
+#: Digits of the frequencies where they are guarded.
 _GUARD_DIGITS = 30
 
 #: Cycles from which frequencies of that many digits leave none of the phases.
 _MOST_CYCLES = 1e28
-
-#: Cycles from which the Fourier clock is cheaper than panels, by genus (set-up of the modes against inversions along the orbit).
-_FOURIER_FROM = {1: 3.0, 2: 10.0, 3: 30.0, 4: 200.0, 5: 3e3}
-
-#: Cycles that panels are willing to cover: minutes.
-_PANEL_CYCLES = 5e4
-
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
@@ -127,6 +121,10 @@ class Solution:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return 1 / clock_rate(self.spectrum, self.quotients.position(z), self.problem.time, DOUBLE)
 
+    def rate_along(self, attitude: Attitude) -> Array:
+        """Return dt/dτ₁ at points where the attitude is known."""
+        return np.asarray(1 / clock_rate(self.spectrum, attitude.q, self.problem.time, DOUBLE))
+
     @property
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
@@ -164,7 +162,6 @@ class Solution:
 
     def clock(self, times: Array, name: str | None = None) -> Clock:
         """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given."""
-        earliest, latest = float(times[0]), float(times[-1])
         cycles, guarded = self.cycles(times), self.is_guarded(times)
         if not cycles <= _MOST_CYCLES:
             raise Unsolved(
@@ -172,14 +169,14 @@ class Solution:
             )
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
-        if name is None:
-            few = _PANEL_CYCLES if self.near_separatrix else _FOURIER_FROM.get(self.curve.genus, np.inf)
-            name = "fourier" if cycles > few else "panels"
-        if name == "fourier":
+        if name is None and self.near_separatrix:
+            name = "fourier" if cycles > PANEL_CYCLES else "panels"
+        if (name or self.costs(times).cheaper_clock(self._inversions(times))) == "fourier":
             return self._fourier(guarded)
-        if cycles > _PANEL_CYCLES:
-            limit = f"panels go to {_PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
+        if cycles > PANEL_CYCLES:
+            limit = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {limit}")
+        earliest, latest = self.windows(times, "panels").span
         return PanelClock(self.rate_at, self.mean_rate, self._guarded[0] if guarded else self.in_tau1, earliest, latest)
 
     def _fourier(self, guarded: bool) -> FourierClock:
@@ -194,7 +191,23 @@ class Solution:
 
     def is_guarded(self, times: Array) -> bool:
         """Return whether frequencies for these times carry guard digits."""
-        return self.cycles(times) > _GUARDED_FROM
+        return self.cycles(times) > GUARDED_FROM
+
+    def costs(self, times: Array) -> Costs:
+        """Return what the clocks cost for given times."""
+        return Costs.of(self.periods.riemann_matrix, self.cycles(times))
+
+    def _inversions(self, times: Array) -> int:
+        return self.windows(times, "fourier").inversions
+
+    def clock_estimates(self, times: Array) -> dict[str, float]:
+        """Return the seconds that either clock was thought to take, those out of the question left out."""
+        seconds = {name: self.costs(times).seconds(name, self._inversions(times)) for name in ("fourier", "panels")}
+        return {name: round(value, 5) for name, value in seconds.items() if np.isfinite(value)}
+
+    def windows(self, times: Array, clock: str) -> Windows:
+        """Return the windows in which many times are interpolated, where that is cheaper with the clock."""
+        return Windows(times, float(np.max(np.abs(self.in_time.rates))), self.costs(times).fewest_in_window(NODES, clock))
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times."""

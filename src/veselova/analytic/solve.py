@@ -17,6 +17,7 @@ from veselova.analytic.error import estimated_error
 from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
 from veselova.analytic.solution import METHODS, Solution
+from veselova.analytic.windows import Along
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Series
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 #: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
 
-#: The series that states are, along the principal axes.
+#: The series that states are, along the principal axes; the last may be left to the problem.
 _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 
 #: An error above this leaves no digit of the attitude.
@@ -108,10 +109,10 @@ class _TorusMotion(Motion[TorusProblem]):
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         solution, route = self._solution, self.method or self._solution.default_method()
         clock = solution.clock(grid, self.clock)
-        tau1, states, error = _states(solution, clock, grid, route)
+        along, error = _along(solution, clock, grid, route)
         for neighbour in self._neighbours:
-            other = _states(neighbour, neighbour.clock(grid, self.clock), grid, route)[1]
-            error = np.maximum(error, np.max(np.abs(other[1] - states[1]), axis=(1, 2)))
+            other = _along(neighbour, neighbour.clock(grid, self.clock), grid, route)[0]
+            error = np.maximum(error, np.max(np.abs(other.series[1] - along.series[1]), axis=(1, 2)))
         lost = np.flatnonzero(~(error <= _NO_DIGIT))
         if lost.size:
             first = grid[lost[np.argmin(np.abs(grid[lost]))]]
@@ -122,16 +123,29 @@ class _TorusMotion(Motion[TorusProblem]):
             "regime": solution.regime,
             "clock": clock.name,
             "clock_size": clock.size,
+            "evaluations": along.evaluations,
+            "clock_estimates": solution.clock_estimates(grid) if clock.name != "uniform" else {},
             "guard_digits": solution.is_guarded(grid),
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
             "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
         }
-        series = self.problem.completed(dict(zip(_SERIES, (tau1, *states), strict=True)))
+        states = (along.tau1 * solution.tau1_unit, *along.series)
+        series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
         return series, self.problem.bound(series, error), route, details
 
 
-def _states(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Array, tuple[Array, Array, Array], Array]:
-    """Return τ₁, the states (q̇, frame, λ) and their error."""
-    tau1, z = clock.tau1(grid)
-    states = solution.states(solution.attitude(z, route))
-    return tau1 * solution.tau1_unit, states, estimated_error(solution, grid, tau1, clock, route)
+def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Along, Array]:
+    """Return the motion at the times, (q̇, frame, λ) its series, and its error.
+
+    Many times leave λ to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest does
+    not.
+    """
+    windows = solution.windows(grid, clock.name)
+    count = 3 if windows.inversions == grid.size else 2
+
+    def evaluation(z: Array) -> tuple[Array, tuple[Array, ...]]:
+        attitude = solution.attitude(z, route)
+        return solution.rate_along(attitude), solution.states(attitude)[:count]
+
+    along = windows.along(clock, solution.in_tau1.rates, evaluation)
+    return along, estimated_error(solution, grid, along.tau1, clock, route) + along.error

@@ -12,12 +12,17 @@ __all__ = ["from_spheroconic", "to_spheroconic"]
 
 Array = NDArray[np.float64]
 
+#: Points taken at once.
+_BLOCK = 65536
+
 
 def to_spheroconic(A: Array, q: Array) -> Array:
     """Return λ_1 ≤ … ≤ λ_{n−1}, the zeros of Σ q_i² Π_{k≠i}(λ−I_k), shape (..., n−1).
 
     They are the eigenvalues of A⁻¹ restricted to q⊥; absolute error of a few ε·max I_i.
     """
+    if q.ndim == 2 and q.shape[0] > _BLOCK:
+        return np.concatenate([to_spheroconic(A, q[first : first + _BLOCK]) for first in range(0, q.shape[0], _BLOCK)])
     basis = tangent_basis(q)
     restricted = np.swapaxes(basis, -1, -2) @ ((1 / A)[:, None] * basis)
     return np.asarray(np.linalg.eigvalsh(restricted), dtype=np.float64)

@@ -1,0 +1,86 @@
+"""What an orbit costs, and which clock is the cheaper for given times: seconds on one core, from measurements.
+
+The Fourier clock costs its modes once, and all of them again at every inversion; panels cost evaluations all along the orbit, and
+their inversions nothing to speak of. A window of many times (analytic.windows) inverts the clock twice, a single time once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["GUARDED_FROM", "PANEL_CYCLES", "Costs"]
+
+#: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
+GUARDED_FROM = 200.0
+
+#: Cycles that panels are willing to cover: minutes.
+PANEL_CYCLES = 5e4
+
+#: Largest genus at which guard digits decide for the Fourier clock, which keeps them, whatever it costs.
+_GUARDED_GENUS = 4
+
+#: Modes with which a Fourier clock is chosen while panels serve.
+_MOST_MODES = 2e5
+
+#: The coefficients fall below 4e-16 = e^−36 inside a convex body of volume (36/π)^g/det T times this, half of it counted.
+_EXPONENT = 36.0
+_BODY = {1: 1.0, 2: 1.25, 3: 1.07, 4: 0.67}
+_HIGH_BODY = 0.29
+
+#: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
+_MODE, _MODES = 12e-6, 1e-3
+_MODE_INVERTED, _INVERSION = 0.13e-6, 1e-6
+_PANEL_CYCLE = {1: 6e-5, 2: 5e-4}
+_EVALUATION = {1: 1e-6, 2: 4e-6}
+_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 1.2e-3, 16e-6
+
+#: An inversion on panels, and the cycles that these reach beyond the times.
+_PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 2.0
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The costs of an orbit with Riemann matrix iT, ``determinant`` = det T, over so many cycles of its fastest phase."""
+
+    genus: int
+    determinant: float
+    cycles: float
+
+    @classmethod
+    def of(cls, T: NDArray[np.float64], cycles: float) -> Costs:
+        """Return the costs on the torus of T."""
+        return cls(T.shape[0], float(np.linalg.det(T)), cycles)
+
+    @property
+    def modes(self) -> float:
+        """Return about how many modes the Fourier clock has."""
+        if not self.determinant > 0:
+            return np.inf
+        return _BODY.get(self.genus, _HIGH_BODY) * (_EXPONENT / np.pi) ** self.genus / self.determinant
+
+    def fewest_in_window(self, nodes: int, clock: str) -> int:
+        """Return the times from which a window with so many nodes is cheaper than single times."""
+        inversion = _INVERSION + self.modes * _MODE_INVERTED if clock == "fourier" else _PANEL_INVERSION
+        evaluation = _EVALUATION.get(self.genus, _HIGH_EVALUATION)
+        return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
+
+    def seconds(self, clock: str, inversions: int) -> float:
+        """Return the seconds of a clock that is inverted so often; infinite where it is not taken of its own accord."""
+        if clock == "fourier":
+            of_modes = self.modes * (_MODE + inversions * _MODE_INVERTED)
+            return _MODES + of_modes + inversions * _INVERSION if self.modes <= _MOST_MODES else np.inf
+        if self.cycles > PANEL_CYCLES:
+            return np.inf
+        of_panels = (self.cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
+        return of_panels + inversions * _PANEL_INVERSION
+
+    def cheaper_clock(self, inversions: int) -> Literal["fourier", "panels"]:
+        """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits."""
+        fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))
+        keeps = self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < np.inf
+        beyond = panels == np.inf and self.genus <= _GUARDED_GENUS + 1
+        return "fourier" if keeps or beyond or fourier < panels else "panels"

@@ -1,0 +1,77 @@
+"""Many times at once: windows against the same motion time by time, and the choice of the clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from draws import random_problem
+from problems import TABLE, Case, tagged
+from veselova import NeumannSystem, solve
+from veselova.analytic.solve import solve as solve_analytic
+
+#: The stated slack of every error estimate.
+SLACK = 2.0
+
+#: Fewer times than these are taken one by one.
+FEW = 100
+
+MOVING = [case for case in TABLE if "at-rest" not in case.tags and case.problem().n <= 6]
+
+
+def assert_one_motion(many: object, single: object, chosen: np.ndarray) -> None:
+    for name in ("frame", "q", "tau1", "spheroconic"):
+        found, expected = many.series(name)[chosen], single.series(name)
+        size = np.maximum(1.0, np.max(np.abs(expected))) if name in ("tau1", "spheroconic") else 1.0
+        difference = np.max(np.abs(found - expected).reshape(chosen.size, -1), axis=1) / size
+        assert np.all(difference <= SLACK * (many.error[chosen] + single.error)), name
+
+
+@pytest.mark.parametrize("case", MOVING, ids=lambda case: case.name)
+def test_many_times_are_the_motion_of_each(case: Case) -> None:
+    problem, horizon = case.problem(), min(case.horizon, 20.0 / max(case.problem().turning, 1e-300))
+    times = np.unique(np.random.default_rng(1).uniform(-horizon, horizon, 1500))
+    chosen = np.sort(np.random.default_rng(2).permutation(times.size)[:FEW])
+    many, single = solve(problem, times), solve(problem, times[chosen])
+    assert_one_motion(many, single, chosen)
+    assert np.max(many.error) <= 2 * np.max(solve(problem, times[[0, -1]]).error)
+
+
+@pytest.mark.parametrize("method", ["theta", "angles"])
+@pytest.mark.parametrize("clock", ["fourier", "panels"])
+def test_windows_serve_either_clock_and_route(method: str, clock: str) -> None:
+    problem = random_problem(np.random.default_rng(4), 4)
+    # Dense here, sparse there, and in both directions.
+    times = np.unique(np.concatenate([np.linspace(-9, -7, 800), np.linspace(-5, 30, 50), np.geomspace(1e-6, 8, 900)]))
+    chosen = np.arange(0, times.size, 20)
+    many = solve_analytic(problem, times, method=method, clock=clock)
+    assert many.provenance.details["evaluations"] < times.size
+    assert_one_motion(many, solve_analytic(problem, times[chosen], method=method, clock=clock), chosen)
+    identity = np.swapaxes(many.frame, 1, 2) @ many.frame
+    assert np.max(np.abs(identity - np.eye(4))) < 1e-13
+
+
+def test_far_windows_keep_every_digit() -> None:
+    problem = random_problem(np.random.default_rng(6), 3)
+    times = 1e8 + np.linspace(0, 3, 1000)
+    chosen = np.arange(0, 1000, 11)
+    many, single = solve(problem, times), solve(problem, times[chosen])
+    assert many.provenance.details["evaluations"] < 500
+    assert np.max(np.abs(many.frame[chosen] - single.frame)) < 1e-13
+
+
+def test_windows_serve_neumann_time() -> None:
+    problem = NeumannSystem([3, 2, 1], [0.6, 0.48, 0.64], [0.8, -0.36, -0.48])
+    times = np.linspace(-10, 10, 2000)
+    many, single = solve(problem, times), solve(problem, times[::25])
+    assert many.provenance.details["evaluations"] < 2000
+    assert np.max(np.abs(many.frame[::25] - single.frame)) < 1e-13
+
+
+def test_the_clock_is_chosen_by_what_it_costs() -> None:
+    problem = tagged("reference", "generic")[-1].problem()
+    near, far = solve(problem, [1.0]), solve(problem, [100.0])
+    for found in (near, far):
+        estimates = found.provenance.details["clock_estimates"]
+        assert found.provenance.details["clock"] == min(estimates, key=estimates.__getitem__)
+    assert near.provenance.details["clock"] == "panels"
