@@ -79,15 +79,13 @@ class Frame:
 def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
     """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-8, (N, n², d)."""
     count, genus, number = directions.shape
-    result = np.empty((count, genus + 1, genus + 1, number))
-    for d in range(number):
-        # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
-        length = _STEP / np.maximum(1.0, np.max(np.abs(directions[:, :, d]), axis=1))
-        step = directions[:, :, d] * (length[:, None] / 2)
-        upper, lower = attitude(points + step), attitude(points - step)
-        result[:, :, 0, d] = (upper.q - lower.q) / length[:, None]
-        result[:, :, 1:, d] = (upper.normals - lower.normals) / length[:, None, None]
-    return result.reshape(count, -1, number)
+    # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
+    length = _STEP / np.maximum(1.0, np.max(np.abs(directions), axis=1))
+    steps = np.moveaxis(directions * (length[:, None, :] / 2), 2, 0)
+    ends = np.concatenate([points + steps, points - steps]).reshape(-1, genus)
+    at = attitude(ends)
+    entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(2, number, count, -1)
+    return np.asarray(np.moveaxis(entries[0] - entries[1], 0, 2) / length[:, None, :])
 
 
 @dataclass(frozen=True)
