@@ -8,6 +8,7 @@ and analytic.panel_clock.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
@@ -112,12 +113,17 @@ def _factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic)
     return arithmetic.number(curve.branch_points[2 * s + 1]) / point if time == "s" else 1 + 0 * point
 
 
-def clock_rate(spectrum: Spectrum, q: Values, time: str, arithmetic: Arithmetic) -> Values:
-    """Return dτ₁/d(time), a power of (q,Aq), at positions (N, m) along the moving directions; the start gives its factor."""
+def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:
+    """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving directions."""
     start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
-    ratio = ((q * q) @ A) / ((start * start) @ A)
-    power = 1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
-    return np.asarray(arithmetic.number(spectrum.clock_rate) * power)
+    size, at_start = (start * start) @ A, arithmetic.number(spectrum.clock_rate)
+
+    def rate(q: Values) -> Values:
+        ratio = ((q * q) @ A) / size
+        power = 1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
+        return np.asarray(at_start * power)
+
+    return rate
 
 
 class Clock(ABC):

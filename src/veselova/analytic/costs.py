@@ -6,11 +6,9 @@ their inversions nothing to speak of. A window of many times (analytic.windows) 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 __all__ = ["GUARDED_FROM", "PANEL_CYCLES", "Costs"]
 
@@ -50,17 +48,12 @@ class Costs:
     determinant: float
     cycles: float
 
-    @classmethod
-    def of(cls, T: NDArray[np.float64], cycles: float) -> Costs:
-        """Return the costs on the torus of T."""
-        return cls(T.shape[0], float(np.linalg.det(T)), cycles)
-
     @property
     def modes(self) -> float:
         """Return about how many modes the Fourier clock has."""
         if not self.determinant > 0:
-            return np.inf
-        return _BODY.get(self.genus, _HIGH_BODY) * (_EXPONENT / np.pi) ** self.genus / self.determinant
+            return math.inf
+        return _BODY.get(self.genus, _HIGH_BODY) * (_EXPONENT / math.pi) ** self.genus / self.determinant
 
     def fewest_in_window(self, nodes: int, clock: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""
@@ -72,15 +65,15 @@ class Costs:
         """Return the seconds of a clock that is inverted so often; infinite where it is not taken of its own accord."""
         if clock == "fourier":
             of_modes = self.modes * (_MODE + inversions * _MODE_INVERTED)
-            return _MODES + of_modes + inversions * _INVERSION if self.modes <= _MOST_MODES else np.inf
+            return _MODES + of_modes + inversions * _INVERSION if self.modes <= _MOST_MODES else math.inf
         if self.cycles > PANEL_CYCLES:
-            return np.inf
+            return math.inf
         of_panels = (self.cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
         return of_panels + inversions * _PANEL_INVERSION
 
     def cheaper_clock(self, inversions: int) -> Literal["fourier", "panels"]:
         """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits."""
         fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))
-        keeps = self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < np.inf
-        beyond = panels == np.inf and self.genus <= _GUARDED_GENUS + 1
+        keeps = self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < math.inf
+        beyond = panels == math.inf and self.genus <= _GUARDED_GENUS + 1
         return "fourier" if keeps or beyond or fourier < panels else "panels"

@@ -84,7 +84,7 @@ class EnclosedSolution:
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         attitude = self._attitude(self.orbit.phases(tau1))
-        q_dot = (attitude.q_prime * clock_rate(self.spectrum, attitude.q, "t", xp)[:, None]) @ self._directions.T
+        q_dot = (attitude.q_prime * clock_rate(self.spectrum, "t", xp)(attitude.q)[:, None]) @ self._directions.T
         frame = np.empty((len(times), n, n), dtype=object)
         frame[:, :, 0] = attitude.q @ self._directions.T
         frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part

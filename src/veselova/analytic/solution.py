@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -119,11 +120,15 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
         if not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return 1 / clock_rate(self.spectrum, self.quotients.position(z), self.problem.time, DOUBLE)
+        return np.asarray(1 / self._rate_of_position(self.quotients.position(z)))
 
     def rate_along(self, attitude: Attitude) -> Array:
         """Return dt/dτ₁ at points where the attitude is known."""
-        return np.asarray(1 / clock_rate(self.spectrum, attitude.q, self.problem.time, DOUBLE))
+        return np.asarray(1 / self._rate_of_position(attitude.q))
+
+    @cached_property
+    def _rate_of_position(self) -> Callable[[Array], Array]:
+        return clock_rate(self.spectrum, self.problem.time, DOUBLE)
 
     @property
     def near_separatrix(self) -> bool:
@@ -171,7 +176,7 @@ class Solution:
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None and self.near_separatrix:
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
-        if (name or self.costs(times).cheaper_clock(self._inversions(times))) == "fourier":
+        if (name or self.costs(times).cheaper_clock(self.windows(times, "fourier").inversions)) == "fourier":
             return self._fourier(guarded)
         if cycles > PANEL_CYCLES:
             limit = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
@@ -195,24 +200,29 @@ class Solution:
 
     def costs(self, times: Array) -> Costs:
         """Return what the clocks cost for given times."""
-        return Costs.of(self.periods.riemann_matrix, self.cycles(times))
+        return Costs(self.curve.genus, self._determinant, self.cycles(times))
 
-    def _inversions(self, times: Array) -> int:
-        return self.windows(times, "fourier").inversions
+    @cached_property
+    def _determinant(self) -> float:
+        return float(np.linalg.det(self.periods.riemann_matrix))
 
     def clock_estimates(self, times: Array) -> dict[str, float]:
         """Return the seconds that either clock was thought to take, those out of the question left out."""
-        seconds = {name: self.costs(times).seconds(name, self._inversions(times)) for name in ("fourier", "panels")}
+        costs, inversions = self.costs(times), self.windows(times, "fourier").inversions
+        seconds = {name: costs.seconds(name, inversions) for name in ("fourier", "panels")}
         return {name: round(value, 5) for name, value in seconds.items() if np.isfinite(value)}
 
     def windows(self, times: Array, clock: str) -> Windows:
         """Return the windows in which many times are interpolated, where that is cheaper with the clock."""
-        return Windows(times, float(np.max(np.abs(self.in_time.rates))), self.costs(times).fewest_in_window(NODES, clock))
+        return Windows(times, self._fastest, self.costs(times).fewest_in_window(NODES, clock))
 
     def cycles(self, times: Array) -> float:
-        """Return the most cycles that any phase makes between t = 0 and the times."""
-        with np.errstate(over="ignore"):
-            return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(times)))
+        """Return the most cycles that any phase makes between t = 0 and the times, which increase."""
+        return self._fastest * max(abs(float(times[0])), abs(float(times[-1])))
+
+    @cached_property
+    def _fastest(self) -> float:
+        return float(np.max(np.abs(self.in_time.rates)))
 
     @cached_property
     def steepness(self) -> Steepness:
@@ -279,9 +289,7 @@ class Solution:
         frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
-        q_dot = (attitude.q_prime @ moving.directions.T) * clock_rate(self.spectrum, attitude.q, self.problem.time, DOUBLE)[
-            :, None
-        ]
+        q_dot = (attitude.q_prime @ moving.directions.T) * self._rate_of_position(attitude.q)[:, None]
         if attitude.spheroconic.size:
             frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
             spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)

@@ -53,7 +53,7 @@ class Orbit:
         z = self.phases(tau1)
         if self.position is None:
             return self.rate.at(self.rate.inversion.invert(z))
-        return 1 / clock_rate(self.spectrum, self.position(z), "t", self.rate.inversion.arithmetic)
+        return 1 / clock_rate(self.spectrum, "t", self.rate.inversion.arithmetic)(self.position(z))
 
     @cached_property
     def strip(self) -> tuple[float, Any]:

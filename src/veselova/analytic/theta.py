@@ -115,20 +115,34 @@ class Theta:
         return np.exp(-np.pi * quadratic), r, nearest
 
     def _sum(self, z: Array, characteristic: Characteristic, bells: Array, r: Array, nearest: Array) -> Array:
-        F, G = self._split
-        S, C, _, factor = self._parts
-        k = self._gaussian_lattice
-        epsilon_G = np.array([characteristic.epsilon[i] for i in G], dtype=float)
-        signs = 1 - 2 * np.mod(k @ epsilon_G, 2)
-        outer_sign = 1 - 2 * np.mod(nearest @ epsilon_G, 2)
+        F, (_, C, _, factor) = self._split[0], self._parts
+        if characteristic not in self._terms:
+            self._terms[characteristic] = self._term(characteristic)
+        epsilon_G, signs, x, weights, crossing = self._terms[characteristic]
+        outer_sign = factor * (1 - 2 * np.mod(nearest @ epsilon_G, 2))
         if not F:
-            return np.asarray(factor * outer_sign * (bells @ signs))
-        x = self._wave_lattice(characteristic.epsilon)
-        weights = np.exp(-np.pi * np.sum((x @ S) * x, axis=1))
+            return np.asarray(outer_sign * (bells @ signs))
         y_F = z[:, F] + np.array([characteristic.delta[i] / 2 for i in F])
         waves = np.exp(2j * np.pi * ((y_F - r @ C.T) @ x.T)) * weights
-        crossing = np.exp(2j * np.pi * (k @ C.T @ x.T)) * signs[:, None]
-        return np.asarray(factor * outer_sign * np.sum(waves * (bells @ crossing), axis=1).real)
+        return np.asarray(outer_sign * np.sum(waves * (bells @ crossing), axis=1).real)
+
+    @cached_property
+    def _terms(self) -> dict[Characteristic, tuple[Array, ...]]:
+        return {}
+
+    def _term(self, characteristic: Characteristic) -> tuple[Array, ...]:
+        """Return what a sum takes at any z: ε_G, the signs of the bells, the x, their weights, and e^{2πi x·Ck}."""
+        k, (S, C, _, _) = self._gaussian_lattice, self._parts
+        epsilon_G = np.array([characteristic.epsilon[i] for i in self._split[1]], dtype=float)
+        signs = 1 - 2 * np.mod(k @ epsilon_G, 2)
+        x = self._wave_lattice(characteristic.epsilon)
+        return (
+            epsilon_G,
+            signs,
+            x,
+            np.exp(-np.pi * np.sum((x @ S) * x, axis=1)),
+            np.exp(2j * np.pi * (k @ C.T @ x.T)) * signs[:, None],
+        )
 
 
 def _schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array, float]:

@@ -117,12 +117,14 @@ class Windows:
     @cached_property
     def _cells(self) -> _Cells:
         """Return the windows of the first length that are worth while."""
+        if self._times.size < _FEW_TIMES:
+            return _Cells(self._length, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))
         keys = np.floor(self._times / self._length)
         borders = np.concatenate([[0], np.flatnonzero(np.diff(keys)) + 1, [keys.size]])
         cells = _Cells(
             self._length, keys[borders[:-1]] * self._length, borders[:-1], borders[1:], np.full(borders.size - 1, np.inf)
         )
-        return cells[cells.worth_while(self._fewest if keys.size >= _FEW_TIMES else keys.size + 1)]
+        return cells[cells.worth_while(self._fewest)]
 
     @property
     def span(self) -> tuple[float, float]:
@@ -133,6 +135,8 @@ class Windows:
     @property
     def inversions(self) -> int:
         """Return how often the clock will be inverted at least: at the ends of windows, and at times in none."""
+        if self._times.size < _FEW_TIMES:
+            return int(self._times.size)
         return int(self._times.size - np.sum(self._cells.last - self._cells.first) + 2 * self._cells.starts.size)
 
     def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
