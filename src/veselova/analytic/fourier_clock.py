@@ -57,8 +57,10 @@ class FourierClock(Clock):
         self._modes, coefficients = modes[order], coefficients[order]
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
         self._amplitudes = coefficients / (np.pi * (self._modes @ in_tau1.rates))
-        self._rates = 2 * coefficients
-        self._offset = 2 * np.pi * (self._modes @ in_tau1.start)
+        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h and cos(2πm·z⁰+2h), of sin h cos h and sin²h.
+        offset, both = 2 * np.pi * (self._modes @ in_tau1.start), 2 * np.stack([self._amplitudes, 2 * coefficients], axis=1)
+        wave = np.stack([np.cos(offset), np.sin(offset)], axis=1)
+        self._weights = both * np.stack([wave[:, 0], -wave[:, 1]], axis=1), both * wave[:, ::-1]
 
     @property
     def size(self) -> int:
@@ -84,15 +86,16 @@ class FourierClock(Clock):
 
         The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
         """
-        value, slope = np.empty(advance.shape[0]), np.empty(advance.shape[0])
+        result = np.empty((advance.shape[0], 2))
         modes, block = self._modes[:size], max(1, _BLOCK // max(size, 1))
+        of_products, of_squares = self._weights[0][:size], self._weights[1][:size]
         for first in range(0, advance.shape[0], block):
             rows = slice(first, first + block)
             half = np.pi * (advance[rows] @ modes.T)
-            middle = half + self._offset[:size]
-            value[rows] = 2 * (np.cos(middle) * np.sin(half)) @ self._amplitudes[:size]
-            slope[rows] = np.cos(middle + half) @ self._rates[:size]
-        return value, slope
+            sine = np.sin(half)
+            result[rows] = (sine * np.cos(half, out=half)) @ of_products - np.square(sine, out=sine) @ of_squares
+        result[:, 1] += np.sum(of_squares[:, 1]) / 2
+        return result[:, 0], result[:, 1]
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z): Newton's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
