@@ -19,9 +19,10 @@ GUARDED_FROM = 200.0
 PANEL_CYCLES = 5e4
 
 #: Largest genus at which guard digits decide for the Fourier clock, which keeps them, whatever it costs.
-_GUARDED_GENUS = 4
+_GUARDED_GENUS = 3
 
-#: Modes with which a Fourier clock is chosen while panels serve.
+#: Largest genus at which a Fourier clock is the last resort where panels do not reach, and modes with which it is chosen before.
+_LAST_RESORT_GENUS = 5
 _MOST_MODES = 2e5
 
 #: The coefficients fall below 4e-16 = e^−36 inside a convex body of volume (36/π)^g/det T times this, half of it counted.
@@ -75,5 +76,5 @@ class Costs:
         """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits."""
         fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))
         keeps = self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < math.inf
-        beyond = panels == math.inf and self.genus <= _GUARDED_GENUS + 1
+        beyond = panels == math.inf and self.genus <= _LAST_RESORT_GENUS
         return "fourier" if keeps or beyond or fourier < panels else "panels"

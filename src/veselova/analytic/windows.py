@@ -46,6 +46,9 @@ _FARTHEST = 2.0**32
 #: A Newton step of this size, in half windows, leaves an error of its square.
 _SETTLED = 1e-9
 
+#: Windows tried before the others of the same length.
+_FIRST_WINDOWS = 8
+
 #: Windows made at once; times evaluated one by one at once, and in a window. They bound the memory.
 _WINDOWS, _TIMES, _TIMES_IN_WINDOW = 256, 32768, 4096
 
@@ -145,7 +148,11 @@ class Windows:
         for _ in range(_MOST_HALVINGS):
             if cells.starts.size == 0:
                 break
-            left = [filling.by_windows(cells[k : k + _WINDOWS]) for k in range(0, cells.starts.size, _WINDOWS)]
+            left = [filling.by_windows(cells[:_FIRST_WINDOWS])]
+            if 2 * left[0].starts.size > _FIRST_WINDOWS:
+                left.append(cells[_FIRST_WINDOWS:])  # most of them are too long
+            else:
+                left += [filling.by_windows(cells[k : k + _WINDOWS]) for k in range(_FIRST_WINDOWS, cells.starts.size, _WINDOWS)]
             joined = (np.concatenate([getattr(part, name) for part in left]) for name in ("starts", "first", "last", "tails"))
             halves = _Cells(cells.length, *joined).halved(self._times)
             cells = halves[halves.worth_while(self._fewest)]
