@@ -164,20 +164,19 @@ class Veselova(TorusProblem):
         return frozenset({"q_p"})
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return q, the first column of the frame, or the body angular velocity ω = q∧q̇, equation (44.3)."""
+        """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the body, equation (44.3)."""
         q, q_dot = series["frame"][..., 0], series["q_dot"]
         if name == "q":
             return np.asarray(q)
+        if name == "spheroconic":
+            return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
         product = q[..., :, None] * q_dot[..., None, :]
         return np.asarray(product - np.swapaxes(product, -1, -2))
 
     def completed(self, series: Series) -> Series:
-        """Return series along the principal axes of A in the body axes, with the spheroconic coordinates."""
-        spheroconic = series.get("spheroconic")
-        if spheroconic is None:
-            spheroconic = to_spheroconic(self.A, series["frame"][:, :, 0])
+        """Return series along the principal axes of A in the body axes; spheroconic coordinates only where they were found."""
         turned = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
-        return {"tau1": series["tau1"], "spheroconic": spheroconic, **turned}
+        return {**series, **turned}
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along states in the body axes, by name, first axis the times.
