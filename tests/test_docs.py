@@ -73,6 +73,7 @@ def test_the_request_of_the_readme_is_answered(server: Server) -> None:
         "docs/container.md",
         "docs/service.md",
         "docs/accuracy.md",
+        "docs/performance.md",
     ],
 )
 def test_links_and_named_files_exist(name: str) -> None:
