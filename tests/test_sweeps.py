@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
+import re
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +34,7 @@ from veselova.service.problem_details import Refused
 from veselova.service.results import Result
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
-from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
+from veselova.service.summaries import Chunk, OtherVersion, computed_chunk, lost_chunk
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
@@ -220,6 +223,18 @@ def test_a_problem_whose_worker_died_says_so() -> None:
 
     (row,) = parquet.read_table(io.BytesIO(lost_chunk(request(), 3).table)).to_pylist()
     assert (row["row"], row["outcome"]) == (3, "worker-lost")
+
+
+def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
+    with pytest.raises(OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"):
+        computed_chunk(request().canonical, 0, 1, "0.0.0")
+
+
+def test_a_finished_job_keeps_its_results_and_no_chunks(tmp_path: Path) -> None:
+    job, jobs = run_sweep(request(times=[0, 1], trajectories=True), local_settings(tmp_path, 1), lambda done, total: None)
+    names = {path.name for path in (tmp_path / "jobs" / job.id).iterdir()} - {"lock"}
+    assert names == {"summaries.parquet", "trajectories.zarr.zip"}
+    assert jobs.missing(job) == []
 
 
 def test_equal_requests_are_one_job_and_others_are_not() -> None:
@@ -478,6 +493,25 @@ def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, 
     packed = zarr.open_group(zarr.storage.ZipStore(jobs.packed_path(job.id), mode="r"), mode="r")
     assert np.all(np.isfinite(packed["tau1"][:]))
     assert not jobs.trajectories_path(job.id).exists()
+
+
+def test_a_sweep_does_not_notice_that_the_clock_is_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock of the wall jumps by days, to and fro, each time that the store or the cluster looks at it."""
+    job, undisturbed = run_sweep(request(), local_settings(tmp_path / "one", 1), lambda done, total: None)
+    days = itertools.cycle([3, -5, 0, 400, -1])
+    clock = time.time
+
+    class Jumping(datetime):
+        @classmethod
+        def now(cls, tz: Any = None) -> datetime:
+            return datetime.now(tz) + timedelta(days=next(days))
+
+    monkeypatch.setattr("veselova.service.jobs.datetime", Jumping)
+    monkeypatch.setattr("distributed.scheduler.time", lambda: clock() + 86400 * next(days))
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 3)
+    disturbed_job, disturbed = run_sweep(request(), local_settings(tmp_path / "two", 1), lambda done, total: None)
+    assert disturbed_job.state == "finished"
+    assert disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
 
 
 def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:
