@@ -14,8 +14,9 @@ __all__ = ["Cache"]
 
 _LOG = logging.getLogger("veselova.service")
 
-#: What is left after entries had to go, as a part of what may be: the next few answers need no search through the folder.
-_KEPT = 0.9
+#: What is left after entries had to go, as a part of what may be; and what may be added before the folder is searched again,
+#: which takes time in proportion to the entries. Servers that share it may exceed its size by as much each.
+_KEPT, _UNSEEN = 0.9, 0.1
 
 #: The end of the name of an entry on its way into the cache, and the nanoseconds after which it will not arrive any more.
 _PART, _ARRIVAL_NS = ".part", 600 * 10**9
@@ -31,6 +32,7 @@ class Cache:
     def __init__(self, folder: Path, size: int) -> None:
         self._folder, self._size = folder, size
         self._failing = False
+        self._room = 0
 
     def find(self, name: str) -> Path | None:
         """Return the file of an entry, which is now the one used last, or None."""
@@ -56,7 +58,9 @@ class Cache:
             if size > self._size:
                 return False
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._make_room(size)
+            if size > self._room:
+                self._room = self._make_room(size)
+            self._room -= size
             shutil.move(source, part)  # a copy, where the source is on another disk
             part.replace(self._path(name))
         except OSError as error:
@@ -78,8 +82,11 @@ class Cache:
     def _path(self, name: str) -> Path:
         return self._folder / f"{name}.npz"
 
-    def _make_room(self, size: int) -> None:
-        """Remove the entries used longest ago until so many bytes fit. What another server removes meanwhile is gone as well."""
+    def _make_room(self, size: int) -> int:
+        """Remove the entries used longest ago until so many bytes fit, and return how many may be added before the next search.
+
+        What another server removes meanwhile is gone as well.
+        """
         entries = []
         with os.scandir(self._folder) as found:
             for entry in found:
@@ -89,8 +96,9 @@ class Cache:
                     continue
                 entries.append((state.st_mtime_ns, state.st_size, entry.path))
         total = sum(held for _, held, _ in entries)
+        unseen = max(size, int(_UNSEEN * self._size))
         if total + size <= self._size:
-            return
+            return min(self._size - total, unseen)
         arriving = time.time_ns() - _ARRIVAL_NS
         for used, held, path in sorted(entries):
             if path.endswith(_PART) and used > arriving:
@@ -98,7 +106,8 @@ class Cache:
             Path(path).unlink(missing_ok=True)
             total -= held
             if total + size <= _KEPT * self._size:
-                return
+                break
+        return min(self._size - total, unseen)
 
     def report(self, reason: str) -> None:
         """Say why answers are not cached, once until one is again."""
