@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
-from decimal import Decimal
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.decimals import Decimals, decimals_of
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.table import row_blocks
 
@@ -71,10 +70,8 @@ def read_archive(problem: Problem, archive: Mapping[str, NDArray[Any]]) -> Traje
     if f"{next(iter(problem.outputs))}_{_DECIMAL}" not in archive:
         series = {name: archive[name] for name in problem.outputs if name not in problem.derived}
         return Trajectory(problem, archive["times"], archive["error"], series, provenance)
-    midpoints, radii = ({name: _numbers(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS))
+    midpoints, radii = (
+        {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
+    )
     decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii)
     return Trajectory.of_decimals(problem, archive["times"], decimals, provenance)
-
-
-def _numbers(texts: NDArray[Any]) -> NDArray[Any]:
-    return np.asarray(np.vectorize(Decimal, otypes=[object])(texts))

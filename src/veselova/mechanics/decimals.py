@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import localcontext
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import BackendMissing
 
-__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "beyond_double"]
+__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "beyond_double", "decimals_of"]
 
 Objects = NDArray[np.object_]
 
@@ -29,6 +29,11 @@ _SPARE_DIGITS = 30
 def beyond_double(digits: int, certified: bool) -> bool:
     """Return whether an answer with so many digits, or with certified errors, has decimals and takes its data exactly."""
     return digits > FEWEST_DIGITS or certified
+
+
+def decimals_of(texts: Any) -> Objects:
+    """Return the decimals that texts state, an array or nested lists of them."""
+    return np.asarray(np.vectorize(Decimal, otypes=[object])(np.asarray(texts, dtype=object)))
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,7 +11,7 @@ from veselova.mechanics.errors import InvalidInput
 from veselova.service.estimates import require_hope
 from veselova.service.negotiation import accepted_type
 from veselova.service.problem_details import Refused
-from veselova.service.schemas import ComparisonRequest, TorusRequest
+from veselova.service.schemas import ComparisonRequest, TorusRequest, layers
 from veselova.service.settings import Settings
 
 __all__ = ["admit", "decoded", "read_json", "require_acceptable"]
@@ -46,21 +46,13 @@ async def read_json(request: Request, settings: Settings) -> Any:
 
 
 def _require_modest(document: Any, settings: Settings) -> None:
-    """Raise InvalidInput where a document is deeper, or has longer texts, than the settings allow; without recursion."""
-    layer = [document]
-    for _ in range(settings.max_depth + 1):
+    """Raise InvalidInput where a document is deeper, or has longer texts, than the settings allow."""
+    for depth, layer in enumerate(layers(document)):
+        if depth > settings.max_depth:
+            raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
         longest = max((len(value) for value in layer if isinstance(value, str)), default=0)
         if longest > settings.max_text:
             raise InvalidInput((), f"texts of at most {settings.max_text} characters", f"one of {longest}")
-        layer = [
-            item
-            for value in layer
-            if isinstance(value, (dict, list))
-            for item in (value.values() if isinstance(value, dict) else value)
-        ]
-        if not layer:
-            return
-    raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
 
 
 def decoded(text: bytes) -> Any:

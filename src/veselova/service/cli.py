@@ -115,7 +115,7 @@ def demo(method: _Method = None, plot: _Plot = None) -> None:
 @app.command()
 def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None) -> None:
     """Solve a motion with one engine."""
-    from veselova.service.console import print_trajectory
+    from veselova.service.console import print_json, print_trajectory, terminal
     from veselova.service.documents import trajectory_document
     from veselova.service.schemas import TrajectoryRequest, read_request
     from veselova.service.tasks import requested_trajectory
@@ -130,9 +130,9 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     if plot:
         _draw(trajectory, plot)
     if json:
-        _print_json(trajectory_document(trajectory, request.outputs))
+        print_json(trajectory_document(trajectory, request.outputs))
     else:
-        print_trajectory(_console(), trajectory)
+        print_trajectory(terminal(), trajectory)
         _say_written(output, plot)
 
 
@@ -146,7 +146,7 @@ def compare(file: _File, json: _Json = False, output: _Output = None, plot: _Plo
 
 
 def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
-    from veselova.service.console import print_comparison
+    from veselova.service.console import print_comparison, print_json, terminal
     from veselova.service.documents import comparison_document
     from veselova.service.schemas import ComparisonRequest, read_request
     from veselova.service.tasks import requested_comparison
@@ -162,16 +162,16 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     if plot:
         _draw(comparison, plot)
     if json:
-        _print_json(comparison_document(comparison, request.outputs))
+        print_json(comparison_document(comparison, request.outputs))
     else:
-        print_comparison(_console(), comparison)
+        print_comparison(terminal(), comparison)
         _say_written(output, plot)
 
 
 @app.command()
 def torus(file: _File, json: _Json = False) -> None:
     """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
-    from veselova.service.console import print_torus
+    from veselova.service.console import print_json, print_torus, terminal
     from veselova.service.schemas import TorusRequest, read_request
     from veselova.service.tasks import requested_torus
 
@@ -182,9 +182,9 @@ def torus(file: _File, json: _Json = False) -> None:
     with _within_budget(document):
         answer = requested_torus(request)
     if json:
-        _print_json(answer.as_dict())
+        print_json(answer.as_dict())
     else:
-        print_torus(_console(), answer)
+        print_torus(terminal(), answer)
 
 
 @app.command()
@@ -218,20 +218,6 @@ def _document(file: str) -> Any:
     except OSError as error:
         raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
     return decoded(text)
-
-
-def _console() -> Any:
-    from rich.console import Console
-
-    # Tables keep their columns when the output is a file; a terminal's own width is taken as it is.
-    return Console(width=None if sys.stdout.isatty() else 120)
-
-
-def _print_json(document: Any) -> None:
-    from veselova.service.documents import encoded
-
-    sys.stdout.buffer.write(encoded(document) + b"\n")
-    sys.stdout.buffer.flush()
 
 
 #: Fields of a motion's request that say nothing of its torus.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,14 +13,26 @@ from rich.table import Table
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Trajectory
+from veselova.service.documents import encoded
 
-__all__ = ["print_comparison", "print_torus", "print_trajectory"]
+__all__ = ["print_comparison", "print_json", "print_torus", "print_trajectory", "terminal"]
 
 #: Rows of a trajectory that a terminal is shown; files and JSON have all.
 _SHOWN_TIMES = 12
 
 #: Components of the series shown.
 _SHOWN_COMPONENTS = 6
+
+
+def terminal() -> Console:
+    """Return standard output. Tables keep their columns when it is a file; a terminal's own width is taken as it is."""
+    return Console(width=None if sys.stdout.isatty() else 120)
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """Print a document on one line."""
+    sys.stdout.buffer.write(encoded(document) + b"\n")
+    sys.stdout.buffer.flush()
 
 
 def _table(*columns: str) -> Table:

@@ -7,6 +7,7 @@ in ``veselova.migrations`` alone; what is written here must say the same, and a 
 from __future__ import annotations
 
 import threading
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,18 @@ from alembic.script import ScriptDirectory
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.settings import Settings
 
-__all__ = ["api_keys", "chunks", "connect", "database_url", "idempotency_keys", "jobs", "metadata", "schema_differences"]
+__all__ = [
+    "api_keys",
+    "chunks",
+    "connect",
+    "database_url",
+    "idempotency_keys",
+    "in_utc",
+    "jobs",
+    "metadata",
+    "reason_of",
+    "schema_differences",
+]
 
 metadata = sa.MetaData()
 
@@ -129,6 +141,16 @@ def _migrate(connection: sa.Connection) -> None:
     with EnvironmentContext(config, script, fn=steps) as environment:
         environment.configure(connection=connection, target_metadata=metadata, render_as_batch=True)
         environment.run_migrations()
+
+
+def in_utc(moment: datetime) -> datetime:
+    """Return a moment in UTC; SQLite gives back what was stored in UTC without saying so."""
+    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+
+
+def reason_of(error: Exception) -> str:
+    """Return what the disk or the database says, without statements, addresses or paths."""
+    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(".")
 
 
 def schema_differences(engine: sa.Engine) -> list[Any]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Mapping
-from decimal import Decimal
 from typing import Any, BinaryIO
 
 import numpy as np
 import orjson
 
 from veselova.mechanics.comparison import Comparison
-from veselova.mechanics.decimals import Decimals
+from veselova.mechanics.decimals import Decimals, decimals_of
 from veselova.mechanics.errors import InternalContradiction
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.table import row_blocks
@@ -69,16 +68,12 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
 
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     midpoints, radii = (
-        {name: _decimals(document[kind][name]) for name in stored_outputs(problem)} for kind in ("series", "radii")
+        {name: decimals_of(document[kind][name]) for name in stored_outputs(problem)} for kind in ("series", "radii")
     )
     provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     decimals = Decimals.with_derived(provenance.digits, certified, midpoints, radii)
     return Trajectory.of_decimals(problem, np.array(document["times"], dtype=np.float64), decimals, provenance)
-
-
-def _decimals(strings: Any) -> Any:
-    return np.vectorize(Decimal, otypes=[object])(np.array(strings, dtype=object))
 
 
 def comparison_document(comparison: Comparison, outputs: Iterable[str] | None = None) -> dict[str, Any]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -14,6 +13,7 @@ import orjson
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.table import Target
 from veselova.mechanics.trajectory import Provenance
+from veselova.service.whole_file import whole_file
 
 __all__ = ["MEDIA_TYPES", "Sink", "media_type_of", "provenance_of", "sink_of"]
 
@@ -56,15 +56,8 @@ class Sink:
             yield self.stream.write
             return
         assert self.path is not None
-        part = self.path.with_name(f".{self.path.name}.{uuid.uuid4().hex}.part")
-        try:
-            with part.open("xb") as file:
-                yield file.write
-            part.replace(self.path)
-        except BaseException:
-            with suppress(OSError):
-                part.unlink()
-            raise
+        with whole_file(self.path) as part, part.open("xb") as file:
+            yield file.write
 
 
 def sink_of(target: Target) -> Sink:

@@ -14,6 +14,7 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.admission import admit, read_json, require_acceptable
+from veselova.service.download import MEDIA_TYPES
 from veselova.service.job_document import JobDocument, job_document
 from veselova.service.job_service import JobService
 from veselova.service.negotiation import accepted_type
@@ -41,7 +42,7 @@ _ACCEPTED: dict[int | str, dict[str, Any]] = {202: {"model": JobDocument, "descr
 _REMOVED: dict[int | str, dict[str, Any]] = {204: {"description": "The job is forgotten"}}
 
 #: Formats of a table: media type → how its file ends.
-_TABLES = {"application/vnd.apache.parquet": "parquet", "text/csv": "csv", "application/vnd.apache.arrow.stream": "arrow"}
+_TABLES = {MEDIA_TYPES[name]: name for name in ("parquet", "csv", "arrow")}
 _TABLE: dict[int | str, dict[str, Any]] = {
     200: {"description": "The table", "content": {name: {"schema": {"type": "string", "format": "binary"}} for name in _TABLES}}
 }
@@ -130,7 +131,7 @@ class _JobRoutes:
         if not path.is_file():
             raise Refused("no-such-resource", "The files of this job are gone; POST its request again.")
         name = f"{job_id}.{_TABLES[media_type]}"
-        if media_type == "application/vnd.apache.parquet":
+        if _TABLES[media_type] == "parquet":
             return FileResponse(path, media_type=media_type, filename=name)
         from veselova.service.results import table_stream
 

@@ -6,11 +6,13 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import anyio
+from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.mechanics.errors import BackendMissing
+from veselova.service.database import reason_of
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 
@@ -63,53 +65,42 @@ class JobService:
 
     async def _opened(self) -> Sweeps:
         try:
-            from sqlalchemy.exc import SQLAlchemyError
-
             from veselova.service.jobs import Jobs
             from veselova.service.sweeps import Sweeps
         except ImportError as error:
             self.failure = f"{error.name} is not installed"
-            raise BackendMissing(error.name or "sqlalchemy", "A sweep", "pip install 'veselova[sweeps]'") from None
+            raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
         try:
             jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
             sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
             await sweeps.resume()
             self._watching = asyncio.create_task(sweeps.watch())
         except (OSError, SQLAlchemyError) as error:
-            self.failure = _reason(error)
+            self.failure = reason_of(error)
             raise Refused("storage-unavailable", f"Jobs cannot be stored at present: {self.failure}.", retry_after=30) from None
         self.failure = ""
         return sweeps
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
         """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or the database refuse."""
-        from sqlalchemy.exc import SQLAlchemyError
-
         sweeps = await self.sweeps()
         try:
             return await anyio.to_thread.run_sync(call, sweeps.jobs)
         except (OSError, SQLAlchemyError) as error:
-            _LOG.warning("the storage of jobs failed: %s", _reason(error))
-            detail = f"Jobs cannot be stored or read at present: {_reason(error)}."
+            _LOG.warning("the storage of jobs failed: %s", reason_of(error))
+            detail = f"Jobs cannot be stored or read at present: {reason_of(error)}."
             raise Refused("storage-unavailable", detail, retry_after=30) from None
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not answer. Blocks."""
         if self._sweeps is None:
             return {}
-        from sqlalchemy.exc import SQLAlchemyError
-
         try:
             return self._sweeps.jobs.counts()
         except (OSError, SQLAlchemyError) as error:
-            _LOG.warning("the storage of jobs failed: %s", _reason(error))
+            _LOG.warning("the storage of jobs failed: %s", reason_of(error))
             return {}
 
     async def require(self) -> None:
         """Raise Refused (``storage-unavailable``) unless the database can be written."""
         await self.ask(lambda jobs: jobs.require_writable())
-
-
-def _reason(error: Any) -> str:
-    """Return what the disk or the database says, without statements or addresses."""
-    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(".")

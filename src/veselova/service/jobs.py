@@ -15,11 +15,12 @@ import orjson
 import sqlalchemy as sa
 
 from veselova.mechanics.errors import InvalidInput
-from veselova.service.database import chunks, connect, idempotency_keys, jobs
+from veselova.service.database import chunks, connect, idempotency_keys, in_utc, jobs
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
 from veselova.service.sweep_request import SweepRequest
+from veselova.service.whole_file import whole_file
 
 __all__ = ["ENDED", "Job", "JobEnded", "Jobs"]
 
@@ -136,7 +137,7 @@ class Jobs:
             found = connection.execute(sa.select(jobs, done.label("done")).where(jobs.c.id == job_id)).mappings().first()
         if found is None:
             raise Refused("no-such-job", f"There is no job {job_id[:40]}.")
-        times = {name: _in_utc(found[name]) for name in ("created_at", "finished_at")}
+        times = {name: found[name] and in_utc(found[name]) for name in ("created_at", "finished_at")}
         return Job(**{**found, **times, "request": found["request"].encode(), "done": int(found["done"])})
 
     def unfinished(self) -> list[str]:
@@ -250,11 +251,6 @@ def _new(sweep: SweepRequest) -> dict[str, Any]:
     }
 
 
-def _in_utc(moment: datetime | None) -> datetime | None:
-    """Return a moment with its zone, which SQLite does not keep."""
-    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
-
-
 def _job_of(connection: sa.Connection, key: str) -> str | None:
     query = sa.select(idempotency_keys.c.job_id).where(idempotency_keys.c.key == key)
     return connection.execute(query).scalar()
@@ -263,9 +259,5 @@ def _job_of(connection: sa.Connection, key: str) -> str | None:
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that a death of the process or the machine leaves it whole or absent."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(f".{os.getpid()}.part")
-    with unfinished.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    unfinished.replace(path)
+    with whole_file(path) as part:
+        part.write_bytes(content)

@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 import sqlalchemy as sa
 
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.service.database import api_keys, connect
+from veselova.service.database import api_keys, connect, in_utc
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 
@@ -126,9 +126,4 @@ def _digest(text: str) -> str:
 
 
 def _key(row: sa.Row[tuple[object, ...]]) -> Key:
-    return Key(row.id, row.name, _utc(row.created_at), _utc(row.revoked_at) if row.revoked_at else None)
-
-
-def _utc(moment: datetime) -> datetime:
-    """Return a moment in UTC; SQLite gives back what was stored in UTC without saying so."""
-    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+    return Key(row.id, row.name, in_utc(row.created_at), in_utc(row.revoked_at) if row.revoked_at else None)

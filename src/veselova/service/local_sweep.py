@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
-import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,16 +134,5 @@ def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
     except RuntimeError:
         asyncio.run(run())
         return
-    failures: list[BaseException] = []
-
-    def body() -> None:
-        try:
-            asyncio.run(run())
-        except BaseException as error:
-            failures.append(error)
-
-    thread = threading.Thread(target=body, name="veselova sweep")
-    thread.start()
-    thread.join()
-    if failures:
-        raise failures[0]
+    with ThreadPoolExecutor(1, thread_name_prefix="veselova sweep") as thread:
+        thread.submit(asyncio.run, run()).result()

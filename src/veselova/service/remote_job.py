@@ -13,7 +13,7 @@ from veselova.mechanics.errors import ServiceError
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.table import Target
 from veselova.service.calls import Call
-from veselova.service.download import sink_of
+from veselova.service.download import MEDIA_TYPES, sink_of
 from veselova.service.schemas import read_request
 from veselova.service.sweep_request import SweepRequest, sweep_document
 
@@ -108,14 +108,14 @@ class RemoteJob:
 
     def _downloaded(self, target: Target) -> Flow:
         yield from self._finished(None)
-        yield self._fetch("/result", "application/vnd.apache.parquet", target)
+        yield self._fetch("/result", MEDIA_TYPES["parquet"], target)
 
     def _dataset(self, progress: Callable[[int, int], object] | None) -> Flow:
         from veselova.service.sweep_dataset import sweep_dataset
 
         document = yield from self._finished(progress)
         sweep, table = read_request(SweepRequest, document["request"]), io.BytesIO()
-        yield self._fetch("/result", "application/vnd.apache.parquet", table)
+        yield self._fetch("/result", MEDIA_TYPES["parquet"], table)
         with tempfile.TemporaryDirectory() as folder:
             packed = None
             if "trajectories" in document["links"]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from veselova.service.jobs import Job, Jobs
 from veselova.service.summaries import Chunk
+from veselova.service.whole_file import whole_file
 
 __all__ = ["Result", "table_stream"]
 
@@ -113,13 +114,9 @@ def _concatenate(paths: list[Path], target: Path) -> None:
     from pyarrow import parquet
 
     schema = pa.unify_schemas([parquet.read_schema(path) for path in paths], promote_options="permissive")
-    unfinished = target.with_suffix(f".{os.getpid()}.part")
-    with parquet.ParquetWriter(unfinished, schema, compression="zstd") as writer:
+    with whole_file(target) as part, parquet.ParquetWriter(part, schema, compression="zstd") as writer:
         for group in _groups(paths, schema):
             writer.write_table(group, row_group_size=_GROUP_ROWS)
-    with unfinished.open("rb") as file:
-        os.fsync(file.fileno())
-    unfinished.replace(target)
 
 
 def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
@@ -140,11 +137,7 @@ def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
 
 def _pack(store: Path, target: Path) -> None:
     """Put a Zarr store into one file, in an order and with dates that depend on nothing but its content."""
-    unfinished = target.with_suffix(f".{os.getpid()}.part")
-    with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_STORED) as archive:
+    with whole_file(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
         for path in sorted(path for path in store.rglob("*") if path.is_file()):
             with path.open("rb") as source, archive.open(zipfile.ZipInfo(path.relative_to(store).as_posix()), "w") as entry:
                 shutil.copyfileobj(source, entry)
-    with unfinished.open("rb") as file:
-        os.fsync(file.fileno())
-    unfinished.replace(target)

@@ -6,6 +6,8 @@ problem is built, so that Python, command line and HTTP refuse the same input wi
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
@@ -17,7 +19,7 @@ from veselova.mechanics.times import uniform_times, validated_times
 from veselova.service.examples import BODY4, BODY4_PROBLEM
 from veselova.service.systems import SYSTEMS, ProblemModel, Request, Times
 
-__all__ = ["ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
+__all__ = ["ComparisonRequest", "TorusRequest", "TrajectoryRequest", "layers", "read_request"]
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
 _DEEPEST = 8
@@ -148,20 +150,22 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     return request
 
 
-def _is_deeper(document: Any, levels: int) -> bool:
-    """Return whether a document nests deeper than so many levels, without recursion."""
+def layers(document: Any) -> Iterator[list[Any]]:
+    """Yield the values of a document level by level, the document itself first, without recursion."""
     layer = [document]
-    for _ in range(levels):
+    while layer:
+        yield layer
         layer = [
             item
             for value in layer
             if isinstance(value, (dict, list))
             for item in (value.values() if isinstance(value, dict) else value)
-            if isinstance(item, (dict, list))
         ]
-        if not layer:
-            return False
-    return True
+
+
+def _is_deeper(document: Any, levels: int) -> bool:
+    """Return whether a document nests deeper than so many levels."""
+    return any(isinstance(value, (dict, list)) for value in next(islice(layers(document), levels, None), ()))
 
 
 def _fault(item: Any) -> InvalidInput:

@@ -80,12 +80,10 @@ def settings_of_environment(**stated: Any) -> Settings:
 
 
 def _require_addresses(limits: Settings) -> None:
-    """Refuse addresses of a scheduler or a database that cannot be followed, where sweeps are installed."""
+    """Refuse addresses of a scheduler or a database that cannot be followed."""
+    from veselova.service.database import database_url
+
     require_scheduler(limits)
-    try:
-        from veselova.service.database import database_url
-    except ImportError:
-        return
     database_url(limits)
 
 

@@ -6,19 +6,20 @@ import io
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 import orjson
 
 from veselova.engines import torus
-from veselova.mechanics.errors import InternalContradiction, InvalidInput, InvalidRequest, Unsolved, VeselovaError
+from veselova.mechanics.errors import Unsolved, VeselovaError
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
 from veselova.service.parameters import components
+from veselova.service.problem_details import problem_code
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.tasks import requested_trajectory, warm_up
@@ -60,9 +61,15 @@ def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk
     if version != __version__:
         raise OtherVersion(f"a worker of the cluster runs veselova {__version__}, and this is {version}")
     _warm_up()
-    sweep = read_request(SweepRequest, orjson.loads(request))
+    sweep = _sweep(request)
     answers = [_answer(sweep, row) for row in range(start, stop)]
     return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
+
+
+@lru_cache(maxsize=4)
+def _sweep(request: bytes) -> SweepRequest:
+    """Return the sweep of a JSON text; all chunks of a job bring the same, which may be long."""
+    return read_request(SweepRequest, orjson.loads(request))
 
 
 @cache
@@ -88,15 +95,11 @@ def _answer(sweep: SweepRequest, row: int) -> tuple[Row, Mapping[str, Any]]:
         outcome, detail = SOLVED, ""
     except TimeIsUp:
         outcome, detail = "over-budget", f"the work was stopped after its budget of {sweep.budget_s:g} s"
-    except (InvalidInput, InvalidRequest) as error:
-        outcome, detail = "invalid-input", str(error)
-    except Unsolved as error:
-        outcome, detail = error.outcome, error.reason
     except VeselovaError as error:
-        outcome, detail = "internal-contradiction" if isinstance(error, InternalContradiction) else "unsolved", str(error)
-    except Exception:
+        outcome, detail = problem_code(error), error.reason if isinstance(error, Unsolved) else str(error)
+    except Exception as error:
         _LOG.exception("problem %d of sweep %s failed", row, sweep.id)
-        outcome, detail = "internal-error", "an unexpected error; it has been logged"
+        outcome, detail = problem_code(error), "an unexpected error; it has been logged"
     return {**_row(sweep, row, outcome, detail), **found}, kept
 
 

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from veselova.mechanics.errors import InvalidInput
+from veselova.service.console import print_json, terminal
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.schemas import read_request
 from veselova.service.sweep_request import SweepRequest
@@ -26,14 +27,14 @@ def run(document: Any, json: bool, output: Path | None, folder: Path | None, wor
     request = read_request(SweepRequest, document)
     if output is not None and (output.suffix.lower() not in _WRITERS or not output.parent.is_dir()):
         raise InvalidInput(("--output",), f"a file in an existing folder, ending in {', '.join(_WRITERS)}", str(output))
-    terminal = Console(stderr=True)
+    progress_line = Console(stderr=True)
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("problems,"), TimeRemainingColumn(), TextColumn("left"))
-    with Progress(*columns, console=terminal, transient=True, disable=not sys.stderr.isatty()) as bar:
+    with Progress(*columns, console=progress_line, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("sweep", total=request.total)
         try:
             job, jobs = run_sweep(request, local_settings(folder, workers), lambda done, _: bar.update(task, completed=done))
         except KeyboardInterrupt:
-            terminal.print("What is done is kept; the same command goes on from there.")
+            progress_line.print("What is done is kept; the same command goes on from there.")
             raise
     table = jobs.result_path(job.id)
     if output is not None:
@@ -60,18 +61,15 @@ def _say(request: SweepRequest, table: Path, json: bool, output: Path | None) ->
     """Print the outcomes and where the table is, as JSON or for a reader."""
     from pyarrow import parquet
 
-    from veselova.service.documents import encoded
-
     outcomes = Counter(parquet.read_table(table, columns=["outcome"])["outcome"].to_pylist())
     where = str(output or table)
     if json:
         summary = {"id": request.id, "total": request.total, "outcomes": dict(outcomes), "table": where}
-        sys.stdout.buffer.write(encoded(summary) + b"\n")
-        sys.stdout.buffer.flush()
+        print_json(summary)
         return
     rows = Table("outcome", "problems", box=None)
     for outcome, count in outcomes.most_common():
         rows.add_row(outcome, str(count))
-    console = Console(width=None if sys.stdout.isatty() else 120)
+    console = terminal()
     console.print(rows)
     console.print(f"Table: {where}", soft_wrap=True)

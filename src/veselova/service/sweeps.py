@@ -16,6 +16,7 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.cluster import open_cluster
+from veselova.service.database import reason_of
 from veselova.service.dispatch import answers
 from veselova.service.jobs import Job, JobEnded, Jobs
 from veselova.service.results import Result
@@ -257,7 +258,7 @@ class Sweeps:
                 await asyncio.wait([calling])
                 raise
             except (OSError, SQLAlchemyError) as error:
-                reason = str(getattr(error, "orig", None) or error)
+                reason = reason_of(error)
                 _LOG.warning("job %s waits for its storage: %s", job_id, reason)
                 if progress := self._progress.get(job_id):
                     progress.waits_for = f"its storage ({reason})"
