@@ -13,7 +13,8 @@ from draws import random_problem, random_riemann_matrix
 from problems import tagged
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.solution import Solution
-from veselova.analytic.theta import Theta, lattice_points
+from veselova.analytic.lattice import lattice_points
+from veselova.analytic.theta import Theta
 
 
 def all_characteristics(genus: int) -> list[Characteristic]:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.lattice import Coordinates, centred_points, lattice_points, small_norm
 from veselova.analytic.precision import Values
-from veselova.analytic.theta import cheapest_waves, largest_corner, lattice_points, small_norm
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["EnclosedTheta"]
@@ -33,9 +33,9 @@ class EnclosedTheta:
     """The theta functions of T, shape (g, g), balls of ``arithmetic``. What is left out of the sums is estimated, not bounded."""
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
-        self._T, self._xp = T, arithmetic
-        self._F = list(cheapest_waves(T.astype(float)))
-        self._G = [i for i in range(self.genus) if i not in self._F]
+        self._xp, self._coordinates = arithmetic, Coordinates.cheapest(_symmetric(T))
+        self._T = self._coordinates.form(T)
+        self._F, self._G = list(self._coordinates.waves), self._coordinates.gaussians
         self._constants: dict[Characteristic, tuple[Values, Values]] = {}
         if self.size > _MOST_TERMS:
             raise Unsolved("narrow-gap", f"theta sums of {arithmetic.digits} digits would have {self.size} terms at this gap")
@@ -66,9 +66,7 @@ class EnclosedTheta:
     @cached_property
     def _gaussian_lattice(self) -> NDArray[np.int64]:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
-        inverse = _symmetric(self._parts[2])
-        corner = float(np.sqrt(largest_corner(inverse)))
-        return lattice_points(inverse, self._radius + corner, np.zeros(len(inverse))).astype(np.int64)
+        return centred_points(_symmetric(self._parts[2]), self._radius).astype(np.int64)
 
     def _wave_lattice(self, epsilon: tuple[int, ...]) -> NDArray[np.int64]:
         """Return 2x for the x that matter, shape (X, |F|)."""
@@ -84,7 +82,9 @@ class EnclosedTheta:
         xp, result = self._xp, np.empty((len(z), len(characteristics)), dtype=object)
         bells: dict[tuple[int, ...], tuple[Values, Values, Values]] = {}
         turns: dict[tuple[Any, ...], tuple[Values, Values]] = {}
-        for index, characteristic in enumerate(characteristics):
+        z = self._coordinates.points(z)
+        for index, given in enumerate(characteristics):
+            characteristic, sign = self._coordinates.characteristic(given)
             delta = tuple(characteristic.delta[i] for i in self._G)
             if delta not in bells:
                 bells[delta] = self._bells(z, delta)
@@ -98,7 +98,7 @@ class EnclosedTheta:
             real, imaginary = self._table(characteristic)
             sums = np.sum(cosines.T * xp.product(bell, real) - sines.T * xp.product(bell, imaginary), axis=1)
             odd = np.array(nearest @ np.array([characteristic.epsilon[i] for i in self._G], dtype=int), dtype=float) % 2
-            result[:, index] = np.where(odd == 1, -sums, sums) if self._G else sums
+            result[:, index] = sign * (np.where(odd == 1, -sums, sums) if self._G else sums)
         return np.asarray(xp.widened(result, np.abs(result[:, :1]) * xp.epsilon))
 
     def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values]:

@@ -1,0 +1,177 @@
+"""The lattice of a theta sum: its points in an ellipsoid, and the coordinates in which the sum is short.
+
+With m = Uᵀm', U ∈ GL(g, Z), the sum over Z^g is one over m', and
+
+    θ[ε;δ](z; T) = θ[U⁻ᵀε; Uδ](Uz; UTUᵀ).
+
+Near a separatrix T has a nearly null vector, a difference of coordinates; in a reduced basis it is a coordinate of its own, which
+one Gaussian serves. Reduction is in pairs: b_i is shortened by multiples of b_j as long as one is, in T or in its dual T⁻¹.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.characteristic import Characteristic
+
+__all__ = ["Coordinates", "centred_points", "lattice_points", "schur", "small_norm"]
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Terms below e^(−39) = 1e-17 of the largest do not count when splits are compared.
+_EXPONENT = 39.0
+
+#: Least eigenvalue of S for waves: there θ(z)/θ(0) stays above ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| = 0.42^|F|.
+_WAVE_FLOOR = 0.5
+
+#: A Gaussian, and a wave with its cosine and sine, cost this many terms; functions with the same shifts share them.
+_BELL, _WAVE = 8.0, 25.0
+
+#: A vector is shortened where the multiple of another that does it differs from ½ by more than rounding.
+_HALF = 0.5 + 1e-9
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The rows of ``U`` are the basis, shape (g, g); ``waves`` is the set F of analytic.theta, the others have Gaussians."""
+
+    U: Integers
+    waves: tuple[int, ...]
+
+    @classmethod
+    def cheapest(cls, T: Array) -> Coordinates:
+        """Return those with the shortest sum, by volume, in which the waves do not cancel: S stays above a floor.
+
+        Gaussians are the shortest vectors of a basis reduced in T, or what the shortest of one reduced in T⁻¹ leave.
+        """
+        genus = len(T)
+        primal, dual = _reduced(T), np.rint(np.linalg.inv(_reduced(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)
+        choices = [cls(primal, tuple(range(m, genus))) for m in range(genus + 1)]
+        choices += [cls(dual, tuple(range(m))) for m in range(1, genus)]
+        return min(choices, key=lambda choice: choice.cost(T))
+
+    @classmethod
+    def given(cls, genus: int, waves: tuple[int, ...]) -> Coordinates:
+        """Return those of Z^g itself."""
+        return cls(np.eye(genus, dtype=np.int64), waves)
+
+    @cached_property
+    def gaussians(self) -> list[int]:
+        """Return G, the coordinates that are not waves."""
+        return [i for i in range(len(self.U)) if i not in self.waves]
+
+    def cost(self, T: Array) -> float:
+        """Return the terms of a value, by volume, with what Gaussians and waves take; infinite where waves cancel."""
+        F, G, radius = list(self.waves), self.gaussians, math.sqrt(_EXPONENT / math.pi)
+        S, _, inverse = schur(np.asarray(self.form(T)), F, G)
+        if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
+            return math.inf
+        bells, waves = _points(inverse, _spread(inverse, radius)), _points(S, radius)
+        return bells * waves + _BELL * bells + (_WAVE * waves if F else 0.0)
+
+    def form(self, T: Any) -> Any:
+        """Return UTUᵀ."""
+        return self.U @ T @ self.U.T
+
+    def points(self, z: Any) -> Any:
+        """Return Uz for z of shape (N, g)."""
+        return z @ self.U.T
+
+    def characteristic(self, given: Characteristic) -> tuple[Characteristic, int]:
+        """Return a characteristic in these coordinates, and the sign of its reduction modulo one."""
+        epsilon = np.mod(self._dual @ np.array(given.epsilon, dtype=np.int64), 2)
+        halves = self.U @ np.array(given.delta, dtype=np.int64)
+        delta = np.mod(halves, 2)
+        sign = 1 - 2 * int(epsilon @ ((halves - delta) // 2) % 2)
+        return Characteristic(tuple(map(int, epsilon)), tuple(map(int, delta))), sign
+
+    @cached_property
+    def _dual(self) -> Integers:
+        return np.rint(np.linalg.inv(self.U).T).astype(np.int64)
+
+
+def _reduced(form: Array) -> Integers:
+    """Return a basis, as rows, in which no vector is shortened by a multiple of another; short vectors first."""
+    U = np.eye(len(form), dtype=np.int64)
+    gram, size = form.copy(), len(form)
+    improved = True
+    while improved:
+        improved = False
+        for i, j in ((i, j) for i in range(size) for j in range(size) if i != j):
+            if abs(gram[i, j]) > _HALF * gram[j, j]:
+                U[i] -= round(gram[i, j] / gram[j, j]) * U[j]
+                gram, improved = U @ form @ U.T, True
+    return U[np.argsort(np.diag(gram), kind="stable")]
+
+
+def _points(form: Array, radius: float) -> float:
+    """Return about how many points of Z^d have a norm below the radius: a volume, and at least one."""
+    dimension = len(form)
+    ball = math.pi ** (dimension / 2) / math.gamma(dimension / 2 + 1)
+    return max(1.0, float(ball * radius**dimension / np.sqrt(np.linalg.det(form))))
+
+
+def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:
+    """Return (S, C, T_GG⁻¹): C = T_FG T_GG⁻¹, S = T_FF − C T_GF."""
+    inverse = np.linalg.inv(T[np.ix_(G, G)]) if G else np.empty((0, 0))
+    C = T[np.ix_(F, G)] @ inverse
+    S = T[np.ix_(F, F)] - C @ T[np.ix_(G, F)]
+    return (S + S.T) / 2, C, (inverse + inverse.T) / 2
+
+
+def _largest_corner(form: Array) -> float:
+    """Return max rᵀ form r over the cell |r_i| ≤ ½, a convex function: the maximum over its corners."""
+    size = form.shape[0]
+    if size == 0:
+        return 0.0
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * size, indexing="ij")).reshape(size, -1).T
+    return float(np.max(np.sum((corners @ form) * corners, axis=1)))
+
+
+def centred_points(form: Array, radius: float) -> Array:
+    """Return the k ∈ Z^d that matter to some r of the cell |r_i| ≤ ½: |k−r|² ≤ radius² + min_k |k−r|² in the norm of the form."""
+    return lattice_points(form, _spread(form, radius), np.zeros(form.shape[0]))
+
+
+def _spread(form: Array, radius: float) -> float:
+    # The nearest k is no farther than zero, |r|² ≤ corner.
+    corner = _largest_corner(form)
+    return math.sqrt(radius * radius + corner) + math.sqrt(corner)
+
+
+def small_norm(form: Array, shift: Array) -> float:
+    """Return xᵀ form x for a short x of Z^d + shift: rounding from the last coordinate on (Babai's nearest plane)."""
+    upper = np.linalg.cholesky(form).T
+    x, norm = np.zeros(shift.size), 0.0
+    for i in range(shift.size - 1, -1, -1):
+        centre = -(upper[i, i + 1 :] @ x[i + 1 :]) / upper[i, i]
+        x[i] = np.rint(centre - shift[i]) + shift[i]
+        norm += float(upper[i, i] * (x[i] - centre)) ** 2
+    return norm
+
+
+def lattice_points(form: Array, radius: float, shift: Array) -> Array:
+    """Return the points x ∈ Z^d + shift with xᵀ form x ≤ radius², shape (K, d), by descent through the Cholesky factor."""
+    dimension = form.shape[0]
+    if dimension == 0:
+        return np.zeros((1, 0))
+    upper = np.linalg.cholesky(form).T
+    points, left = np.zeros((1, 0)), np.array([radius * radius])
+    for i in range(dimension - 1, -1, -1):
+        centre = -(points @ upper[i, i + 1 :]) / upper[i, i]
+        reach = np.sqrt(left) / upper[i, i]
+        first = np.ceil(centre - reach - shift[i])
+        counts = np.maximum(np.floor(centre + reach - shift[i]) - first + 1, 0).astype(np.int64)
+        parent = np.repeat(np.arange(points.shape[0]), counts)
+        offset = np.arange(parent.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        x = first[parent] + offset + shift[i]
+        left = np.maximum(left[parent] - (upper[i, i] * (x - centre[parent])) ** 2, 0.0)
+        points = np.column_stack([x, points[parent]])
+    return points
