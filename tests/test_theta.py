@@ -12,8 +12,8 @@ from flint import acb, acb_mat, ctx
 from draws import random_problem, random_riemann_matrix
 from problems import tagged
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.solution import Solution
 from veselova.analytic.lattice import lattice_points
+from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta
 
 

@@ -19,7 +19,7 @@ from veselova.mechanics.veselova import Veselova
 Array = NDArray[np.float64]
 
 #: Steps from one time to the next before giving up: minutes. A's over many orders of magnitude can ask for as many.
-_MOST_STEPS = 20_000
+MOST_STEPS = 20_000
 
 _CONTEXT = mpmath.MPContext()
 _CONTEXT.dps = 45
@@ -51,7 +51,7 @@ def _integrator(n: int) -> Any:
     return hy.taylor_adaptive(equations, zeros, fp_type=quad, compact_mode=True, pars=[quad(1)] * (2 * n + 1))
 
 
-def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Array, Array, Array]:
+def true_motion(problem: Veselova, times: Array, frame: Any = None, most_steps: int = MOST_STEPS) -> tuple[Array, Array, Array]:
     """Return (frame, q̇, τ₁) at the times, rounded to double from 34 digits; ``frame`` are exact strings where given.
 
     A frame left to the problem is taken as the problem's own doubles, made orthogonal in high precision.
@@ -96,7 +96,7 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None) -> tuple[Arr
         integrator.state[:] = [quad(x) for x in start]
         indices = np.flatnonzero(times >= 0) if direction > 0 else np.flatnonzero(times < 0)[::-1]
         for index in indices:
-            outcome = integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed), max_steps=_MOST_STEPS)[0]
+            outcome = integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed), max_steps=most_steps)[0]
             if outcome != hy.taylor_outcome.time_limit:
                 raise TimeoutError(f"integration in binary128 ended with {outcome}")
             results[index] = [float(x) for x in integrator.state]

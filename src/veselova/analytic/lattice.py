@@ -73,7 +73,7 @@ class Coordinates:
         S, _, inverse = schur(np.asarray(self.form(T)), F, G)
         if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
             return math.inf
-        bells, waves = _points(inverse, _spread(inverse, radius)), _points(S, radius)
+        bells, waves = _points(inverse, _spreads(inverse, radius)), _points(S, np.full(len(F), radius))
         return bells * waves + _BELL * bells + (_WAVE * waves if F else 0.0)
 
     def form(self, T: Any) -> Any:
@@ -111,11 +111,17 @@ def _reduced(form: Array) -> Integers:
     return U[np.argsort(np.diag(gram), kind="stable")]
 
 
-def _points(form: Array, radius: float) -> float:
-    """Return about how many points of Z^d have a norm below the radius: a volume, and at least one."""
+def _points(form: Array, radii: Array) -> float:
+    """Return about how many points of Z^d an ellipsoid with these half axes has, in the norm of the form: its volume, or one."""
     dimension = len(form)
     ball = math.pi ** (dimension / 2) / math.gamma(dimension / 2 + 1)
-    return max(1.0, float(ball * radius**dimension / np.sqrt(np.linalg.det(form))))
+    return max(1.0, float(ball * np.prod(radii) / np.sqrt(np.linalg.det(form))))
+
+
+def _spreads(form: Array, radius: float) -> Array:
+    """Return how far centred points reach along each Gram–Schmidt vector, along which r of the cell reaches ``half``."""
+    half = np.sum(np.abs(np.linalg.cholesky(form)), axis=0) / 2 if len(form) else np.empty(0)
+    return np.asarray(half + np.sqrt(half**2 + radius**2))
 
 
 def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:
@@ -136,14 +142,14 @@ def _largest_corner(form: Array) -> float:
 
 
 def centred_points(form: Array, radius: float) -> Array:
-    """Return the k ∈ Z^d that matter to some r of the cell |r_i| ≤ ½: |k−r|² ≤ radius² + min_k |k−r|² in the norm of the form."""
-    return lattice_points(form, _spread(form, radius), np.zeros(form.shape[0]))
+    """Return the k ∈ Z^d that matter to some r of the cell |r_i| ≤ ½: |k−r|² ≤ radius² + min_k |k−r|² in the norm of the form.
 
-
-def _spread(form: Array, radius: float) -> float:
-    # The nearest k is no farther than zero, |r|² ≤ corner.
+    Zero is no nearer than the nearest, so |k|² − 2k·r ≤ radius², whose least value over the cell is |k|² − Σ|(form k)_i|.
+    """
     corner = _largest_corner(form)
-    return math.sqrt(radius * radius + corner) + math.sqrt(corner)
+    k = lattice_points(form, math.sqrt(radius * radius + corner) + math.sqrt(corner), np.zeros(form.shape[0]))
+    projected = k @ form
+    return np.asarray(k[np.sum(projected * k - np.abs(projected), axis=1) <= radius * radius])
 
 
 def small_norm(form: Array, shift: Array) -> float:
