@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.balls import Balls, balls
-from veselova.analytic.precision import Values, extended
+from veselova.analytic.precision import Decimals, Values
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.analytic.spectrum import Resolved, Spectrum, tangent
@@ -59,10 +59,10 @@ def resting_spheroconic(moving: Moving, xp: Balls) -> Values:
     return _zeros(found, poles, xp.array(poles), xp.array(moving.q_squared), 0, xp)
 
 
-def _zeros_of_position(poles: list[Fraction], weights: list[Fraction], digits: int) -> list[Any]:
-    arithmetic = extended(digits)
+def _zeros_of_position(poles: list[Fraction], weights: list[Fraction], digits: int) -> list[Fraction]:
     try:
-        return zeros_between_poles(arithmetic.array(poles), arithmetic.array(weights), 0, arithmetic)
+        with Decimals(digits) as arithmetic:
+            return [Fraction(x) for x in zeros_between_poles(arithmetic.array(poles), arithmetic.array(weights), 0, arithmetic)]
     except TooFewDigits:
         return _zeros_of_position(poles, weights, _FINER * digits)
 

@@ -6,6 +6,7 @@ are multiprecision numbers of an mpmath context that belongs to the arithmetic a
 
 from __future__ import annotations
 
+import decimal
 import math
 import threading
 from abc import ABC, abstractmethod
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprf
 
-__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Double", "Extended", "extended"]
+__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
@@ -170,15 +171,55 @@ class Double(Arithmetic):
         return float(np.linalg.det(matrix))
 
 
+#: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
+_GUARD = 6
+
+
+class Decimals:
+    """The four operations and square roots on decimals of the standard library, ten times as fast as those of mpmath.
+
+    Operators round to these digits ``with`` it only, in this thread.
+    """
+
+    def __init__(self, digits: int) -> None:
+        self.digits = digits
+        self.epsilon = decimal.Decimal(10) ** -digits
+        self._context = decimal.Context(prec=digits + _GUARD, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
+        self._outer = decimal.Context()
+
+    def __enter__(self) -> Decimals:
+        self._outer = decimal.getcontext()
+        decimal.setcontext(self._context)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        decimal.setcontext(self._outer)
+
+    def number(self, value: Any) -> decimal.Decimal:
+        """Return one number (Fraction or int), rounded to this precision."""
+        numerator, denominator = Fraction(value).as_integer_ratio()
+        return self._context.divide(decimal.Decimal(numerator), decimal.Decimal(denominator))
+
+    def array(self, values: Any) -> Values:
+        """Return an array of decimals from a sequence of rationals or of decimals."""
+        result = np.empty(len(values), dtype=object)
+        result[:] = [x if isinstance(x, decimal.Decimal) else self.number(x) for x in values]
+        return result
+
+    def sqrt(self, value: Any) -> Any:
+        """Return square roots, entrywise."""
+        return _DECIMAL_SQRT(value)
+
+
+_DECIMAL_SQRT = np.frompyfunc(lambda x: x.sqrt(), 1, 1)
+
+
 class Extended(Arithmetic):
     """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least 20)."""
 
-    #: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
-    _GUARD = 6
-
     def __init__(self, digits: int) -> None:
         self._context = mpmath.MPContext()
-        self._context.dps = digits + self._GUARD
+        self._context.dps = digits + _GUARD
         self.digits = digits
         self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
@@ -193,8 +234,9 @@ class Extended(Arithmetic):
 
     def number(self, value: Any) -> Any:
         """Return one number, rounded to this precision."""
-        if isinstance(value, Fraction):
-            return self._context.mpf(value.numerator) / value.denominator
+        if isinstance(value, (Fraction, decimal.Decimal)):
+            numerator, denominator = value.as_integer_ratio()
+            return self._context.mpf(numerator) / denominator
         if isinstance(value, np.generic):
             value = value.item()
         return self._context.mpf(value)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 from typing import Any
 
-from veselova.analytic.precision import Extended, Values
+from veselova.analytic.precision import Decimals, Values
 
 __all__ = ["TooFewDigits", "zeros_between_poles"]
 
@@ -13,14 +14,14 @@ __all__ = ["TooFewDigits", "zeros_between_poles"]
 _MOST_STEPS = 300
 
 #: Where a bracket still begins at zero, its logarithm is halved down to this part of its end.
-_LEAST_PART = 1e-30
+_LEAST_PART = Decimal("1e-30")
 
 #: A bracket over more than this is not one in which Newton's method converges quadratically.
-_WIDE_BRACKET = 1e3
+_WIDE_BRACKET = 1000
 
 
 #: Iterations settle at this relative change, or at so many roundings; from there every plain Newton step doubles the digits.
-_SETTLED, _SETTLED_DIGITS = 1e-300, 300
+_SETTLED, _SETTLED_DIGITS = Decimal("1e-300"), 300
 _ROUNDINGS = 4
 
 
@@ -28,18 +29,18 @@ class TooFewDigits(Exception):
     """The sums cancel below the digits of the arithmetic, so that an iteration does not settle: ask again with more."""
 
 
-def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmetic: Extended) -> list[Any]:
+def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmetic: Decimals) -> list[Any]:
     """Return the zeros of f between increasing poles and the poles of weight zero, all increasing: m−1 numbers for m poles.
 
     They are the eigenvalues of diag(p) restricted to √w⊥ (κ = 0), or those of diag(p) − √w√wᵀ but the lowest (κ = 1), to
-    the digits of ``arithmetic`` relative to the largest pole. Raises TooFewDigits.
+    the digits of ``arithmetic`` relative to the largest pole; call it ``with`` that. Raises TooFewDigits.
     """
     live = [(p, w) for p, w in zip(poles, weights, strict=True) if w > 0]
     zeros = [p for p, w in zip(poles, weights, strict=True) if not w > 0]
     return sorted([*zeros, *(_zero(live, a, constant, arithmetic) for a in range(len(live) - 1))])
 
 
-def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Extended) -> Any:
+def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Decimals) -> Any:
     """Return the zero between poles a and a+1, found as its distance from the nearer one."""
     (low, _), (high, _) = live[a], live[a + 1]
     width = high - low
@@ -69,7 +70,7 @@ def _scaled(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: i
     return value, (other - own) * rest + own * other * slope - near_weight - far_weight
 
 
-def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: int, width: Any, arithmetic: Extended) -> Any:
+def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: int, width: Any, arithmetic: Decimals) -> Any:
     """Return the zero δ of h in (0, width/2] to the digits of the arithmetic relative to itself: bracketed Newton steps."""
     least, most = 0 * width, width / 2
     own = width * near[0][1] / (near[0][1] + far[0][1])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.four_points import FourPoints
-from veselova.analytic.precision import DOUBLE, extended
+from veselova.analytic.precision import DOUBLE, Decimals
 from veselova.analytic.rational_polynomial import (
     NEAR,
     Polynomial,
@@ -112,10 +112,10 @@ class SeparableStart:
         """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits."""
         digits = _DIGITS
         while True:
-            arithmetic = extended(digits)
             try:
-                poles, weights = arithmetic.array(self.inverse), arithmetic.array(self.q_squared)
-                return [_rational(x) for x in zeros_between_poles(poles, weights, 0, arithmetic)]
+                with Decimals(digits) as arithmetic:
+                    poles, weights = arithmetic.array(self.inverse), arithmetic.array(self.q_squared)
+                    return [Fraction(x) for x in zeros_between_poles(poles, weights, 0, arithmetic)]
             except TooFewDigits:
                 digits *= 2
 
@@ -217,11 +217,6 @@ def _cut(
         above=float(upper - point),
         axes=(names.get(lower), names.get(upper)),
     )
-
-
-def _rational(x: object) -> Fraction:
-    mantissa, exponent = x.man_exp  # type: ignore[attr-defined]
-    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
 def _without(values: Sequence[Fraction], *omitted: int) -> list[Fraction]:

@@ -12,13 +12,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from veselova.analytic.precision import Arithmetic, Extended, Values, extended
+from veselova.analytic.precision import Arithmetic, Decimals, Extended, Values, extended
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
@@ -58,7 +59,7 @@ class Spectrum:
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
         return sorted(labelled, key=lambda item: item[:2])
 
-    @property
+    @cached_property
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
         points = [value for value, _, _ in self.branch_points]
@@ -140,27 +141,29 @@ def _digits_of_speed(moving: Moving) -> int:
 
 def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
     """Return the spectra at one precision; None where it is too low for iterations to settle, or for c_1 = 0 to come out."""
-    q, v, rate = tangent(moving, arithmetic)
-    inverse = arithmetic.array([1 / a for a in moving.A])
-    try:
-        points = zeros_between_poles(inverse, q * q, 0, arithmetic)
-        along = arithmetic.array(_components(q, v, inverse, points, arithmetic))
-        spheroconic = arithmetic.array(points)
-        constants = zeros_between_poles(spheroconic, along * along, 1, arithmetic)
+    with Decimals(arithmetic.digits) as xp:
+        q, v, rate = tangent(moving, xp)
+        inverse = xp.array([1 / a for a in moving.A])
+        try:
+            points = zeros_between_poles(inverse, q * q, 0, xp)
+            along = xp.array(_components(q, v, inverse, points, xp))
+            spheroconic = xp.array(points)
+            constants = zeros_between_poles(spheroconic, along * along, 1, xp)
+        except TooFewDigits:
+            return None
         if moving.time == "tau1":
             # All eigenvalues add up to the trace; none but the lowest is missing, and none at all where q' = 0.
-            rest = np.sum(spheroconic) - np.sum(along * along) - np.sum(arithmetic.array(constants))
+            rest = np.sum(spheroconic) - np.sum(along * along) - sum(constants)
             constants = sorted([rest, *constants]) if len(constants) < len(points) else constants
-        elif abs(1 - np.sum(along * along / spheroconic)) > arithmetic.number(10) ** -digits:
+        elif abs(1 - np.sum(along * along / spheroconic)) > Decimal(10) ** -digits:
             return None
         else:
-            constants = [arithmetic.number(0), *constants]
-    except TooFewDigits:
-        return None
-    return Spectrum(arithmetic, inverse, q, v, arithmetic.array(constants), spheroconic, rate)
+            constants = [Decimal(0), *constants]
+    arrays = [arithmetic.array(values) for values in (inverse, q, v, constants, spheroconic)]
+    return Spectrum(arithmetic, arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arithmetic.number(rate))
 
 
-def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
+def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until roots are taken.
 
     With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose tangent is along Aw, (dτ₁/ds)²
@@ -189,11 +192,11 @@ def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any
     return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
 
 
-def _root(value: Fraction, arithmetic: Arithmetic) -> Any:
+def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
     return arithmetic.sqrt(arithmetic.number(value))
 
 
-def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Extended) -> list[Any]:
+def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Decimals) -> list[Any]:
     """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or too small for the digits)."""
     on_plane = {I: i for i, I in enumerate(inverse) if not q[i] > 0}
     live = {I: i for i, I in enumerate(inverse) if q[i] > 0}
