@@ -52,20 +52,25 @@ class Rate(ABC, Generic[P]):
         The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ · e^{−2πi m·z} over the torus is
         F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹: one-variable integrals only.
         """
-        periods, result = self.inversion.periods, []
-        psi = periods.arithmetic.nodes(count)
-        for s in range(periods.genus):
-            angles = np.zeros((count, periods.genus), dtype=psi.dtype)
+        genus, result = self.inversion.periods.genus, []
+        psi = self.inversion.arithmetic.nodes(count)
+        for s in range(genus):
+            angles = np.zeros((count, genus), dtype=psi.dtype)
             angles[:, s] = psi
-            weights = periods.inverse_cycles @ self._weighted_forms(s, psi) * (2 * periods.arithmetic.pi / count)
-            result.append((weights, self.inversion.map(angles)))
+            result.append((self._weights(s, psi), self.inversion.map(angles)))
         return result
+
+    def _weights(self, s: int, psi: Values) -> Values:
+        """Return a⁻¹ times the forms at nodes of cut s, and 2π over their number, shape (g, N)."""
+        periods = self.inversion.periods
+        return np.asarray(periods.inverse_cycles @ self._weighted_forms(s, psi) * (2 * periods.arithmetic.pi / len(psi)))
 
     @cached_property
     def mean(self) -> Any:
         """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
-        means = [np.sum(weights, axis=1) for weights, _ in self.columns(periods.longest)]
+        psi = periods.arithmetic.nodes(periods.longest)
+        means = [np.sum(self._weights(s, psi), axis=1) for s in range(periods.genus)]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=1))
 
 

@@ -20,7 +20,7 @@ from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE, extended
+from veselova.analytic.precision import DOUBLE
 from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
@@ -55,10 +55,7 @@ _NARROW_GAP_HIGH_GENUS = 1e-12
 #: Largest genus at which theta sums are taken there all the same.
 _SEPARATRIX_GENUS = 7
 
-#: Digits of the frequencies where they are guarded.
-_GUARD_DIGITS = 30
-
-#: Cycles from which frequencies of that many digits leave none of the phases.
+#: Cycles from which guarded frequencies, of 30 digits, leave none of the phases.
 _MOST_CYCLES = 1e28
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
@@ -160,18 +157,15 @@ class Solution:
     @cached_property
     def _guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
-        periods = Periods(Curve.of(self.spectrum, extended(_GUARD_DIGITS)))
-        mean = ClockRate.of(self.spectrum, AbelJacobi(periods, coarse=self.inversion), self.problem.time).mean
-        flows = (LinearFlow.of(self._origin, periods.frequencies), LinearFlow.of(self._origin, periods.frequencies / mean))
-        return flows[0], flows[1], float(mean)
+        from veselova.analytic.guarded import guarded_flows  # loads python-flint
+
+        return guarded_flows(self.spectrum, self._origin, self.problem.time)
 
     def clock(self, times: Array, name: str | None = None) -> Clock:
         """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given."""
         cycles, guarded = self.cycles(times), self.is_guarded(times)
         if not cycles <= _MOST_CYCLES:
-            raise Unsolved(
-                "too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {_GUARD_DIGITS} digits"
-            )
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to 30 digits")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None and self.near_separatrix:

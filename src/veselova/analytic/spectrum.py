@@ -52,6 +52,16 @@ class Spectrum:
     spheroconic: Values
     clock_rate: Any
 
+    @classmethod
+    def of(cls, arithmetic: Arithmetic, values: tuple[Any, Any, Any, Any, Any, Any]) -> Spectrum:
+        """Return the spectrum with its values, in the order above, taken into an arithmetic."""
+        inverse, q, q_prime, constants, spheroconic = map(arithmetic.array, values[:5])
+        return cls(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(values[5]))
+
+    def in_arithmetic(self, arithmetic: Arithmetic) -> Spectrum:
+        """Return the spectrum in another arithmetic."""
+        return Spectrum.of(arithmetic, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic, self.clock_rate))
+
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
         """Return (value, kind, index), increasing."""
@@ -159,8 +169,7 @@ def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | N
             return None
         else:
             constants = [Decimal(0), *constants]
-    arrays = [arithmetic.array(values) for values in (inverse, q, v, constants, spheroconic)]
-    return Spectrum(arithmetic, arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arithmetic.number(rate))
+    return Spectrum.of(arithmetic, (inverse, q, v, constants, spheroconic, rate))
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:

@@ -1,0 +1,31 @@
+"""Frequencies for times far out: with digits beyond those of a double, in balls, which are faster than any other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.balls import balls
+from veselova.analytic.clock import ClockRate
+from veselova.analytic.curve import Curve
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.periods import Periods
+from veselova.analytic.spectrum import Spectrum
+
+__all__ = ["GUARD_DIGITS", "guarded_flows"]
+
+#: Digits of the frequencies, and those that balls may lose on the way to them.
+GUARD_DIGITS, _SPARE = 30, 6
+
+
+def guarded_flows(spectrum: Spectrum, origin: NDArray[np.float64], time: str) -> tuple[LinearFlow, LinearFlow, float]:
+    """Return z(τ₁) = z⁰ + fτ₁, the uniform part z⁰ + (f/F_0)t, and F_0, from z⁰ in double precision."""
+    with balls(spectrum.arithmetic.digits, certified=False) as fine:
+        exact = spectrum.in_arithmetic(fine)
+        curve = Curve.of(exact, balls(GUARD_DIGITS + _SPARE, certified=False))
+    with balls(GUARD_DIGITS + _SPARE, certified=False):
+        periods = Periods(curve)
+        mean = ClockRate.of(exact, AbelJacobi(periods), time).mean
+        of_tau1, of_time = (LinearFlow.of(origin, rates) for rates in (periods.frequencies, periods.frequencies / mean))
+    return of_tau1, of_time, float(mean)
