@@ -43,7 +43,7 @@ P = TypeVar("P", bound=AngleSeries)
 
 @dataclass(frozen=True)
 class AbelJacobi(Generic[P]):
-    """The map of one curve; ``coarse`` is the same map in double precision, from which a finer one starts."""
+    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls starts."""
 
     periods: P
     coarse: AbelJacobi[P] | None = None
@@ -85,10 +85,7 @@ class AbelJacobi(Generic[P]):
         xp = self.arithmetic
         cycles = xp.floor(z)
         reduced = z - cycles
-        if self.coarse is None:
-            psi = self._newton(reduced)
-        else:
-            psi = self._enclose(reduced, self.coarse) if xp.has_radii else self._refine(reduced, self.coarse)
+        psi = self._newton(reduced) if self.coarse is None else self._enclose(reduced, self.coarse)
         return np.asarray(psi + 2 * xp.pi * cycles)
 
     def _newton(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -159,19 +156,6 @@ class AbelJacobi(Generic[P]):
             except np.linalg.LinAlgError:
                 return None
         return None
-
-    def _refine(self, z: Values, coarse: AbelJacobi[P]) -> Values:
-        """Newton's method with the double-precision Jacobian: each step adds some fourteen digits."""
-        xp = self.arithmetic
-        start = coarse.invert(DOUBLE.array(z))
-        slopes = xp.array(np.linalg.inv(coarse.jacobian(start)))
-        psi = xp.array(start)
-        for _ in range(2 + self.arithmetic.digits // 10):
-            residual = self.map(psi) - z
-            psi = psi - np.stack([slope @ row for slope, row in zip(slopes, residual, strict=True)])
-            if np.max(np.abs(residual)) <= _SETTLED * xp.epsilon:
-                return np.asarray(psi)
-        raise InternalContradiction("the Abel–Jacobi inversion did not settle in extended precision")
 
     def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
         """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the map has but one."""
