@@ -1,25 +1,36 @@
 """How much memory does an idle server hold, and what does a request cost beyond the solve?
 
-    python benchmarks/server.py
+    python benchmarks/server.py [REQUESTS]
 
-Starts a server with one worker, then POSTs four-dimensional bodies, q at 100 times and the frame at 1000; time beyond the solve
-is the time of the whole request, measured by the client on the same machine, less the seconds that the engine reports.
+Starts a server with one worker and an empty cache, then POSTs REQUESTS (200) different bodies of three and of four dimensions one
+after the other, q at 100 times, and of four dimensions the frame at 1000. The time of a request is that of its client: from the
+first byte sent on a connection that is kept open on loopback to the last byte received. Beyond the solve is that less the seconds
+which the engine reports in this very answer; it has in it HTTP itself, validation, the way to the worker and back, the making of
+the problem, the integrals of motion, the entry of the cache and the text of the answer. For comparison the same connection asks
+for /healthz, which has HTTP and nothing else, and this process makes the same problems and writes the same answers itself.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from http.client import HTTPConnection
 from pathlib import Path
+from typing import Any
 
 import httpx2
 
 from veselova.service.examples import BODY4_PROBLEM
+
+BODY3_PROBLEM = {"system": "veselova", "A": [3, 2, 1], "q": [1, 1, 1], "q_dot": [0.3, -0.7, 0.4], "normalize": True}
 
 
 def resident_megabytes(pid: int) -> float:
@@ -27,36 +38,56 @@ def resident_megabytes(pid: int) -> float:
     return float(line.split()[1]) / 1024
 
 
-def compare(client: httpx2.Client, count: int, outputs: list[str]) -> None:
-    """Print what a request costs beyond the solve; every body is another one, so that no answer comes from the cache."""
-    beyond, whole = [], []
-    for k in range(60):
-        problem = {**BODY4_PROBLEM, "A": [3 + k / 100, 2, "1.5", 1]}
-        body = {"problem": problem, "times": {"start": 0, "stop": 10, "count": count}, "outputs": outputs}
-        began = time.perf_counter()
-        response = client.post("/v1/trajectories", json=body)
-        seconds = time.perf_counter() - began
+def bodies(base: dict[str, Any], count: int, outputs: list[str], requests: int) -> Iterator[bytes]:
+    """Yield requests for bodies of which no two are the same, so that no answer comes from the cache."""
+    for k in range(requests):
+        problem = {**base, "A": [3 + (k + 1) / (requests + 1), *base["A"][1:]]}
+        yield json.dumps({"problem": problem, "times": {"start": 0, "stop": 10, "count": count}, "outputs": outputs}).encode()
+
+
+def asked(connection: HTTPConnection, method: str, path: str, body: bytes | None = None) -> tuple[float, bytes]:
+    """Return the seconds of one request and the body of its answer."""
+    began = time.perf_counter()
+    connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
+    response = connection.getresponse()
+    content = response.read()
+    seconds = time.perf_counter() - began
+    assert response.status == 200, content
+    return seconds, content
+
+
+def quantiles(taken: list[float]) -> str:
+    ordered = sorted(taken)
+    tenth, ninth = (ordered[int(q * (len(ordered) - 1))] for q in (0.1, 0.9))
+    return f"{1e3 * statistics.median(taken):.2f} ms (a tenth below {1e3 * tenth:.2f}, a tenth above {1e3 * ninth:.2f})"
+
+
+def measure(connection: HTTPConnection, base: dict[str, Any], count: int, outputs: list[str], requests: int) -> None:
+    """Print what a request costs beyond the solve."""
+    beyond, whole, size = [], [], 0
+    for body in bodies(base, count, outputs, requests):
+        seconds, content = asked(connection, "POST", "/v1/trajectories", body)
         whole.append(seconds)
-        beyond.append(seconds - response.json()["provenance"]["seconds"])
-    size, request, rest = len(response.content) / 1e3, statistics.median(whole), statistics.median(beyond)
-    print(f"{outputs[0]} at {count} times, n = 4: {size:.0f} kB, whole request {request * 1e3:.1f} ms (median of 60),")
-    print(f"  beyond the solve {rest * 1e3:.1f} ms (largest {max(beyond) * 1e3:.1f} ms)")
+        beyond.append(seconds - json.loads(content)["provenance"]["seconds"])
+        size = len(content)
+    print(f"{outputs[0]} at {count} times, n = {len(base['A'])}, {size / 1e3:.0f} kB: whole request {quantiles(whole)},")
+    print(f"  beyond the solve {quantiles(beyond)}")
 
 
 def main() -> None:
+    requests = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
-    environment = {**os.environ, "VESELOVA_WORKERS": "1"}
-    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    url = f"http://127.0.0.1:{port}"
-    try:
-        with httpx2.Client(base_url=url, timeout=60) as client:
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "VESELOVA_WORKERS": "1", "VESELOVA_DATA_DIR": folder}
+        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
+        process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        try:
             began = time.perf_counter()
             while True:
                 try:
-                    if client.get("/readyz").status_code == 200:
+                    if httpx2.get(f"http://127.0.0.1:{port}/readyz").status_code == 200:
                         break
                 except httpx2.TransportError:
                     time.sleep(0.02)
@@ -66,11 +97,20 @@ def main() -> None:
             total = server_size + worker_size
             print(f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {total:.0f} MB")
 
-            for count, outputs in ((100, ["q"]), (1000, ["frame"])):
-                compare(client, count, outputs)
-    finally:
-        process.send_signal(signal.SIGTERM)
-        process.wait(20)
+            connection = HTTPConnection("127.0.0.1", port)
+            connection.connect()
+            connection.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            print(f"/healthz: {quantiles([asked(connection, 'GET', '/healthz')[0] for _ in range(requests)])}")
+            for base, count, outputs in (
+                (BODY3_PROBLEM, 100, ["q"]),
+                (BODY4_PROBLEM, 100, ["q"]),
+                (BODY4_PROBLEM, 1000, ["frame"]),
+            ):
+                measure(connection, base, count, outputs, requests)
+            connection.close()
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.wait(20)
 
 
 if __name__ == "__main__":
