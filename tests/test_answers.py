@@ -210,7 +210,7 @@ def test_what_is_not_kept_is_a_404_problem(own: Server, name: str) -> None:
 
 
 def kept_files(folder: Path) -> list[Path]:
-    return sorted((folder / "data" / "cache").glob("*.npz"))
+    return sorted((folder / "data" / "cache").glob("*.kept"))
 
 
 @pytest.mark.parametrize("damage", ["flipped", "truncated", "emptied"])

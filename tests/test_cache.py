@@ -2,56 +2,75 @@
 
 from __future__ import annotations
 
-import errno
-import shutil
+import os
 import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hostile import GOOD
+from veselova.mechanics.trajectory import Trajectory
 from veselova.service.cache import Cache
-from veselova.service.delivery import DamagedEntry, Wanted, restored, solved
+from veselova.service.delivery import Wanted, restored, solved
+from veselova.service.entry import DamagedEntry, Entry, read_entry
 from veselova.service.problem_details import Refused
+from veselova.service.schemas import TrajectoryRequest, read_request
 from veselova.service.spool import Spool
+from veselova.service.tasks import requested_trajectory
 
 IN_MEMORY = Wanted("json", "identity")
 
-
-def put(cache: Cache, folder: Path, name: str, size: int = 400) -> bool:
-    source = folder / "source"
-    source.write_bytes(name.encode()[:1] * size)
-    return cache.put(name, source)
+REQUEST = read_request(TrajectoryRequest, GOOD)
 
 
-def test_the_entry_used_longest_ago_goes_first(tmp_path: Path) -> None:
-    cache = Cache(tmp_path / "cache", 1000)
-    assert put(cache, tmp_path, "a")
-    assert put(cache, tmp_path, "b")
+@pytest.fixture(scope="module")
+def motion() -> Trajectory:
+    return requested_trajectory(REQUEST)
+
+
+def put(cache: Cache, name: str, motion: Trajectory) -> int:
+    """Keep an entry as a worker and its server do, and return its bytes."""
+    entry = cache.entry(name)
+    assert entry
+    size = entry.write(REQUEST.model_dump(), motion)
+    if size and cache.is_full(size):
+        cache.make_room()
+    return size
+
+
+def test_the_entry_used_longest_ago_goes_first(tmp_path: Path, motion: Trajectory) -> None:
+    size = put(Cache(tmp_path / "measured", 10**6), "a", motion)
+    cache = Cache(tmp_path / "cache", 3 * size - 1)
+    for name in "ab":
+        assert put(cache, name, motion) == size
+    for path in (tmp_path / "cache").iterdir():  # a moment ago: clocks of files go by some milliseconds
+        os.utime(path, ns=(path.stat().st_atime_ns, path.stat().st_mtime_ns - 10**9))
     assert cache.find("a")
-    assert put(cache, tmp_path, "c")
+    assert put(cache, "c", motion)
     found = {name: cache.find(name) for name in "abc"}
     assert found["b"] is None
     assert found["a"] is not None
-    assert found["a"].read_bytes() == b"a" * 400
-    assert not put(cache, tmp_path, "d", size=1001)
-    assert cache.find("a")
+    assert np.array_equal(read_entry(str(found["a"]))[1].frame, motion.frame)
+    small = Cache(tmp_path / "small", size - 1)
+    assert put(small, "d", motion) == 0
+    assert not list((tmp_path / "small").iterdir())
 
 
-def test_many_writers_keep_the_folder_within_its_size(tmp_path: Path) -> None:
+def test_many_writers_keep_the_folder_within_its_size(tmp_path: Path, motion: Trajectory) -> None:
+    size = put(Cache(tmp_path / "measured", 10**6), "a", motion)
     failures: list[Exception] = []
 
     def write(number: int) -> None:
-        cache, folder = Cache(tmp_path / "cache", 5000), tmp_path / str(number)
-        folder.mkdir()
+        cache = Cache(tmp_path / "cache", 12 * size)
         try:
             for i in range(40):
-                assert put(cache, folder, f"{number}-{i}")
+                assert put(cache, f"{number}-{i}", motion) == size
                 if found := cache.find(f"{number}-{i}"):
                     with suppress(FileNotFoundError):  # another writer needed the room in between
-                        assert len(found.read_bytes()) == 400
+                        read_entry(str(found))
         except Exception as error:
             failures.append(error)
 
@@ -61,27 +80,17 @@ def test_many_writers_keep_the_folder_within_its_size(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert not failures
-    assert put(Cache(tmp_path / "cache", 5000), tmp_path, "last")
-    assert sum(path.stat().st_size for path in (tmp_path / "cache").iterdir()) <= 5000
+    assert put(Cache(tmp_path / "cache", 12 * size), "last", motion)
+    assert sum(path.stat().st_size for path in (tmp_path / "cache").iterdir()) <= 12 * size
 
 
-def test_a_full_disk_is_reported_once_and_leaves_nothing_behind(tmp_path: Path, monkeypatch: Any, caplog: Any) -> None:
-    cache = Cache(tmp_path / "cache", 1000)
-    real = shutil.move
-
-    def full(source: Path, target: Path) -> None:
-        target.write_bytes(b"half")
-        raise OSError(errno.ENOSPC, "No space left on device", str(target))
-
-    monkeypatch.setattr(shutil, "move", full)
-    assert not put(cache, tmp_path, "a")
-    assert not put(cache, tmp_path, "b")
+def test_why_nothing_is_kept_is_said_once_until_something_is_again(tmp_path: Path, motion: Trajectory, caplog: Any) -> None:
+    cache = Cache(tmp_path / "cache", 10**6)
+    for _ in range(2):
+        cache.report("No space left on device")
     assert caplog.text.count("No space left on device") == 1
-    assert not list((tmp_path / "cache").iterdir())
-    monkeypatch.setattr(shutil, "move", real)
-    assert put(cache, tmp_path, "a")
-    monkeypatch.setattr(shutil, "move", full)
-    assert not put(cache, tmp_path, "b")
+    assert put(cache, "a", motion)
+    cache.report("No space left on device")
     assert caplog.text.count("No space left on device") == 2
 
 
@@ -92,10 +101,12 @@ def full_disk(tmp_path: Path) -> str:
     return str(tmp_path / "full")
 
 
-def test_an_answer_outlives_a_disk_too_full_to_keep_it(full_disk: str) -> None:
-    delivery = solved(GOOD, IN_MEMORY, full_disk)
+def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk: str) -> None:
+    delivery = solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "entry"), full_disk, 10**6))
     assert delivery.body
     assert delivery.not_stored == "No space left on device"
+    assert delivery.stored == 0
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> None:
@@ -106,14 +117,27 @@ def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> N
     assert Path("/dev/full").exists()
 
 
-def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(tmp_path: Path) -> None:
-    made = solved(GOOD, IN_MEMORY, str(tmp_path / "kept.npz"))
-    assert restored(str(tmp_path / "kept.npz"), IN_MEMORY) == made
-    (tmp_path / "other.npz").write_bytes(b"PK\x03\x04 something else")
-    with pytest.raises(DamagedEntry):
-        restored(str(tmp_path / "other.npz"), IN_MEMORY)
+@pytest.mark.parametrize(
+    "changes", [{}, {"digits": 30, "certified": True}, {"problem": {**GOOD["problem"], "A": [3 * 10**30, 2 * 10**30, 10**30]}}]
+)
+def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(tmp_path: Path, changes: dict[str, Any]) -> None:
+    entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
+    made = solved({**GOOD, **changes}, IN_MEMORY, entry)
+    assert made.stored == (tmp_path / "kept").stat().st_size
+    for again in (restored(entry.path, IN_MEMORY), solved({**GOOD, **changes}, IN_MEMORY, entry)):
+        assert (again.body, again.provenance, again.kept, again.stored) == (made.body, made.provenance, True, 0)
     with pytest.raises(FileNotFoundError):
-        restored(str(tmp_path / "none.npz"), IN_MEMORY)
+        restored(str(tmp_path / "none"), IN_MEMORY)
+
+
+@pytest.mark.parametrize("content", [b"", b"1234", b"{}\n" + bytes(4), b"something else altogether"])
+def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "other").write_bytes(content)
+    with pytest.raises(DamagedEntry):
+        restored(str(tmp_path / "other"), IN_MEMORY)
+    made = solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6))
+    assert (made.kept, made.damaged) == (False, True)
+    assert restored(str(tmp_path / "other"), IN_MEMORY).body == made.body
 
 
 def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(tmp_path: Path, monkeypatch: Any) -> None:

@@ -17,7 +17,7 @@ from veselova.mechanics.table import row_blocks
 if TYPE_CHECKING:
     from veselova.mechanics.trajectory import Trajectory
 
-__all__ = ["read_archive", "write_archive"]
+__all__ = ["archived_series", "read_archive", "write_archive"]
 
 #: Suffixes of the decimals of a series, and of their radii.
 _DECIMAL, _RADIUS = "decimal", "radius"
@@ -26,29 +26,30 @@ _DECIMAL, _RADIUS = "decimal", "radius"
 _LEVEL = 1
 
 
-def write_archive(
-    trajectory: Trajectory, stream: BinaryIO, outputs: Iterable[str], *, compressed: bool = True, notes: Mapping[str, str] = {}
-) -> None:
-    """Write times, error, provenance, the chosen series (decimals as texts) and the integrals; ``notes`` are further texts."""
-    kind = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
-    with zipfile.ZipFile(stream, "w", kind, compresslevel=_LEVEL) as archive:
-        for name, array in _arrays(trajectory, tuple(outputs), notes):
+def write_archive(trajectory: Trajectory, stream: BinaryIO, outputs: Iterable[str]) -> None:
+    """Write times, error, provenance, the chosen series (decimals as texts) and the integrals."""
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+        for name, array in _arrays(trajectory, tuple(outputs)):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 _write_array(member, array)
 
 
-def _arrays(trajectory: Trajectory, outputs: tuple[str, ...], notes: Mapping[str, str]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _arrays(trajectory: Trajectory, outputs: tuple[str, ...]) -> Iterator[tuple[str, NDArray[Any]]]:
+    yield "provenance", np.array(json.dumps(trajectory.provenance.as_dict()))
+    yield from archived_series(trajectory, outputs)
+    for name, values in trajectory.integrals.items():
+        yield f"integral_{name}", values
+
+
+def archived_series(trajectory: Trajectory, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield times, error and the chosen series by the names of their arrays, decimals and their radii as texts as well."""
     yield "times", trajectory.times
     yield "error", trajectory.error
-    for name, text in {"provenance": json.dumps(trajectory.provenance.as_dict()), **notes}.items():
-        yield name, np.array(text)
     for name in outputs:
         yield name, trajectory.series(name)
         if trajectory.decimals is not None:
             yield f"{name}_{_DECIMAL}", trajectory.decimals.midpoints[name].astype(str)
             yield f"{name}_{_RADIUS}", trajectory.decimals.radii[name].astype(str)
-    for name, values in trajectory.integrals.items():
-        yield f"integral_{name}", values
 
 
 def _write_array(member: Any, array: NDArray[Any]) -> None:
@@ -62,11 +63,15 @@ def _write_array(member: Any, array: NDArray[Any]) -> None:
         member.write(array[block].tobytes())
 
 
-def read_archive(problem: Problem, archive: Mapping[str, NDArray[Any]]) -> Trajectory:
-    """Return the trajectory of an open archive; raises KeyError unless it has what no other series gives, of decimals all."""
+def read_archive(problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
+    """Return the trajectory of an open archive, or of such arrays by name with the dictionary of their ``provenance``.
+
+    Raises KeyError unless it has what no other series gives, of decimals all.
+    """
     from veselova.mechanics.trajectory import Provenance, Trajectory
 
-    provenance = Provenance(**json.loads(str(archive["provenance"])))
+    found = archive["provenance"]
+    provenance = Provenance(**(found if isinstance(found, dict) else json.loads(str(found))))
     if f"{next(iter(problem.outputs))}_{_DECIMAL}" not in archive:
         series = {name: archive[name] for name in problem.outputs if name not in problem.derived}
         return Trajectory(problem, archive["times"], archive["error"], series, provenance)

@@ -6,12 +6,14 @@ I_i = 1/A_i throughout.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "StateIntegrals",
     "clock_rate",
     "constants_of_motion",
     "energy",
@@ -60,19 +62,12 @@ def norm(vectors: Array) -> Array:
 
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
     """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape (...)."""
-    scaled, k = unit_scale(A)
-    w = norm(np.sqrt(scaled) * sliding_velocity(scaled, q, q_dot))
-    with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
-        h = w * w * (np.sum(scaled * q * q, axis=-1) / (2 * np.prod(scaled)))
-        return np.asarray(np.ldexp(h, k * (2 - A.size)), dtype=np.float64)
+    return StateIntegrals(A, q, q_dot).energy
 
 
 def momentum(A: Array, q: Array, q_dot: Array) -> Array:
     """Return p = [(q,Aq) A q̇ − (q̇,Aq) A q]/det A, equation (big_p), shape (..., n); (q,p) = 0."""
-    scaled, k = unit_scale(A)
-    w = sliding_velocity(scaled, q, q_dot)
-    p = scaled * w * np.sum(scaled * q * q, axis=-1)[..., None] / np.prod(scaled)
-    return np.asarray(np.ldexp(p, k * (2 - A.size)), dtype=np.float64)
+    return StateIntegrals(A, q, q_dot).momentum
 
 
 def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
@@ -85,8 +80,12 @@ def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     """Return q' = dq/dτ₁ = q̇/(dτ₁/dt), shape (..., n); zero for a body at rest."""
-    rate = clock_rate(A, q, q_dot)[..., None]
-    return np.divide(q_dot, rate, out=np.zeros_like(q_dot), where=rate > 0)
+    return _over_rate(q_dot, clock_rate(A, q, q_dot))
+
+
+def _over_rate(q_dot: Array, rate: Array) -> Array:
+    over = rate[..., None]
+    return np.divide(q_dot, over, out=np.zeros_like(q_dot), where=over > 0)
 
 
 def linear_integrals(p: Array, frame: Array) -> Array:
@@ -96,8 +95,7 @@ def linear_integrals(p: Array, frame: Array) -> Array:
 
 def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
     """Return F_i of the Neumann motion that a Veselova motion is in τ₁, shape (..., n): ``uhlenbeck_integrals`` with q'."""
-    A, _ = unit_scale(A)  # F_i has no units, and squares of I_i may leave the float range
-    return uhlenbeck_integrals(A, q, neumann_velocity(A, q, q_dot))
+    return StateIntegrals(A, q, q_dot).neumann
 
 
 def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
@@ -152,8 +150,7 @@ def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
 
     Accuracy: see ``moser_eigenvalues``.
     """
-    A, k = unit_scale(A)
-    return np.asarray(np.ldexp(moser_eigenvalues(A, q, neumann_velocity(A, q, q_dot))[..., 1:], -k), dtype=np.float64)
+    return StateIntegrals(A, q, q_dot).constants
 
 
 def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
@@ -165,3 +162,54 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
     basis = tangent_basis(q)
     form = np.diag(1 / A) - q_prime[..., :, None] * q_prime[..., None, :]
     return np.asarray(np.linalg.eigvalsh(np.swapaxes(basis, -1, -2) @ form @ basis), dtype=np.float64)
+
+
+class StateIntegrals:
+    """The integrals of states, by the functions above; what several of them are made of is computed once.
+
+    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and F_i has no units.
+    """
+
+    def __init__(self, A: Array, q: Array, q_dot: Array) -> None:
+        self._A, self._k = unit_scale(A)
+        self._q, self._q_dot = q, q_dot
+        self._unit = self._k * (2 - A.size)  # of h and p
+
+    @cached_property
+    def _sliding(self) -> Array:
+        return sliding_velocity(self._A, self._q, self._q_dot)
+
+    @cached_property
+    def _rate(self) -> Array:
+        return norm(np.sqrt(self._A) * self._sliding)
+
+    @cached_property
+    def _q_prime(self) -> Array:
+        return _over_rate(self._q_dot, self._rate)
+
+    @cached_property
+    def _qAq(self) -> Array:
+        return np.asarray(np.sum(self._A * self._q * self._q, axis=-1), dtype=np.float64)
+
+    @property
+    def energy(self) -> Array:
+        """Return h, shape (...)."""
+        with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
+            h = self._rate * self._rate * (self._qAq / (2 * np.prod(self._A)))
+            return np.asarray(np.ldexp(h, self._unit), dtype=np.float64)
+
+    @property
+    def momentum(self) -> Array:
+        """Return p, shape (..., n)."""
+        p = self._A * self._sliding * self._qAq[..., None] / np.prod(self._A)
+        return np.asarray(np.ldexp(p, self._unit), dtype=np.float64)
+
+    @property
+    def neumann(self) -> Array:
+        """Return F_1 … F_n, shape (..., n)."""
+        return uhlenbeck_integrals(self._A, self._q, self._q_prime)
+
+    @property
+    def constants(self) -> Array:
+        """Return c_2 ≤ … ≤ c_{n−1}, shape (..., n−2)."""
+        return np.asarray(np.ldexp(moser_eigenvalues(self._A, self._q, self._q_prime)[..., 1:], -self._k), dtype=np.float64)

@@ -80,7 +80,7 @@ def refined(
     if rate_squared is None:
         qAq, vAv, qAv = (_weighted(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
         rate_squared = (vAv * qAq - qAv * qAv) / qAq
-    velocity = _fixed([[x * y / (rate_squared * largest) for y in tangent] for x in tangent])
+    velocity = _fixed_square(tangent, 1 / (rate_squared * largest))
     M = _fixed(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
     unit = _unit_vector(q)
     N, one = _fixed(frame[:, 1:].tolist()), np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
@@ -104,12 +104,30 @@ def refined(
 
 
 def _weighted(A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
-    return sum((a * b * c for a, b, c in zip(A, x, y, strict=True)), Fraction())
+    (a, over_a), (b, over_b), (c, over_c) = _whole(A), _whole(x), _whole(y)
+    return Fraction(sum(map(math.prod, zip(a, b, c, strict=True))), over_a * over_b * over_c)
 
 
 def _fixed(rows: Any) -> Any:
-    """Return numbers as integers of _BITS bits after the point."""
-    return np.array([[math.floor(Fraction(x) * (1 << _BITS)) for x in row] for row in rows], dtype=object)
+    """Return floats or ratios as integers of _BITS bits after the point."""
+    return np.array([[_shifted(*x.as_integer_ratio()) for x in row] for row in rows], dtype=object)
+
+
+def _shifted(numerator: int, denominator: int) -> int:
+    return (numerator << _BITS) // denominator
+
+
+def _whole(vector: Sequence[Fraction]) -> tuple[list[int], int]:
+    """Return a vector as integers over their common denominator: sums and products of them need no further divisors."""
+    common = math.lcm(*(x.denominator for x in vector))
+    return [x.numerator * (common // x.denominator) for x in vector], common
+
+
+def _fixed_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
+    """Return scale·vvᵀ as integers of _BITS bits after the point."""
+    whole, common = _whole(vector)
+    times, over = scale.numerator, scale.denominator * common**2
+    return np.array([[_shifted(x * y * times, over) for y in whole] for x in whole], dtype=object)
 
 
 def _product(a: Any, b: Any) -> Any:

@@ -187,15 +187,16 @@ class Veselova(TorusProblem):
         if self.axes is not None:
             q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
         q = frame[..., 0]
-        p = integrals.momentum(self.A, q, q_dot)
+        found = integrals.StateIntegrals(self.A, q, q_dot)
+        p = found.momentum
         size = integrals.norm(p)
         return {
-            "energy": integrals.energy(self.A, q, q_dot),
+            "energy": found.energy,
             "q_norm": np.sum(q * q, axis=-1),
             "q_p": np.divide(np.sum(q * p, axis=-1), size, out=np.zeros_like(size), where=size > 0),
-            "neumann": integrals.neumann_integrals(self.A, q, q_dot),
+            "neumann": found.neumann,
             "linear": integrals.linear_integrals(p, frame),
-            "constants": integrals.constants_of_motion(self.A, q, q_dot),
+            "constants": found.constants,
         }
 
     def to_body_axes(self, vectors: Array) -> Array:

@@ -15,7 +15,8 @@ from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.service.admission import admit, read_json, require_acceptable
 from veselova.service.cache import Cache
 from veselova.service.connection import while_connected
-from veselova.service.delivery import DamagedEntry, Delivery, Wanted, answered, restored, solved
+from veselova.service.delivery import Delivery, Wanted, answered, restored, solved
+from veselova.service.entry import DamagedEntry
 from veselova.service.formats import FORMATS, Format, format_of
 from veselova.service.identity import entity_tag, identity, is_identity, matches
 from veselova.service.metrics import Metrics
@@ -37,6 +38,9 @@ PROVENANCE = "Veselova-Provenance"
 
 #: What a name stands for never changes; only who asked may keep it, since a server may ask for keys.
 _FOREVER = "private, max-age=31536000, immutable"
+
+#: What Cache-Status says of an answer that came from the cache.
+_HIT = "veselova; hit"
 
 
 class Answers:
@@ -74,25 +78,40 @@ class Answers:
         form = _format(request)
         asked = await self._asked(TrajectoryRequest, request)
         name = identity(asked)
-        kept = await to_thread.run_sync(self._cache.find, name)
-        tag = entity_tag(name, form.name)
-        if matches(_header(request, "if-none-match"), tag, kept is not None):
-            # RFC 9110, 13.1.2: 304 answers GET and HEAD alone.
-            raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
+        await self._require_news(request, name, entity_tag(name, form.name))
         wanted = Wanted(form.name, _coding(request), self._place(_is_large(asked)))
-        store = self._place(self._settings.cache_bytes > 0)
+        entry, stated = self._cache.entry(name), asked.model_dump()
 
         async def work() -> Response:
-            delivery = await self._restored(name, kept, wanted, asked.budget_s) if kept is not None else None
-            self._metrics.cached(hit=delivery is not None)
-            if delivery is not None:
-                return _response(delivery, wanted, {**_headers(name, form), "Cache-Status": "veselova; hit"})
-            with self._metrics.work("trajectory", asked.model_dump()):
-                delivery = await self._workers.run(solved, asked.model_dump(), wanted, store, budget_s=asked.budget_s)
-            stored = await self._keep(name, store, delivery)
-            return _response(delivery, wanted, _headers(name, form, stored))
+            with self._metrics.work("trajectory", stated) as ending:
+                try:
+                    delivery = await self._workers.run(solved, stated, wanted, entry, budget_s=asked.budget_s)
+                    ending.kept = delivery.kept
+                finally:
+                    self._metrics.cached(hit=ending.kept)
+            await self._see_to_cache(name, delivery)
+            headers = _headers(name, form, delivery.kept or delivery.stored > 0)
+            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.kept else headers)
 
-        return await self._guarded(request, work, wanted.place, store)
+        return await self._guarded(request, work, wanted.place, None if entry is None else entry.part)
+
+    async def _require_news(self, request: Request, name: str, tag: str) -> None:
+        """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304 answers GET and HEAD alone."""
+        stated = _header(request, "if-none-match")
+        if stated is None:
+            return
+        kept = await to_thread.run_sync(self._cache.find, name)
+        if matches(stated, tag, kept is not None):
+            raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
+
+    async def _see_to_cache(self, name: str, delivery: Delivery) -> None:
+        """See to what the cache has to do with an answer, and make room where one more entry fills it."""
+        if delivery.damaged:
+            await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
+        if delivery.not_stored is not None:
+            self._cache.report(delivery.not_stored)
+        if delivery.stored and self._cache.is_full(delivery.stored):
+            await to_thread.run_sync(self._cache.make_room)
 
     async def named(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
@@ -113,7 +132,7 @@ class Answers:
             delivery = await self._restored(name, kept, wanted, self._settings.max_budget_s)
             if delivery is None:
                 raise _not_kept(name)
-            return _response(delivery, wanted, {**headers, "Cache-Status": "veselova; hit"})
+            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT})
 
         return await self._guarded(request, work, wanted.place)
 
@@ -132,26 +151,19 @@ class Answers:
             pass
         return None
 
-    async def _keep(self, name: str, store: str | None, delivery: Delivery) -> bool:
-        if store is None:
-            return False
-        if delivery.not_stored is not None:
-            self._cache.report(delivery.not_stored)
-            return False
-        return await to_thread.run_sync(self._cache.put, name, Path(store))
-
     def _place(self, needed: bool) -> str | None:
         return self._spool.place() if needed else None
 
     @staticmethod
     async def _guarded(request: Request, work: Any, *places: str | None) -> Response:
-        """Return what the work gives while the client is there; nothing of the spool outlives it."""
+        """Return what the work gives while the client is there; of work that was stopped no file is left."""
         try:
             return await while_connected(request, work)
-        finally:
+        except BaseException:
             for place in filter(None, places):
                 with suppress(OSError):
                     Path(place).unlink(missing_ok=True)
+            raise
 
 
 def _response(delivery: Delivery, wanted: Wanted, headers: Mapping[str, str]) -> Response:

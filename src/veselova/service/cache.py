@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
 import time
 import uuid
-from contextlib import suppress
 from pathlib import Path
+
+from veselova.service.entry import Entry
 
 __all__ = ["Cache"]
 
@@ -48,44 +48,41 @@ class Cache:
             return None
         return path
 
-    def put(self, name: str, source: Path) -> bool:
-        """Move a file into the cache, and make room for it; return whether it is there now."""
+    def entry(self, name: str) -> Entry | None:
+        """Return where an entry is, or is to be, kept; None where nothing is kept."""
         if not self._size:
-            return False
-        part = self._folder / f".{uuid.uuid4().hex}{_PART}"
+            return None
+        return Entry(str(self._path(name)), str(self._folder / f".{uuid.uuid4().hex}{_PART}"), self._size)
+
+    def is_full(self, size: int) -> bool:
+        """Count an entry of so many bytes, which was made; return whether room has to be made."""
+        self._failing = False
+        self._room -= size
+        return self._room < 0
+
+    def make_room(self) -> None:
+        """Remove the entries used longest ago where all together are too large, and see how many bytes may be added."""
         try:
-            size = source.stat().st_size
-            if size > self._size:
-                return False
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if size > self._room:
-                self._room = self._make_room(size)
-            self._room -= size
-            shutil.move(source, part)  # a copy, where the source is on another disk
-            part.replace(self._path(name))
+            self._room = self._searched()
         except OSError as error:
             self._report(error)
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-            return False
-        self._failing = False
-        return True
 
-    def discard(self, name: str) -> None:
-        """Remove an entry that turned out to be damaged."""
+    def discard(self, name: str, remove: bool = True) -> None:
+        """Say that an entry turned out to be damaged, and remove it."""
         _LOG.warning("the cached answer %s is damaged and was removed", name)
         try:
-            self._path(name).unlink(missing_ok=True)
+            if remove:
+                self._path(name).unlink(missing_ok=True)
         except OSError as error:
             self._report(error)
 
     def _path(self, name: str) -> Path:
-        return self._folder / f"{name}.npz"
+        return self._folder / f"{name}.kept"
 
-    def _make_room(self, size: int) -> int:
-        """Remove the entries used longest ago until so many bytes fit, and return how many may be added before the next search.
+    def _searched(self) -> int:
+        """Remove entries until the others fit, and return how many bytes may be added before the next search.
 
-        What another server removes meanwhile is gone as well.
+        The newest stays: it fits by itself. What another server removes meanwhile is gone as well.
         """
         entries = []
         with os.scandir(self._folder) as found:
@@ -96,18 +93,16 @@ class Cache:
                     continue
                 entries.append((state.st_mtime_ns, state.st_size, entry.path))
         total = sum(held for _, held, _ in entries)
-        unseen = max(size, int(_UNSEEN * self._size))
-        if total + size <= self._size:
-            return min(self._size - total, unseen)
-        arriving = time.time_ns() - _ARRIVAL_NS
-        for used, held, path in sorted(entries):
-            if path.endswith(_PART) and used > arriving:
-                continue
-            Path(path).unlink(missing_ok=True)
-            total -= held
-            if total + size <= _KEPT * self._size:
-                break
-        return min(self._size - total, unseen)
+        if total > self._size:
+            arriving = time.time_ns() - _ARRIVAL_NS
+            for used, held, path in sorted(entries)[:-1]:
+                if path.endswith(_PART) and used > arriving:
+                    continue
+                Path(path).unlink(missing_ok=True)
+                total -= held
+                if total <= _KEPT * self._size:
+                    break
+        return min(max(0, self._size - total), int(_UNSEEN * self._size))
 
     def report(self, reason: str) -> None:
         """Say why answers are not cached, once until one is again."""

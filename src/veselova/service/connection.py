@@ -20,13 +20,6 @@ async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) ->
     answers: list[T] = []
     failures: list[Exception] = []
 
-    async def run() -> None:
-        try:
-            answers.append(await work())
-        except Exception as error:
-            failures.append(error)
-        tasks.cancel_scope.cancel()
-
     async def watch() -> None:
         while (await request.receive())["type"] != "http.disconnect":
             pass
@@ -34,8 +27,12 @@ async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) ->
 
     try:
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(run)
             tasks.start_soon(watch)
+            try:
+                answers.append(await work())
+            except Exception as error:
+                failures.append(error)
+            tasks.cancel_scope.cancel()
     except anyio.get_cancelled_exc_class():
         # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.
         raise Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5) from None

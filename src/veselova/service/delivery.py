@@ -1,38 +1,26 @@
-"""Answers as a worker process gives them: computed or taken from the cache, written in the format and coding asked for."""
+"""Answers as a worker process gives them: taken from the cache or computed, written in the format and coding asked for."""
 
 from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
-
-from veselova.mechanics.archive import read_archive, write_archive
-from veselova.mechanics.errors import VeselovaError
 from veselova.mechanics.trajectory import Trajectory
-from veselova.service.documents import stored_outputs, write_document
+from veselova.service.documents import write_document
+from veselova.service.entry import DamagedEntry, Entry, read_entry
 from veselova.service.formats import FORMATS, Format, coded
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import TrajectoryRequest
 from veselova.service.tasks import TASKS, requested_trajectory
 
-__all__ = ["DamagedEntry", "Delivery", "Wanted", "answered", "restored", "solved"]
+__all__ = ["Delivery", "Wanted", "answered", "restored", "solved"]
 
 #: Answers below this are not worth a content coding.
 _SMALL = 1000
-
-#: The text in an archive that says what was asked.
-_REQUEST = "request"
-
-
-class DamagedEntry(VeselovaError):
-    """A file of the cache that does not hold what was put into it."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +34,18 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Delivery:
-    """An answer: its bytes, or None where they are in the file wanted; its coding, provenance, and why it could not be stored."""
+    """An answer: its bytes, or None where they are in the file wanted; its coding and its provenance.
+
+    Of the cache: whether the answer came from it, the bytes of the entry that was made, whether one was damaged, and why none
+    could be read or made.
+    """
 
     body: bytes | None
     coding: str
     provenance: str | None = None
+    kept: bool = False
+    stored: int = 0
+    damaged: bool = False
     not_stored: str | None = None
 
 
@@ -61,40 +56,34 @@ def answered(kind: str, request: Mapping[str, Any], wanted: Wanted) -> Delivery:
     return _delivered(lambda stream: write_document(document, stream), wanted, wanted.coding)
 
 
-def solved(request: Mapping[str, Any], wanted: Wanted, store: str | None) -> Delivery:
-    """Return a trajectory, computed; it is kept in the file ``store`` as well, if that can be written."""
+def solved(request: Mapping[str, Any], wanted: Wanted, entry: Entry | None) -> Delivery:
+    """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed, and kept if that can be."""
+    damaged, failure = False, None
+    if entry is not None:
+        try:
+            return restored(entry.path, wanted)
+        except FileNotFoundError:
+            pass
+        except DamagedEntry:
+            damaged = True
+        except OSError as error:
+            failure = error.strerror or str(error)
     asked = TrajectoryRequest.model_validate(request)
     trajectory = requested_trajectory(asked)
     delivery = _written(trajectory, asked.outputs, wanted)
-    if store is None:
-        return delivery
-    try:
-        _keep(trajectory, asked, store)
-    except OSError as error:
-        with suppress(OSError):
-            Path(store).unlink(missing_ok=True)
-        return Delivery(delivery.body, delivery.coding, delivery.provenance, error.strerror or str(error))
-    return delivery
+    stored = 0
+    if entry is not None and failure is None:
+        try:
+            stored = entry.write(request, trajectory)
+        except OSError as error:
+            failure = error.strerror or str(error)
+    return replace(delivery, stored=stored, damaged=damaged, not_stored=failure)
 
 
 def restored(path: str, wanted: Wanted) -> Delivery:
-    """Return a trajectory that was kept; raises DamagedEntry where the file is not whole, FileNotFoundError where it is gone."""
-    try:
-        with Path(path).open("rb") as file, np.load(file) as archive:
-            asked = TrajectoryRequest.model_validate(json.loads(str(archive[_REQUEST])))
-            trajectory = read_archive(asked.problem.problem(), archive)
-    except FileNotFoundError:
-        raise
-    except (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OSError, VeselovaError) as error:
-        raise DamagedEntry(f"{path}: {type(error).__name__}") from None
-    return _written(trajectory, asked.outputs, wanted)
-
-
-def _keep(trajectory: Trajectory, asked: TrajectoryRequest, store: str) -> None:
-    kept = tuple(trajectory.problem.outputs) if trajectory.decimals is not None else stored_outputs(trajectory.problem)
-    notes = {_REQUEST: json.dumps({**asked.model_dump(), "times": [0.0]})}  # the times are in the archive
-    with Path(store).open("wb") as stream:
-        write_archive(trajectory, stream, kept, compressed=False, notes=notes)
+    """Return a trajectory that was kept; raises DamagedEntry where the file is not whole, OSError where it cannot be read."""
+    asked, trajectory = read_entry(path)
+    return replace(_written(trajectory, asked.outputs, wanted), kept=True)
 
 
 def _written(trajectory: Trajectory, outputs: list[str] | None, wanted: Wanted) -> Delivery:

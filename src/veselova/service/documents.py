@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO
 
@@ -27,6 +28,10 @@ __all__ = [
     "trajectory_of",
     "write_document",
 ]
+
+
+#: Documents whose arrays have no more numbers are written at once.
+_FEW_NUMBERS = 10_000
 
 
 def stored_outputs(problem: Problem) -> tuple[str, ...]:
@@ -109,11 +114,26 @@ def encoded(document: Mapping[str, Any]) -> bytes:
 
 def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
     """Write a document as JSON, its arrays block by block, so that the text of large ones is never in memory as a whole."""
+    if _numbers(document) <= _FEW_NUMBERS:
+        stream.write(orjson.dumps(_writable(document), option=orjson.OPT_SERIALIZE_NUMPY))
+    else:
+        _write_parts(document, stream)
+
+
+def _numbers(document: Mapping[str, Any]) -> int:
+    """Return how many numbers the arrays of a document have."""
+    return sum(
+        _numbers(value) if isinstance(value, Mapping) else value.size if isinstance(value, np.ndarray) else 0
+        for value in document.values()
+    )
+
+
+def _write_parts(document: Mapping[str, Any], stream: BinaryIO) -> None:
     stream.write(b"{")
     for i, (name, value) in enumerate(document.items()):
         stream.write(b"," * (i > 0) + orjson.dumps(name) + b":")
         if isinstance(value, Mapping):
-            write_document(value, stream)
+            _write_parts(value, stream)
         elif isinstance(value, np.ndarray) and value.ndim:
             _write_array(name, value, stream)
         else:
@@ -131,6 +151,22 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
     stream.write(b"]")
 
 
+def _writable(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a document whose numbers are all finite, its arrays in the order in which they are written."""
+    parts: dict[str, Any] = {}
+    for name, value in document.items():
+        if isinstance(value, Mapping):
+            parts[name] = _writable(value)
+            continue
+        _require_finite(value, name)
+        parts[name] = np.ascontiguousarray(value) if isinstance(value, np.ndarray) and value.ndim else value
+    return parts
+
+
 def _require_finite(value: Any, place: str) -> None:
-    if isinstance(value, (float, np.ndarray, np.floating)) and not np.all(np.isfinite(value)):
+    if isinstance(value, np.ndarray):
+        finite = bool(np.isfinite(value).all())
+    else:
+        finite = not isinstance(value, (float, np.floating)) or math.isfinite(value)
+    if not finite:
         raise InternalContradiction(f"{place} holds a number that is not finite")

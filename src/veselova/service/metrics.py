@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
@@ -18,10 +19,17 @@ from veselova.service.request_log import note
 from veselova.service.systems import SYSTEMS
 from veselova.version import __version__
 
-__all__ = ["Metrics"]
+__all__ = ["Ending", "Metrics"]
 
 #: Seconds of work: from a torus that is a millisecond to the longest budget.
 _BUCKETS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 60)
+
+
+@dataclass
+class Ending:
+    """What is found out about work while it is done: whether its answer was ``kept``."""
+
+    kept: bool = False
 
 
 class Metrics:
@@ -40,19 +48,23 @@ class Metrics:
         self._cache = Counter("veselova_cache", "Answers looked up in the cache, by result", ["result"], **here)
 
     @contextmanager
-    def work(self, kind: str, request: Mapping[str, Any]) -> Iterator[None]:
-        """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too."""
-        engine, outcome, began = _engine(kind, request), "stopped", time.perf_counter()
+    def work(self, kind: str, request: Mapping[str, Any]) -> Iterator[Ending]:
+        """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too.
+
+        An answer that was kept, and so needed no work, is not counted.
+        """
+        engine, outcome, began, ending = _engine(kind, request), "stopped", time.perf_counter(), Ending()
         try:
-            yield
+            yield ending
             outcome = "solved"
         except Exception as error:
             outcome = problem_code(error)
             raise
         finally:
-            self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
-            self._outcomes.labels(kind, engine, outcome).inc()
-            note(system=request["problem"]["system"], engine=engine, outcome=outcome)
+            if not ending.kept:
+                self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
+                self._outcomes.labels(kind, engine, outcome).inc()
+                note(system=request["problem"]["system"], engine=engine, outcome=outcome)
 
     def refused(self, code: str) -> None:
         """Count a request that the service refused with this problem code."""
