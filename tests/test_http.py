@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
+import socket
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx2
 import numpy as np
@@ -133,6 +137,21 @@ def test_constants_are_reported_as_json_spells_them(server: Server, given: Any, 
 @pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])
 def test_what_is_not_json_gets_400(server: Server, body: bytes) -> None:
     is_problem(post(server, "/v1/tori", body), 400, "malformed-json")
+
+
+def test_headers_without_end_are_not_read(server: Server) -> None:
+    address = urlsplit(server.url)
+    with socket.create_connection((address.hostname, address.port), timeout=30) as connection:
+        sent, answer = 0, b""
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Long: ")
+        with suppress(ConnectionError):  # the server has closed its end
+            while sent < 50_000_000 and not select.select([connection], [], [], 0)[0]:
+                connection.sendall(b"a" * 10_000)
+                sent += 10_000
+        with suppress(ConnectionError):
+            answer = connection.recv(1000)
+    assert sent < 50_000_000
+    assert answer[:12] in (b"HTTP/1.1 400", b"")
 
 
 def test_several_faults_are_reported_together(server: Server) -> None:
