@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -27,7 +28,9 @@ from pyarrow import parquet
 import veselova as vs
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, Unsolved
 from veselova.service import sweeps as running
+from veselova.service.cluster import open_cluster
 from veselova.service.database import connect, schema_differences
+from veselova.service.dispatch import answers
 from veselova.service.jobs import Job, Jobs
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.problem_details import Refused
@@ -315,7 +318,9 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
     interrupted = Jobs(settings)
     job = interrupted.get(sweep.id)
     assert 60 <= job.done < 300
-    damaged = interrupted.chunk_path(job.id, 1)
+    missing = interrupted.missing(job)
+    victim = min(set(range(15)) - set(missing))
+    damaged = interrupted.chunk_path(job.id, victim)
     damaged.write_bytes(damaged.read_bytes()[:-1])
     calls: list[int] = []
     store = Jobs.store
@@ -324,9 +329,7 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
     )
     monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
     _, resumed = run_sweep(sweep, settings, lambda done, total: None)
-    assert 0 not in calls
-    assert 1 in calls
-    assert len(calls) == 15 - job.done // 20 + 1
+    assert sorted(calls) == sorted([*missing, victim])
     for path in ("result_path", "packed_path"):
         assert getattr(resumed, path)(sweep.id).read_bytes() == getattr(undisturbed, path)(sweep.id).read_bytes()
 
@@ -444,6 +447,70 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
 
     asyncio.run(run())
     assert jobs.get(job.id).state == "finished"
+
+
+def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(tmp_path: Path) -> None:
+    """One worker is at work for somebody else, and has cancelled work in its queue; then it is the cancelled work itself."""
+    settings = local_settings(tmp_path, 1)
+    endless = {"times": {"start": 0, "stop": 1e6, "count": 2}, "engine": "numeric", "budget_s": 60}
+    job = Jobs(settings).submit(request(**endless))
+
+    async def cancelled_once(client: Any, stage: str) -> None:
+        """Ask for the first problems, and give up when the worker is so far with them."""
+        waiting = asyncio.create_task(answers(client, job, 0, 5, lambda: False))
+        while stage not in (await client.run(stages_of_chunks)).popitem()[1]:
+            assert not waiting.done()
+            await asyncio.sleep(0.01)
+        waiting.cancel()
+        await asyncio.gather(waiting, return_exceptions=True)
+
+    async def run() -> None:
+        async with open_cluster(settings) as client:
+            process = await client.run(os.getpid)
+            flag = tmp_path / "go on"
+            other = client.submit(wait_for_file, str(flag))
+            while "wait_for_file" not in str(await client.processing()):
+                await asyncio.sleep(0.01)
+            await cancelled_once(client, "ready")
+            assert await client.run(os.getpid) == process
+            flag.touch()
+            assert await other == "undisturbed"
+            await cancelled_once(client, "executing")
+            assert set((await client.run(os.getpid)).values()) != set(process.values())
+
+    asyncio.run(run())
+
+
+def wait_for_file(path: str) -> str:
+    while not Path(path).exists():
+        time.sleep(0.01)
+    return "undisturbed"
+
+
+def stages_of_chunks(dask_worker: Any) -> list[str]:
+    return [task.state for key, task in dask_worker.state.tasks.items() if "computed_chunk" in str(key)]
+
+
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), TimeoutError("a look-up took too long")])
+def test_a_worker_whose_machine_fails_is_no_lost_cluster(
+    failure: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: Any) -> Any:
+        raise failure
+
+    monkeypatch.setattr("veselova.service.dispatch.computed_chunk", failing)
+    with pytest.raises(Unsolved, match=f"a worker could not compute the problems 0 to 14: {failure.strerror or failure}"):
+        run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
+
+
+def test_a_listing_reads_no_request(tmp_path: Path) -> None:
+    jobs, statements = Jobs(Settings(data_dir=tmp_path)), list[str]()
+    job = jobs.submit(request())
+    sa.event.listen(jobs._engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
+    assert [status.id for status in jobs.newest()] == [job.id]
+    assert jobs.status(job.id).total == 15
+    assert len(statements) == 2
+    assert not [text for text in statements if "request" in text]
 
 
 def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:

@@ -7,18 +7,26 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelled
 from typing import Any
 
+from veselova.service.database import reason_of
 from veselova.service.jobs import Job
 from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
 from veselova.version import __version__
 
-__all__ = ["answers"]
+__all__ = ["ChunkFailed", "answers"]
+
+#: Seconds between two looks at a worker that has not heard yet that work was cancelled.
+_LOOK_AGAIN_S = 0.02
+
+
+class ChunkFailed(Exception):
+    """A worker could not give the answers to some problems, for a reason of its machine: no room on its disk, say."""
 
 
 async def answers(client: Any, job: Job, start: int, stop: int, closing: Callable[[], bool]) -> list[Chunk]:
     """Return the answers to some problems; where their worker dies over them, one by one, to find out over which.
 
     ``closing`` says, when the wait is cancelled, whether the workers end with their cluster anyway. Raises OSError where the
-    cluster is lost, OtherVersion where it is not of the same version.
+    cluster is lost, ChunkFailed where its worker met with one, OtherVersion where it is not of the same version.
     """
     from distributed.scheduler import KilledWorker
 
@@ -31,6 +39,10 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
         return [part for row in range(start, stop) for part in await answers(client, job, row, row + 1, closing)]
     except FutureCancelled as error:
         raise ConnectionError(f"the cluster dropped the work: {error}") from None
+    except OSError as error:
+        if future.status != "error":  # it is the way to the scheduler that failed
+            raise
+        raise ChunkFailed(f"a worker could not compute the problems {start} to {stop - 1}: {reason_of(error)}") from error
     except asyncio.CancelledError:
         if not closing():
             await _stop(client, future)
@@ -43,7 +55,26 @@ async def _stop(client: Any, future: Any) -> None:
     """End work that nobody waits for: a worker that is in the midst of it is restarted, for a thread cannot be stopped."""
     if client.scheduler_info(n_workers=1)["address"].startswith("inproc"):
         return
-    where = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
+    held = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
     await future.cancel(force=True)
-    if where:
-        await client.restart_workers(where, raise_for_error=False)
+    if running := await _at_work(client, future.key, held):
+        await client.restart_workers(running, raise_for_error=False)
+
+
+async def _at_work(client: Any, key: Any, workers: list[str]) -> list[str]:
+    """Return which of the workers are in the midst of cancelled work; those that only have it in their queue let go of it."""
+    running: list[str] = []
+    while workers:
+        stages = await client.run(_stage, key, workers=workers, on_error="ignore")
+        running += [worker for worker, stage in stages.items() if stage == "running"]
+        workers = [worker for worker, stage in stages.items() if stage == "waiting"]
+        if workers:  # the word that the work was cancelled is on its way
+            await asyncio.sleep(_LOOK_AGAIN_S)
+    return running
+
+
+def _stage(key: Any, dask_worker: Any) -> str:
+    """Return how far a worker is with some work, as Dask calls it on the worker."""
+    if key in dask_worker.active_keys:
+        return "running"
+    return "waiting" if key in dask_worker.state.tasks else "gone"

@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.cluster import open_cluster
 from veselova.service.database import reason_of
-from veselova.service.dispatch import answers
+from veselova.service.dispatch import ChunkFailed, answers
 from veselova.service.jobs import Job, JobEnded, Jobs
 from veselova.service.results import Result
 from veselova.service.settings import Settings
@@ -153,7 +153,7 @@ class Sweeps:
         lock = FileLock(self.jobs.folder / job_id / "lock", timeout=0, thread_local=False)
         async with self._turns:
             try:
-                if (await self._persist(job_id, self.jobs.get, job_id)).ended:
+                if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
                 if await self._persist(job_id, _taken, lock):
                     await self._run_locked(job_id)
@@ -161,7 +161,7 @@ class Sweeps:
                     _LOG.info("job %s runs in another process", job_id)
             except asyncio.CancelledError:
                 raise
-            except (_NoCluster, OtherVersion) as error:
+            except (_NoCluster, ChunkFailed, OtherVersion) as error:
                 await self._persist(job_id, self.jobs.advance, job_id, "failed", str(error))
             except JobEnded as error:
                 _LOG.info("job %s is given up: %s", job_id, error)
