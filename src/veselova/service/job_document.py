@@ -8,7 +8,7 @@ import orjson
 from pydantic import BaseModel, Field
 
 if TYPE_CHECKING:
-    from veselova.service.jobs import Job
+    from veselova.service.jobs import JobStatus
     from veselova.service.sweeps import Progress
 
 __all__ = ["JobDocument", "job_document"]
@@ -30,9 +30,10 @@ class JobDocument(BaseModel):
     links: dict[str, str]
 
 
-def job_document(job: Job, progress: Progress | None, whole: bool = True) -> dict[str, Any]:
-    """Return the document of a job; ``progress`` is what the process that runs it knows beyond the database;
-    ``whole``: with the request, which may be long.
+def job_document(job: JobStatus, progress: Progress | None, trajectories: bool) -> dict[str, Any]:
+    """Return the document of a job, with its request where ``job`` has it; the request is JSON as it was stored.
+
+    ``progress`` is what the process that runs it knows beyond the database; ``trajectories``: whether there are some to be had.
     """
     here = f"/v1/jobs/{job.id}"
     rate = progress.rate if progress else None
@@ -40,9 +41,9 @@ def job_document(job: Job, progress: Progress | None, whole: bool = True) -> dic
     links = {"self": here, "events": f"{here}/events"}
     if job.state == "finished":
         links["result"] = f"{here}/result"
-        if orjson.loads(job.request)["trajectories"]:
+        if trajectories:
             links["trajectories"] = f"{here}/trajectories"
-    return JobDocument(
+    document = JobDocument(
         id=job.id,
         state=job.state,  # type: ignore[arg-type]
         detail=f"waits for {progress.waits_for}" if progress and progress.waits_for else job.detail,
@@ -52,6 +53,9 @@ def job_document(job: Job, progress: Progress | None, whole: bool = True) -> dic
         eta_s=(job.total - done) / rate if rate else None,
         created_at=job.created_at.isoformat(),
         finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
-        request=orjson.loads(job.request) if whole else None,
+        request=None,
         links=links,
     ).model_dump()
+    if (request := getattr(job, "request", None)) is not None:
+        document["request"] = orjson.Fragment(request)
+    return document

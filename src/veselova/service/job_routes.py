@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import anyio
 import orjson
@@ -22,6 +22,9 @@ from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
 from veselova.service.sweep_request import SweepRequest
+
+if TYPE_CHECKING:
+    from veselova.service.jobs import Jobs, JobStatus
 
 __all__ = ["job_router"]
 
@@ -103,8 +106,9 @@ class _JobRoutes:
 
     async def listed(self) -> Response:
         """List the last jobs."""
-        found = await self._service.ask(lambda jobs: jobs.newest())
-        return _json({"jobs": [await self._document(job_id, whole=False) for job_id in found]})
+        found = await self._service.ask(lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest()])
+        sweeps = await self._service.sweeps()
+        return _json({"jobs": [job_document(job, sweeps.progress(job.id), kept) for job, kept in found]})
 
     async def job(self, job_id: str) -> Response:
         """Tell all of a job, its request included."""
@@ -112,7 +116,7 @@ class _JobRoutes:
 
     async def require(self, job_id: str) -> None:
         """Raise Refused unless there is such a job."""
-        await self._service.ask(lambda jobs: jobs.get(job_id))
+        await self._service.ask(lambda jobs: jobs.status(job_id))
 
     async def events(self, job_id: str) -> AsyncIterator[ServerSentEvent]:
         """Tell how far a job is until it has ended."""
@@ -156,11 +160,14 @@ class _JobRoutes:
         return Response(status_code=204)
 
     async def _document(self, job_id: str, whole: bool = True) -> dict[str, Any]:
-        found = await self._service.ask(lambda jobs: jobs.get(job_id))
-        return job_document(found, (await self._service.sweeps()).progress(job_id), whole)
+        def asked(jobs: Jobs) -> tuple[JobStatus, bool]:
+            return (jobs.get if whole else jobs.status)(job_id), jobs.packed_path(job_id).exists()
+
+        job, kept = await self._service.ask(asked)
+        return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
 
     async def _require_finished(self, job_id: str) -> None:
-        found = await self._service.ask(lambda jobs: jobs.get(job_id))
+        found = await self._service.ask(lambda jobs: jobs.status(job_id))
         if found.state != "finished":
             raise Refused("not-finished", f"The job is {found.state}; its result is there when it has finished.", retry_after=2)
 

@@ -22,7 +22,7 @@ from veselova.service.settings import Settings
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.whole_file import whole_file
 
-__all__ = ["ENDED", "Job", "JobEnded", "Jobs"]
+__all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs"]
 
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
@@ -30,13 +30,17 @@ ENDED = ("finished", "failed", "cancelled")
 #: Jobs in one listing.
 _LISTED = 100
 
+#: What is asked of the database about a job: all but its request.
+_STATUS_COLUMNS = [column.name for column in jobs.c if column is not jobs.c.request]
+_DONE = sa.select(sa.func.coalesce(sa.func.sum(chunks.c.rows), 0)).where(chunks.c.job_id == jobs.c.id).scalar_subquery()
+_STATUS = sa.select(*(jobs.c[name] for name in _STATUS_COLUMNS), _DONE.label("done"))
+
 
 @dataclass(frozen=True)
-class Job:
-    """A sweep as the database knows it. ``done`` counts the problems in finished chunks."""
+class JobStatus:
+    """How far a sweep is, as the database knows it. ``done`` counts the problems in finished chunks."""
 
     id: str
-    request: bytes
     state: str
     detail: str
     total: int
@@ -51,11 +55,6 @@ class Job:
         return self.state in ENDED
 
     @property
-    def sweep(self) -> SweepRequest:
-        """Return the request."""
-        return read_request(SweepRequest, orjson.loads(self.request))
-
-    @property
     def chunk_count(self) -> int:
         """Return the number of chunks."""
         return -(-self.total // self.chunk_rows)
@@ -63,6 +62,18 @@ class Job:
     def rows(self, position: int) -> tuple[int, int]:
         """Return the first problem of a chunk, and the one after its last."""
         return position * self.chunk_rows, min((position + 1) * self.chunk_rows, self.total)
+
+
+@dataclass(frozen=True)
+class Job(JobStatus):
+    """A sweep with its request, which may be megabytes of JSON."""
+
+    request: bytes
+
+    @property
+    def sweep(self) -> SweepRequest:
+        """Return the request."""
+        return read_request(SweepRequest, orjson.loads(self.request))
 
 
 class JobEnded(Exception):
@@ -131,14 +142,20 @@ class Jobs:
             raise Refused("storage-full", detail)
 
     def get(self, job_id: str) -> Job:
-        """Return a job; raises Refused (``no-such-job``)."""
-        done = sa.select(sa.func.coalesce(sa.func.sum(chunks.c.rows), 0)).where(chunks.c.job_id == job_id).scalar_subquery()
+        """Return a job with its request; raises Refused (``no-such-job``)."""
+        row = self._row(_STATUS.add_columns(jobs.c.request).where(jobs.c.id == job_id), job_id)
+        return Job(**_status(row), request=row["request"].encode())
+
+    def status(self, job_id: str) -> JobStatus:
+        """Return how far a job is; raises Refused (``no-such-job``)."""
+        return JobStatus(**_status(self._row(_STATUS.where(jobs.c.id == job_id), job_id)))
+
+    def _row(self, query: sa.Select[Any], job_id: str) -> sa.RowMapping:
         with self._engine.connect() as connection:
-            found = connection.execute(sa.select(jobs, done.label("done")).where(jobs.c.id == job_id)).mappings().first()
+            found = connection.execute(query).mappings().first()
         if found is None:
             raise Refused("no-such-job", f"There is no job {job_id[:40]}.")
-        times = {name: found[name] and in_utc(found[name]) for name in ("created_at", "finished_at")}
-        return Job(**{**found, **times, "request": found["request"].encode(), "done": int(found["done"])})
+        return found
 
     def unfinished(self) -> list[str]:
         """Return the jobs that are to go on, oldest first."""
@@ -146,11 +163,11 @@ class Jobs:
             query = sa.select(jobs.c.id).where(jobs.c.state.not_in(ENDED)).order_by(jobs.c.created_at, jobs.c.id)
             return list(connection.execute(query).scalars())
 
-    def newest(self) -> list[str]:
+    def newest(self) -> list[JobStatus]:
         """Return the jobs that were made last, newest first."""
+        query = _STATUS.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
         with self._engine.connect() as connection:
-            query = sa.select(jobs.c.id).order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
-            return list(connection.execute(query).scalars())
+            return [JobStatus(**_status(row)) for row in connection.execute(query).mappings()]
 
     def require_writable(self) -> None:
         """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless the folder can."""
@@ -238,6 +255,11 @@ class Jobs:
                 with contextlib.suppress(FileNotFoundError):  # a part that was finished, or a job that was removed, meanwhile
                     total += (Path(folder) / name).stat().st_size
         return total
+
+
+def _status(row: sa.RowMapping) -> dict[str, Any]:
+    times = {name: row[name] and in_utc(row[name]) for name in ("created_at", "finished_at")}
+    return {**{column: row[column] for column in _STATUS_COLUMNS}, **times, "done": int(row["done"])}
 
 
 def _new(sweep: SweepRequest) -> dict[str, Any]:
