@@ -26,6 +26,7 @@ import zarr
 from pyarrow import parquet
 
 import veselova as vs
+from veselova.analytic.solution import Solution
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, Unsolved
 from veselova.service import sweeps as running
 from veselova.service.cluster import open_cluster
@@ -180,6 +181,17 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
         assert found["drift.energy"] == motion.drift["energy"]
         assert found["frame.min.1.2"] == motion.frame[:, 1, 2].min()
         assert found["tau1.max"] == motion.tau1.max()
+
+
+def test_a_row_with_torus_and_motion_solves_its_problem_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved, construct = list[Any](), Solution.__init__
+    computed_chunk(request().canonical, 0, 1, __version__)  # both engines are loaded and have run
+    monkeypatch.setattr(Solution, "__init__", lambda self, *rest: solved.append(rest) or construct(self, *rest))
+    for times in (None, [0, 1]):
+        solved.clear()
+        found = rows(request(times=times), 0, 3)
+        assert [row["outcome"] for row in found] == ["solved"] * 3
+        assert len(solved) == 3
 
 
 def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -19,9 +20,10 @@ from veselova.mechanics.trajectory import Trajectory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from veselova.analytic.solution import Solution
     from veselova.mechanics.torus import Torus
 
-__all__ = ["ENGINES", "compare", "solve", "start_on_torus", "torus"]
+__all__ = ["ENGINES", "Prepared", "compare", "solve", "start_on_torus", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
@@ -47,6 +49,20 @@ def solve(
     they store. ``certified`` (analytic): the error of every such number is a proven bound.
     Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem, BackendMissing without its library.
     """
+    return _solve(problem, times, engine, method, digits=digits, certified=certified, formulation=formulation)
+
+
+def _solve(
+    problem: Problem,
+    times: Any,
+    engine: str | None,
+    method: str | None,
+    *,
+    digits: int = FEWEST_DIGITS,
+    certified: bool = False,
+    formulation: str | None = None,
+    solution: Solution | None = None,
+) -> Trajectory:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
     engine = next(iter(problem.engines)) if engine is None else engine
@@ -59,8 +75,37 @@ def solve(
         raise InvalidInput(("formulation",), "none (the closed form has one)", shown(formulation))
     if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
+    elif engine == "analytic" and solution is not None:
+        options["solution"] = solution
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
     return answer
+
+
+class Prepared:
+    """A problem of which both the torus and a motion are asked: what the two have in common is computed once."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    @cached_property
+    def _solution(self) -> Solution:
+        from veselova.analytic.solution import Solution
+
+        return Solution(cast("TorusProblem", self.problem))
+
+    @property
+    def has_torus(self) -> bool:
+        """Return whether the motion runs on a torus that ``torus`` describes."""
+        return isinstance(self.problem, TorusProblem) and self.problem.moves
+
+    def torus(self) -> Torus:
+        """Return the torus; raises as the function of this name does."""
+        return _torus(self.problem, self._solution if self.has_torus else None)
+
+    def solve(self, times: Any, engine: str | None = None, method: str | None = None, **options: Any) -> Trajectory:
+        """Return the motion; takes and raises what the function of this name does."""
+        known = self._solution if "_solution" in vars(self) else None
+        return _solve(self.problem, times, engine, method, solution=known, **options)
 
 
 def _require_precision(engine: str, digits: Any, certified: Any) -> None:
@@ -86,10 +131,14 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
 
 def torus(problem: Problem) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the analytic engine does."""
+    return _torus(problem)
+
+
+def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
     if not isinstance(problem, TorusProblem):
         raise InvalidInput(("problem",), "a system with a closed form: veselova, neumann, ellipsoid-geodesic", problem.system)
     from veselova.analytic.torus import torus as torus_of
 
-    return torus_of(problem)
+    return torus_of(problem, solution)

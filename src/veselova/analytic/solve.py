@@ -50,6 +50,7 @@ def solve(
     clock: str | None = None,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
+    solution: Solution | None = None,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
@@ -58,6 +59,7 @@ def solve(
     same with the Fourier clock. Every start is served: equal A's, frozen directions, coinciding constants, rest. On a
     separatrix the error is that of starts a rounding away, and grows like e^(rate·t).
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
+    ``solution``: that of the problem in double precision, where it is known already.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer.
     Accuracy: see the trajectory's ``error``; about 1e-14 at t of order 10².
     """
@@ -68,7 +70,10 @@ def solve(
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
-        return _TorusMotion(problem, method, clock)(grid)
+        motion = _TorusMotion(problem, method, clock)
+        if solution is not None:
+            vars(motion)["_solution"] = solution
+        return motion(grid)
     if certified and method == "theta":
         raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
     if clock is not None:

@@ -18,13 +18,13 @@ __all__ = ["torus"]
 Array = NDArray[np.float64]
 
 
-def torus(problem: TorusProblem) -> Torus:
-    """Return the invariant torus on which a motion runs, and where it starts there.
+def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
+    """Return the invariant torus on which a motion runs, and where it starts there; ``solution``: that of the problem.
 
     Directions that do not move belong to no torus: the curve is that of the moving part. Raises Unsolved at rest, and where
     periods leave the range of a float. Digits: periods and T to about 1e-15 relative, tested for n = 2…8.
     """
-    solution = Solution(problem)
+    solution = solution or Solution(problem)
     curve, moving, root = solution.curve, solution.moving, solution.tau1_unit
     unit = float(moving.unit)
     g = curve.genus

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from veselova.engines import torus
+from veselova.engines import Prepared
 from veselova.mechanics.errors import Unsolved, VeselovaError
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus import Torus
@@ -110,12 +110,13 @@ def _row(sweep: SweepRequest, row: int, outcome: str, detail: str) -> Row:
 def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one problem; what was found before a failure stays."""
     problem = request.problem.problem()
-    if isinstance(problem, TorusProblem) and problem.moves:
-        yield from _of_torus(torus(problem))
+    prepared = Prepared(problem)
+    if prepared.has_torus:
+        yield from _of_torus(prepared.torus())
     elif isinstance(problem, TorusProblem):
         yield "regime", "rest"
     if isinstance(request, TrajectoryRequest):
-        trajectory = requested_trajectory(request)
+        trajectory = requested_trajectory(request, prepared)
         names = request.outputs or list(problem.outputs)
         if keep:
             kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)

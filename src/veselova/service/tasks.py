@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from veselova.engines import compare, solve, torus
+from veselova.engines import Prepared, compare, torus
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Trajectory
@@ -16,11 +16,11 @@ from veselova.service.schemas import ComparisonRequest, TorusRequest, Trajectory
 __all__ = ["TASKS", "requested_comparison", "requested_torus", "requested_trajectory", "warm_up"]
 
 
-def requested_trajectory(request: TrajectoryRequest) -> Trajectory:
-    """Return the motion that a request asks of one engine."""
-    problem, times = request.problem.problem(), request.time_grid()
-    precision: dict[str, Any] = {"digits": request.digits, "certified": request.certified}
-    return solve(problem, times, request.engine, request.method, formulation=request.formulation, **precision)
+def requested_trajectory(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
+    """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that is made already."""
+    prepared = prepared or Prepared(request.problem.problem())
+    options: dict[str, Any] = {name: getattr(request, name) for name in ("digits", "certified", "formulation")}
+    return prepared.solve(request.time_grid(), request.engine, request.method, **options)
 
 
 def requested_comparison(request: ComparisonRequest) -> Comparison:
