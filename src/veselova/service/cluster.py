@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from veselova.mechanics.errors import BackendMissing, InvalidInput
-from veselova.service.settings import Settings
+from veselova.service.settings import MEGABYTE, Settings
 
 __all__ = ["open_cluster", "require_scheduler"]
 
@@ -102,7 +102,7 @@ def _machine(settings: Settings, processes: bool) -> dict[str, Any]:
         "n_workers": settings.sweep_workers if processes else 1,
         "threads_per_worker": 1,
         "processes": processes,
-        "memory_limit": settings.sweep_worker_memory_mb * 1_000_000 if processes else 0,
+        "memory_limit": settings.sweep_worker_memory_mb * MEGABYTE if processes else 0,
         "host": "127.0.0.1" if processes else None,
         # Dask serves pages of its own; they stay on this machine, at any free port.
         "scheduler_kwargs": {"dashboard": False, "dashboard_address": "127.0.0.1:0"},

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.schemas import ComparisonRequest, TrajectoryRequest
-from veselova.service.settings import Settings
+from veselova.service.settings import MEGABYTE, Settings
 
 __all__ = ["Cost", "cost", "require_hope"]
 
@@ -25,8 +25,6 @@ _SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 2.5e-5, 3e-3, 1.5
 
 #: Bytes for each time and n²: the frame, ω, and as much again while they are computed; a decimal is an object of its own.
 _BYTES, _BYTES_DECIMAL = 32, 400
-
-_MEGABYTE = 1 << 20
 
 
 class Cost(NamedTuple):
@@ -41,12 +39,12 @@ def cost(request: ComparisonRequest) -> Cost:
     n, points = request.problem.dimension, request.time_count()
     entries = float(points) * n * n
     if not isinstance(request, TrajectoryRequest):
-        return Cost(entries * sum(_SECONDS.values()), 2 * entries * _BYTES / _MEGABYTE)
+        return Cost(entries * sum(_SECONDS.values()), 2 * entries * _BYTES / MEGABYTE)
     if beyond_double(request.digits, request.certified):
         length = max(request.digits, FEWEST_DIGITS) / FEWEST_DIGITS
         seconds = entries * length * _SECONDS_EXACT + n * length**_SET_UP_POWER * _SET_UP_EXACT
-        return Cost(seconds, entries * (_BYTES_DECIMAL + request.digits) / _MEGABYTE)
-    return Cost(entries * _SECONDS[request.chosen_engine], entries * _BYTES / _MEGABYTE)
+        return Cost(seconds, entries * (_BYTES_DECIMAL + request.digits) / MEGABYTE)
+    return Cost(entries * _SECONDS[request.chosen_engine], entries * _BYTES / MEGABYTE)
 
 
 def require_hope(request: ComparisonRequest, settings: Settings) -> None:

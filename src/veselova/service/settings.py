@@ -11,7 +11,10 @@ from typing import Literal
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-__all__ = ["Settings"]
+__all__ = ["MEGABYTE", "Settings"]
+
+#: Bytes of what is stated in MB.
+MEGABYTE = 1_000_000
 
 
 def _state_folder() -> Path:
@@ -35,7 +38,9 @@ class Settings(BaseSettings):
     estimate_slack: float = Field(
         default=4.0, ge=0, description="refuse work whose estimated time is so many times its budget; 0 refuses none"
     )
-    worker_memory_mb: int = Field(default=2048, ge=256, description="memory of a worker, in MB; work that needs more is refused")
+    worker_memory_mb: int = Field(
+        default=2048, ge=256, description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused"
+    )
     max_body_bytes: int = Field(default=4_000_000, ge=1000, description="largest request body (200 000 times as a list)")
     max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
     max_text: int = Field(default=2100, ge=20, description="longest text in a request body (a number as a string)")
@@ -56,7 +61,7 @@ class Settings(BaseSettings):
     dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
     sweep_workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps")
     sweep_worker_memory_mb: int = Field(
-        default=1000, ge=200, description="memory of a worker for sweeps, in MB, before it is ended"
+        default=1000, ge=200, description="memory of a worker for sweeps, in MB of 10⁶ bytes, before it is ended"
     )
     max_running_jobs: int = Field(default=4, ge=1, description="jobs that share the workers; others wait")
     max_jobs: int = Field(default=100, ge=1, description="jobs that may wait or run before others are refused")

@@ -12,14 +12,12 @@ from anyio import BrokenWorkerProcess, CapacityLimiter, CapacityLimiterStatistic
 
 from veselova.service.metrics import Metrics
 from veselova.service.problem_details import Refused
-from veselova.service.settings import Settings
+from veselova.service.settings import MEGABYTE, Settings
 from veselova.service.tasks import warm_up
 
 __all__ = ["Workers"]
 
 T = TypeVar("T")
-
-_MEGABYTE = 1 << 20
 
 
 class Workers:
@@ -76,7 +74,7 @@ def _within_memory(megabytes: int, task: Callable[..., T], *arguments: Any) -> T
     # On Linux RLIMIT_DATA counts what a process writes to, and not the libraries that it maps, as RLIMIT_AS would.
     kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     hard = resource.getrlimit(kind)[1]
-    limit = megabytes * _MEGABYTE
+    limit = megabytes * MEGABYTE
     resource.setrlimit(kind, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
     try:
         return task(*arguments)
