@@ -1,11 +1,15 @@
 """Does the service answer while all its workers are busy, and does its memory stay as it is?
 
     python benchmarks/load.py [SECONDS [CONNECTIONS]]
+    python benchmarks/load.py requests [NUMBER]
 
 Starts a server with two workers. For SECONDS (60), CONNECTIONS (64) connections POST small motions, each of a body of its own,
 one after the other, while another asks for /healthz fifty times a second. Then four times as many connections as may wait are
 opened at once: those beyond get 503 and none is left without an answer. Printed: answers by status, requests per second,
 quantiles of both, and the memory of the server's process before, at half time and after.
+
+With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER (100 000) of them, each for a body
+of its own; printed is the memory of the server and of its worker after 10, 100, 1000 … requests.
 """
 
 from __future__ import annotations
@@ -118,14 +122,39 @@ async def measure(port: int, pid: int, seconds: float, connections: int, waiting
     print(f"{4 * waiting} at once where {waiting} may wait: {dict(await burst(port, 4 * waiting))}")
 
 
+async def count(port: int, pid: int, number: int) -> None:
+    """Print the memory of a server and its worker each time that ten times as many requests have been answered."""
+    answered, seen, began = 0, Counter[int](), time.perf_counter()
+
+    async def ask(draw: random.Random) -> None:
+        nonlocal answered
+        async with Connection(port) as connection:
+            while answered < number:
+                answered += 1
+                mark = answered
+                seen[(await connection.ask(motion(draw)))[0]] += 1
+                if mark >= 10 and str(mark).strip("0") == "1":
+                    worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+                    print(f"{mark} requests: server {megabytes(pid):.0f} MB, worker {megabytes(worker):.0f} MB", flush=True)
+
+    await asyncio.gather(*(ask(random.Random(seed)) for seed in range(2)))
+    print(f"{dict(seen)}, {number / (time.perf_counter() - began):.0f} per second")
+
+
 def main() -> None:
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
-    connections = int(sys.argv[2]) if len(sys.argv) > 2 else 64
+    counting = sys.argv[1:2] == ["requests"]
+    number = int(sys.argv[2]) if counting and len(sys.argv) > 2 else 100_000
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 and not counting else 60.0
+    connections = int(sys.argv[2]) if len(sys.argv) > 2 and not counting else 64
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
-        limits = {"VESELOVA_WORKERS": "2", "VESELOVA_MAX_WAITING": str(connections), "VESELOVA_DATA_DIR": folder}
+        limits = {
+            "VESELOVA_WORKERS": "1" if counting else "2",
+            "VESELOVA_MAX_WAITING": str(connections),
+            "VESELOVA_DATA_DIR": folder,
+        }
         command = [sys.executable, "-m", "veselova", "serve", "--port", str(port), "--log-level", "warning"]
         process = subprocess.Popen(command, env={**os.environ, **limits})
         try:
@@ -136,7 +165,9 @@ def main() -> None:
                 except httpx2.TransportError:
                     pass
                 time.sleep(0.05)
-            asyncio.run(measure(port, process.pid, seconds, connections, connections))
+            asyncio.run(
+                count(port, process.pid, number) if counting else measure(port, process.pid, seconds, connections, connections)
+            )
         finally:
             process.send_signal(signal.SIGTERM)
             process.wait(30)
