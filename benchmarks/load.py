@@ -8,8 +8,8 @@ one after the other, while another asks for /healthz fifty times a second. Then 
 opened at once: those beyond get 503 and none is left without an answer. Printed: answers by status, requests per second,
 quantiles of both, and the memory of the server's process before, at half time and after.
 
-With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER (100 000) of them, each for a body
-of its own; printed is the memory of the server and of its worker after 10, 100, 1000 … requests.
+With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER (100 000) of them, each for a
+body of its own; printed is the memory of the server and of its worker after 10, 100, 1000 … requests.
 """
 
 from __future__ import annotations

@@ -12,8 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -27,18 +25,17 @@ from pyarrow import parquet
 
 import veselova as vs
 from veselova.analytic.solution import Solution
-from veselova.mechanics.errors import InvalidInput, InvalidRequest, Unsolved
+from veselova.mechanics.errors import InvalidRequest, Unsolved
 from veselova.service import sweeps as running
 from veselova.service.cluster import open_cluster
-from veselova.service.database import connect, schema_differences
 from veselova.service.dispatch import answers
-from veselova.service.jobs import Job, Jobs
+from veselova.service.jobs import Jobs
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.problem_details import Refused
 from veselova.service.results import Result
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
-from veselova.service.summaries import Chunk, OtherVersion, computed_chunk, lost_chunk
+from veselova.service.summaries import OtherVersion, computed_chunk, lost_chunk
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
@@ -370,43 +367,6 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, mon
     assert (job.state, job.done) == ("finished", 15)
 
 
-def together(call: Callable[[int], Any], count: int) -> list[Any]:
-    """Return what a call gives in so many threads that begin at once."""
-    begin = threading.Barrier(count)
-
-    def one(i: int) -> Any:
-        begin.wait()
-        return call(i)
-
-    with ThreadPoolExecutor(count) as pool:
-        return list(pool.map(one, range(count)))
-
-
-def test_a_sweep_that_many_ask_for_at_once_is_one_job(tmp_path: Path) -> None:
-    jobs = Jobs(Settings(data_dir=tmp_path))
-    for seed in range(5):
-        sweep = request(seed=seed)
-        submitted = together(lambda _, sweep=sweep, key=f"key {seed}": jobs.submit(sweep, key), 8)
-        assert {job.id for job in submitted} == {sweep.id}
-    assert jobs.counts() == {"queued": 5}
-
-
-def test_the_first_chunks_of_a_job_may_be_stored_at_once(tmp_path: Path) -> None:
-    jobs = Jobs(Settings(data_dir=tmp_path))
-    for seed in range(5):
-        sweep = request(samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True)
-        job = jobs.submit(sweep)
-        result = Result(jobs, job)
-
-        def store(position: int, job: Job = job, result: Result = result) -> None:
-            start, stop = job.rows(position)
-            result.store(position, [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})])
-
-        together(store, job.chunk_count)
-        kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
-        assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
-
-
 @pytest.mark.parametrize("removed", [False, True])
 def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
@@ -515,28 +475,6 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
 
-def test_a_listing_reads_no_request(tmp_path: Path) -> None:
-    jobs, statements = Jobs(Settings(data_dir=tmp_path)), list[str]()
-    job = jobs.submit(request())
-    sa.event.listen(jobs._engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
-    assert [status.id for status in jobs.newest()] == [job.id]
-    assert jobs.status(job.id).total == 15
-    assert len(statements) == 2
-    assert not [text for text in statements if "request" in text]
-
-
-def test_only_an_ended_job_is_removed(tmp_path: Path) -> None:
-    jobs = Jobs(Settings(data_dir=tmp_path))
-    job = jobs.submit(request())
-    jobs.store(job.id, 0, 15, b"a table")
-    with pytest.raises(Refused, match="goes on"):
-        jobs.remove(job.id)
-    assert jobs.chunk_path(job.id, 0).exists()
-    jobs.advance(job.id, "cancelled")
-    jobs.remove(job.id)
-    assert not jobs.chunk_path(job.id, 0).exists()
-
-
 def test_a_value_that_is_a_text_may_come_in_a_later_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The table is the same as that of one chunk: the column has texts."""
     sweep = request(vary={"/A/0": [2, 2.5, "x"]}, samples=1)
@@ -591,22 +529,6 @@ def test_a_sweep_does_not_notice_that_the_clock_is_changed(tmp_path: Path, monke
     disturbed_job, disturbed = run_sweep(request(), local_settings(tmp_path / "two", 1), lambda done, total: None)
     assert disturbed_job.state == "finished"
     assert disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
-
-
-def test_limits_are_named_before_a_job_is_made(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
-        Jobs(Settings(data_dir=tmp_path, max_sweep_problems=10)).submit(request())
-    with pytest.raises(InvalidInput, match="bytes of results"):
-        Jobs(Settings(data_dir=tmp_path, max_sweep_bytes=1000)).submit(request())
-    jobs = Jobs(Settings(data_dir=tmp_path, max_jobs=1))
-    jobs.submit(request())
-    assert jobs.submit(request()).id == request().id
-    with pytest.raises(Exception, match="1 jobs are waiting"):
-        jobs.submit(request(seed=8))
-
-
-def test_migrations_make_the_tables_of_the_code(tmp_path: Path) -> None:
-    assert schema_differences(connect(Settings(data_dir=tmp_path))) == []
 
 
 def test_the_command_line_sweeps(tmp_path: Path) -> None:

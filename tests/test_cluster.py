@@ -1,0 +1,113 @@
+"""A Dask cluster behind TLS: scheduler, workers and server show certificates of one authority, and nobody else gets in."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trustme
+
+from conftest import free_port
+from veselova.mechanics.errors import InvalidInput
+from veselova.service.cluster import open_cluster
+from veselova.service.local_sweep import run_sweep
+from veselova.service.schemas import read_request
+from veselova.service.settings import Settings
+from veselova.service.sweep_request import SweepRequest
+
+BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+
+
+def certificates(folder: Path) -> dict[str, Path]:
+    """Return the settings of a cluster with an authority of its own."""
+    folder.mkdir()
+    authority = trustme.CA()
+    node = authority.issue_cert("localhost", "127.0.0.1")
+    files = {f"dask_{name}_file": folder / f"{name}.pem" for name in ("ca", "cert", "key")}
+    authority.cert_pem.write_to_path(str(files["dask_ca_file"]))
+    node.cert_chain_pems[0].write_to_path(str(files["dask_cert_file"]))
+    node.private_key_pem.write_to_path(str(files["dask_key_file"]))
+    return files
+
+
+@contextmanager
+def dask(*arguments: str) -> Iterator[None]:
+    process = subprocess.Popen([sys.executable, "-m", "dask", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+    """The settings with which a scheduler and two workers behind TLS are reached."""
+    folder = tmp_path_factory.mktemp("cluster")
+    files = certificates(folder / "tls")
+    options = ["--tls-ca-file", str(files["dask_ca_file"]), "--tls-cert", str(files["dask_cert_file"])]
+    options += ["--tls-key", str(files["dask_key_file"]), "--no-dashboard"]
+    port = str(free_port())
+    address = f"tls://127.0.0.1:{port}"
+    worker = ["worker", address, "--nthreads", "1", "--host", "127.0.0.1", "--local-directory", str(folder), *options]
+    with ExitStack() as stack:
+        stack.enter_context(dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options))
+        for _ in range(2):
+            stack.enter_context(dask(*worker))
+        yield {"dask_scheduler": address, **files}
+
+
+def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
+    cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
+    vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
+    sweep = read_request(SweepRequest, {"problem": BASE, "vary": vary, "samples": 10, "times": [0, 1]})
+    job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
+    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None)
+    assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
+
+
+def test_every_connection_of_the_cluster_is_encrypted(cluster: dict[str, Any], tmp_path: Path) -> None:
+    async def addresses() -> list[str]:
+        async with open_cluster(Settings(data_dir=tmp_path, **cluster)) as client:
+            await client.wait_for_workers(2, timeout=60)
+            found = client.scheduler_info(n_workers=-1)
+            return [found["address"], *found["workers"]]
+
+    found = asyncio.run(addresses())
+    assert len(found) == 3
+    assert all(address.startswith("tls://") for address in found)
+
+
+def test_who_has_no_certificate_of_the_authority_is_not_let_in(
+    cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.cluster._CONNECT_S", 3)
+    stranger = {**cluster, **certificates(tmp_path / "another")}
+    plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
+
+    async def connect(settings: dict[str, Any]) -> None:
+        async with open_cluster(Settings(data_dir=tmp_path, **settings)):
+            pass
+
+    asyncio.run(connect(cluster))
+    with pytest.raises(OSError, match="TLS certificate does not match"):
+        asyncio.run(connect(stranger))
+    with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
+        asyncio.run(connect(plain))
+
+
+def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Path) -> None:
+    async def connect() -> None:
+        async with open_cluster(Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")):
+            pass
+
+    with pytest.raises(InvalidInput, match="required tls://, for whoever reaches a Dask cluster can run code on it"):
+        asyncio.run(connect())

@@ -1,0 +1,170 @@
+"""The store of jobs and keys, on SQLite and on PostgreSQL alike."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+import zarr
+from pydantic import SecretStr
+
+from postgresql import new_database, postgresql_server
+from test_sweeps import request as sweep_request
+from veselova.mechanics.errors import InvalidInput
+from veselova.service.database import connect, schema_differences
+from veselova.service.jobs import Job, JobEnded, Jobs
+from veselova.service.keys import open_keys
+from veselova.service.local_sweep import run_sweep
+from veselova.service.problem_details import Refused
+from veselova.service.results import Result
+from veselova.service.settings import Settings
+from veselova.service.summaries import Chunk
+
+
+@pytest.fixture(scope="module")
+def postgresql() -> Iterator[str]:
+    with postgresql_server() as address:
+        yield address
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
+    """Settings with a folder and a database of their own."""
+    if request.param == "sqlite":
+        return Settings(data_dir=tmp_path)
+    address = new_database(request.getfixturevalue("postgresql"), uuid.uuid4().hex)
+    return Settings(data_dir=tmp_path, database_url=SecretStr(address))
+
+
+@pytest.fixture
+def opened() -> Iterator[Callable[[Settings], Jobs]]:
+    """Opens stores, and closes them at the end of the test."""
+    with ExitStack() as stack:
+        yield lambda settings: stack.enter_context(closing(Jobs(settings)))
+
+
+def together(call: Callable[[int], Any], count: int) -> list[Any]:
+    """Return what a call gives in so many threads that begin at once."""
+    begin = threading.Barrier(count)
+
+    def one(i: int) -> Any:
+        begin.wait()
+        return call(i)
+
+    with ThreadPoolExecutor(count) as pool:
+        return list(pool.map(one, range(count)))
+
+
+def test_a_sweep_that_many_ask_for_at_once_is_one_job(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    jobs = opened(store)
+    for seed in range(5):
+        sweep = sweep_request(seed=seed)
+        submitted = together(lambda _, sweep=sweep, key=f"key {seed}": jobs.submit(sweep, key), 8)
+        assert {job.id for job in submitted} == {sweep.id}
+    assert jobs.counts() == {"queued": 5}
+
+
+def test_the_first_chunks_of_a_job_may_be_stored_at_once(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    jobs = opened(store)
+    for seed in range(5):
+        sweep = sweep_request(samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True)
+        job = jobs.submit(sweep)
+        result = Result(jobs, job)
+
+        def store(position: int, job: Job = job, result: Result = result) -> None:
+            start, stop = job.rows(position)
+            result.store(position, [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})])
+
+        together(store, job.chunk_count)
+        kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
+        assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
+
+
+def test_a_listing_reads_no_request(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    jobs, statements = opened(store), list[str]()
+    job = jobs.submit(sweep_request())
+    sa.event.listen(jobs._engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
+    assert [status.id for status in jobs.newest()] == [job.id]
+    assert jobs.status(job.id).total == 15
+    assert len(statements) == 2
+    assert not [text for text in statements if "request" in text]
+
+
+def test_only_an_ended_job_is_removed(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    jobs = opened(store)
+    job = jobs.submit(sweep_request())
+    jobs.store(job.id, 0, 15, b"a table")
+    with pytest.raises(Refused, match="goes on"):
+        jobs.remove(job.id)
+    assert jobs.chunk_path(job.id, 0).exists()
+    jobs.advance(job.id, "cancelled")
+    jobs.remove(job.id)
+    assert not jobs.chunk_path(job.id, 0).exists()
+
+
+def test_limits_are_named_before_a_job_is_made(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
+        opened(store.model_copy(update={"max_sweep_problems": 10})).submit(sweep_request())
+    with pytest.raises(InvalidInput, match="bytes of results"):
+        opened(store.model_copy(update={"max_sweep_bytes": 1000})).submit(sweep_request())
+    jobs = opened(store.model_copy(update={"max_jobs": 1}))
+    jobs.submit(sweep_request())
+    assert jobs.submit(sweep_request()).id == sweep_request().id
+    with pytest.raises(Exception, match="1 jobs are waiting"):
+        jobs.submit(sweep_request(seed=8))
+
+
+def test_a_sweep_runs_on_either_database_to_the_same_result(store: Settings, tmp_path: Path) -> None:
+    sweep = sweep_request(samples=3, times=[0, 1], outputs=["q"])
+    job, jobs = run_sweep(sweep, store, lambda done, total: None)
+    assert (job.state, job.done, job.total) == ("finished", 9, 9)
+    _, other = run_sweep(sweep, Settings(data_dir=tmp_path / "other"), lambda done, total: None)
+    assert jobs.result_path(job.id).read_bytes() == other.result_path(job.id).read_bytes()
+
+
+def test_servers_that_start_together_make_the_tables_of_the_code_once(store: Settings) -> None:
+    for engine in together(lambda _: connect(store), 4):
+        assert schema_differences(engine) == []
+        engine.dispose()
+
+
+def test_a_job_goes_through_its_states_and_keeps_its_dates(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+    jobs = opened(store)
+    job = jobs.submit(sweep_request(), "a key")
+    assert (job.state, job.done, job.finished_at) == ("queued", 0, None)
+    assert job.created_at.utcoffset() is not None
+    assert jobs.unfinished() == [job.id]
+    assert jobs.advance(job.id, "running")
+    jobs.store(job.id, 0, 15, b"a table")
+    jobs.store(job.id, 0, 15, b"the same once more")
+    assert (jobs.status(job.id).state, jobs.status(job.id).done) == ("running", 15)
+    assert jobs.missing(jobs.get(job.id)) == []
+    assert jobs.advance(job.id, "finished")
+    assert not jobs.advance(job.id, "running")
+    assert jobs.get(job.id).finished_at >= job.created_at
+    with pytest.raises(JobEnded, match="finished"):
+        jobs.store(job.id, 0, 15, b"too late")
+    with pytest.raises(InvalidInput, match="a key of its own for every request"):
+        jobs.submit(sweep_request(seed=8), "a key")
+    jobs.remove(job.id)
+    assert jobs.newest() == []
+    jobs.submit(sweep_request(seed=8), "a key")  # which went with its job
+
+
+def test_a_key_is_known_until_it_is_revoked(store: Settings) -> None:
+    keys = open_keys(store)
+    key, text = keys.create("Sophie")
+    assert keys.holder(text) == key
+    assert keys.holder(text[:-1] + ("a" if text[-1] != "a" else "b")) is None
+    assert keys.revoke(key.id).revoked_at >= key.created_at
+    assert keys.holder(text) is None
+    assert [known.id for known in keys.list()] == [key.id]
+    keys.close()
