@@ -9,7 +9,7 @@ opened at once: those beyond get 503 and none is left without an answer. Printed
 quantiles of both, and the memory of the server's process before, at half time and after.
 
 With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER (100 000) of them, each for a
-body of its own; printed is the memory of the server and of its worker after 10, 100, 1000 … requests.
+body of its own, one of four solved in closed form; printed is the memory of both processes after 10, 100, 1000 … requests.
 """
 
 from __future__ import annotations
@@ -54,10 +54,11 @@ class Connection:
         return int(lines[0].split()[1]), time.perf_counter() - began
 
 
-def motion(draw: random.Random) -> bytes:
+def motion(draw: random.Random, engine: str = "analytic") -> bytes:
     """Return a request for a small motion of a body of its own."""
     problem = {"system": "veselova", "A": [3, 2, 1 + draw.random()], "q": [1, 1, 1], "q_dot": [draw.random(), 0.2, -0.5]}
-    body = json.dumps({"problem": {**problem, "normalize": True}, "times": [0, 1, 2], "budget_s": 30}).encode()
+    times = [0, 1, 2] if engine == "analytic" else [0, 0.1]
+    body = json.dumps({"problem": {**problem, "normalize": True}, "times": times, "engine": engine, "budget_s": 30}).encode()
     return (
         b"POST /v1/trajectories HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body)
         + body
@@ -132,7 +133,8 @@ async def count(port: int, pid: int, number: int) -> None:
             while answered < number:
                 answered += 1
                 mark = answered
-                seen[(await connection.ask(motion(draw)))[0]] += 1
+                engine = "analytic" if mark % 4 == 0 else "numeric"
+                seen[(await connection.ask(motion(draw, engine)))[0]] += 1
                 if mark >= 10 and str(mark).strip("0") == "1":
                     worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
                     print(f"{mark} requests: server {megabytes(pid):.0f} MB, worker {megabytes(worker):.0f} MB", flush=True)
