@@ -28,7 +28,9 @@ from typing import Any
 
 import httpx2
 
+from veselova.service.delivery import Wanted, solved
 from veselova.service.examples import BODY4_PROBLEM
+from veselova.service.tasks import warm_up
 
 BODY3_PROBLEM = {"system": "veselova", "A": [3, 2, 1], "q": [1, 1, 1], "q_dot": [0.3, -0.7, 0.4], "normalize": True}
 
@@ -70,8 +72,19 @@ def measure(connection: HTTPConnection, base: dict[str, Any], count: int, output
         whole.append(seconds)
         beyond.append(seconds - json.loads(content)["provenance"]["seconds"])
         size = len(content)
+    here = [without_http(json.loads(body)) for body in bodies(base, count, outputs, requests)]
     print(f"{outputs[0]} at {count} times, n = {len(base['A'])}, {size / 1e3:.0f} kB: whole request {quantiles(whole)},")
-    print(f"  beyond the solve {quantiles(beyond)}")
+    print(f"  beyond the solve {quantiles(beyond)},")
+    print(f"  of which without any server {quantiles(here)}")
+
+
+def without_http(request: dict[str, Any]) -> float:
+    """Return the seconds beyond the solve of the same answer in this process: the problem, the integrals, the text."""
+    began = time.perf_counter()
+    delivery = solved(request, Wanted("json", "identity"), None)
+    seconds = time.perf_counter() - began
+    assert delivery.body is not None
+    return seconds - json.loads(delivery.body)["provenance"]["seconds"]
 
 
 def main() -> None:
@@ -97,6 +110,7 @@ def main() -> None:
             total = server_size + worker_size
             print(f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {total:.0f} MB")
 
+            warm_up()
             connection = HTTPConnection("127.0.0.1", port)
             connection.connect()
             connection.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
