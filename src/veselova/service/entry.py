@@ -11,18 +11,21 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.mechanics.archive import archived_series, read_archive
 from veselova.mechanics.errors import VeselovaError
 from veselova.mechanics.table import row_blocks
-from veselova.mechanics.trajectory import Trajectory
+from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.service.documents import stored_outputs
 from veselova.service.schemas import TrajectoryRequest
 
 __all__ = ["DamagedEntry", "Entry", "read_entry"]
+
+Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 
 #: The checksum at the end of a file.
 _CHECKSUM = struct.Struct("<I")
@@ -43,10 +46,12 @@ class Entry:
     def write(self, request: Mapping[str, Any], trajectory: Trajectory) -> int:
         """Keep a trajectory, whole or not at all, and return its bytes, 0 for one that is too large; raises OSError.
 
-        The file is a line of JSON (request, provenance, names and shapes of the arrays), the arrays, and a checksum of both:
-        NumPy's own archive has a header for each array, which take longer to write than small arrays to compute.
+        The file is a line of JSON (request, provenance, names and shapes of the arrays), the arrays, and a checksum of both.
+        NumPy's own archive has a header and a checksum for each array, which take four times as long to write for small ones.
         """
-        part = Path(self.part)
+        part, arrays = Path(self.part), _arrays(trajectory)
+        if sum(array.nbytes for array in arrays.values()) > self.most:
+            return 0
         try:
             try:
                 stream = part.open("wb")
@@ -54,7 +59,7 @@ class Entry:
                 part.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 stream = part.open("wb")
             with stream:
-                _write(stream, request, trajectory)
+                _write(stream, request, trajectory.provenance, arrays)
                 size = stream.tell()
             if size <= self.most:
                 part.replace(self.path)
@@ -67,13 +72,16 @@ class Entry:
         return 0
 
 
-def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory) -> None:
+def _arrays(trajectory: Trajectory) -> Arrays:
     problem = trajectory.problem
     outputs = tuple(problem.outputs) if trajectory.decimals is not None else stored_outputs(problem)
-    arrays = dict(archived_series(trajectory, outputs))
+    return dict(archived_series(trajectory, outputs))
+
+
+def _write(stream: BinaryIO, request: Mapping[str, Any], provenance: Provenance, arrays: Arrays) -> None:
     header = {
         "request": {**request, "times": [0.0]},  # the times are among the arrays
-        "provenance": trajectory.provenance.as_dict(),
+        "provenance": provenance.as_dict(),
         "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
     }
     line = json.dumps(header).encode() + b"\n"
