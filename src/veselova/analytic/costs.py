@@ -33,9 +33,9 @@ _HIGH_BODY = 0.29
 #: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
 _MODE_INVERTED, _INVERSION = 0.13e-6, 1e-6
-_PANEL_CYCLE = {1: 6e-5, 2: 5e-4}
-_EVALUATION = {1: 1e-6, 2: 4e-6}
-_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 1.2e-3, 16e-6
+_PANEL_CYCLE = {1: 2e-5, 2: 5e-5, 3: 1.5e-4, 4: 4.5e-4}
+_EVALUATION = {1: 1e-6, 2: 2e-6, 3: 5e-6, 4: 12e-6}
+_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 1.5e-3, 25e-6
 
 #: An inversion on panels, and the cycles that these reach beyond the times.
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 2.0

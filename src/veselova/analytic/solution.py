@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,9 @@ Array = NDArray[np.float64]
 #: The two routes from phases to attitude.
 METHODS = ("theta", "angles")
 
-#: Largest genus at which theta quotients cost no more than inversion in angles (g = 3: 15 µs a point both; g = 4: 80 against 15).
-_THETA_GENUS = 3
+#: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.7, 3.6, 9 and 55
+#: against 6, 7, 14 and 25).
+_THETA_GENUS = 4
 
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
@@ -113,9 +114,9 @@ class Solution:
         """Return dt/dτ₁ on the torus, in double precision."""
         return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
-    def rate_at(self, z: Array) -> Array:
-        """Return dt/dτ₁ at phases z (N, g): in angles, or near a separatrix, where they are ill-conditioned, from q by theta."""
-        if not self.near_separatrix:
+    def rate_at(self, z: Array, method: str | None = None) -> Array:
+        """Return dt/dτ₁ at phases z (N, g): in angles, or from q by theta; near a separatrix, where angles say little, always."""
+        if (method or self.default_method()) == "angles" and not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return np.asarray(1 / self._rate_of_position(self.quotients.position(z)))
 
@@ -161,8 +162,11 @@ class Solution:
 
         return guarded_flows(self.spectrum, self._origin, self.problem.time)
 
-    def clock(self, times: Array, name: str | None = None) -> Clock:
-        """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given."""
+    def clock(self, times: Array, name: str | None = None, method: str | None = None) -> Clock:
+        """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given.
+
+        Panels take dt/dτ₁ along the orbit by ``method``, the route to the attitude.
+        """
         cycles, guarded = self.cycles(times), self.is_guarded(times)
         if not cycles <= _MOST_CYCLES:
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to 30 digits")
@@ -176,7 +180,8 @@ class Solution:
             limit = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {limit}")
         earliest, latest = self.windows(times, "panels").span
-        return PanelClock(self.rate_at, self.mean_rate, self._guarded[0] if guarded else self.in_tau1, earliest, latest)
+        in_tau1, rate = self._guarded[0] if guarded else self.in_tau1, partial(self.rate_at, method=method)
+        return PanelClock(rate, self.mean_rate, in_tau1, earliest, latest)
 
     def _fourier(self, guarded: bool) -> FourierClock:
         if guarded not in self._fourier_clocks:

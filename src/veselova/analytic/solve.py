@@ -113,10 +113,10 @@ class _TorusMotion(Motion[TorusProblem]):
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         solution, route = self._solution, self.method or self._solution.default_method()
-        clock = solution.clock(grid, self.clock)
+        clock = solution.clock(grid, self.clock, route)
         along, error = _along(solution, clock, grid, route)
         for neighbour in self._neighbours:
-            other = _along(neighbour, neighbour.clock(grid, self.clock), grid, route)[0]
+            other = _along(neighbour, neighbour.clock(grid, self.clock, route), grid, route)[0]
             error = np.maximum(error, np.max(np.abs(other.series[1] - along.series[1]), axis=(1, 2)))
         lost = np.flatnonzero(~(error <= _NO_DIGIT))
         if lost.size:
