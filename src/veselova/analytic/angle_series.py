@@ -13,7 +13,10 @@ __all__ = ["AngleSeries"]
 
 
 class AngleSeries(ABC):
-    """The period data of g cuts, on each of which the forms du_1 … du_g are cosine series in its angle ψ_s."""
+    """The period data of g cuts, on each of which the forms du_1 … du_g are cosine series in its angle ψ_s.
+
+    Where they are those of many curves, every array has a first axis for these.
+    """
 
     @property
     @abstractmethod
@@ -43,7 +46,7 @@ class AngleSeries(ABC):
     @cached_property
     def cycles(self) -> Values:
         """Return a, shape (g, g)."""
-        return np.stack([2 * self.arithmetic.pi * series[:, 0] for series in self.cut_series], axis=1)
+        return np.stack([2 * self.arithmetic.pi * series[..., 0] for series in self.cut_series], axis=-1)
 
     @cached_property
     def inverse_cycles(self) -> Values:
@@ -53,17 +56,17 @@ class AngleSeries(ABC):
     @cached_property
     def frequencies(self) -> Values:
         """Return f = a⁻¹e_g, cycles per unit of τ: z(τ) = z⁰ + fτ."""
-        return self.inverse_cycles[:, self.genus - 1]
+        return self.inverse_cycles[..., self.genus - 1]
 
     @property
     def longest(self) -> int:
         """Return the number of coefficients of the longest series."""
-        return max(int(series.shape[1]) for series in self.cut_series)
+        return max(int(series.shape[-1]) for series in self.cut_series)
 
     @cached_property
     def angle_series(self) -> Values:
         """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the longest cut."""
-        padded = np.zeros((self.genus, self.genus, self.longest), dtype=self.cycles.dtype)
+        padded = np.zeros((*self.cycles.shape, self.longest), dtype=self.cycles.dtype)
         for s, series in enumerate(self.cut_series):
-            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
+            padded[..., s, : series.shape[-1]] = self.inverse_cycles @ series
         return padded

@@ -24,7 +24,7 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["Clock", "ClockRate", "Rate", "clock_rate"]
+__all__ = ["Clock", "ClockRate", "Rate", "clock_rate", "rate_factor"]
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,8 @@ class Rate(ABC, Generic[P]):
         """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
         psi = periods.arithmetic.nodes(periods.longest)
-        means = [np.sum(self._weights(s, psi), axis=1) for s in range(periods.genus)]
-        return self.scale * periods.arithmetic.determinant(np.stack(means, axis=1))
+        means = [np.sum(self._weights(s, psi), axis=-1) for s in range(periods.genus)]
+        return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class ClockRate(Rate[Periods]):
         curve, fine = inversion.periods.curve, spectrum.arithmetic
         product = fine.number(1)
         for s, point in enumerate(spectrum.spheroconic):
-            product = product * _factor(curve, s, point, time, fine)
+            product = product * rate_factor(curve, s, point, time, fine)
         return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * product)), time)
 
     def at(self, psi: Values) -> Values:
@@ -101,21 +101,25 @@ class ClockRate(Rate[Periods]):
 
     def _factor(self, s: int, below: Values) -> Values:
         curve = self.inversion.periods.curve
-        point = curve.branch_points[2 * s + 1] + below
-        return np.asarray(_factor(curve, s, point, self.time, curve.arithmetic))
+        point = curve.point(2 * s + 1) + below
+        return np.asarray(rate_factor(curve, s, point, self.time, curve.arithmetic))
 
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         periods = self.inversion.periods
         below, above = periods.cuts[s].distances(psi)
         sign = (-1) ** (periods.genus - s - 1)
-        return np.asarray(sign * periods.cuts[s].forms(below, above) * self._factor(s, below))
+        return np.asarray(sign * periods.cuts[s].forms(below, above) * self._factor(s, below)[..., None, :])
 
 
-def _factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
+def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
     """Return φ(λ_s) for the cut s = 0…g−1."""
     if time == "t":
-        return arithmetic.sqrt(point / arithmetic.number(curve.branch_points[2 * s + 2]))
-    return arithmetic.number(curve.branch_points[2 * s + 1]) / point if time == "s" else 1 + 0 * point
+        return arithmetic.sqrt(point / _number(curve.point(2 * s + 2), arithmetic))
+    return _number(curve.point(2 * s + 1), arithmetic) / point if time == "s" else 1 + 0 * point
+
+
+def _number(value: Any, arithmetic: Arithmetic) -> Any:
+    return value if isinstance(value, np.ndarray) else arithmetic.number(value)
 
 
 def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:

@@ -47,6 +47,7 @@ class Curve:
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
     differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c.
+    In doubles it may be N curves whose branch points come from the same in the same order, along a first axis of both arrays.
     """
 
     arithmetic: Arithmetic
@@ -89,6 +90,14 @@ class Curve:
         beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
         return Layout(places, own_cut, cuts == own_cut, mate, beyond, np.where(places <= 2 * cuts + 1, 1, -1))
 
+    def width(self, j: int) -> Any:
+        """Return b_{j+1} − b_j; of many curves with an axis for angles, (N, 1)."""
+        return self.differences[j, j + 1] if self.branch_points.ndim == 1 else self.differences[:, j, j + 1, None]
+
+    def point(self, j: int) -> Any:
+        """Return b_j in the same way."""
+        return self.branch_points[j] if self.branch_points.ndim == 1 else self.branch_points[:, j, None]
+
     def cut_of(self, j: Any) -> Any:
         """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for b_0, which ends none."""
         return (j + 1) // 2
@@ -97,7 +106,7 @@ class Curve:
     def midpoints(self) -> Values:
         """Return ζ_l − b_j, shape (2g+1, g−1), with ζ_l the midpoint of gap l = 1…g−1: the zeros of the nodal differentials."""
         even = np.arange(2, 2 * self.genus, 2)
-        return (self.differences[:, even] + self.differences[:, even + 1]) / 2
+        return (self.differences[..., even] + self.differences[..., even + 1]) / 2
 
     @cached_property
     def narrowest_gap(self) -> float:

@@ -1,11 +1,13 @@
 """Jacobi's elliptic functions on a quarter period, each value accurate relative to itself for every modulus.
 
 The modulus is given by both k² and k'² = 1−k², which come as products of differences of branch points: for a closing gap k'²
-is tiny and 1−k² would be noise. Angles are ψ = πv/K, so a function of period 2K in v has period 2π in ψ.
+is tiny and 1−k² would be noise. Angles are ψ = πv/K, so a function of period 2K in v has period 2π in ψ. In doubles k² and k'²
+may be arrays (N, 1), none of them zero: the functions then have the shape (N, number of angles), no row depending on the others.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -28,19 +30,23 @@ class Jacobi:
     @cached_property
     def quarter(self) -> Any:
         """Return K, the real quarter period; it grows like log(4/k')."""
-        xp = self.arithmetic
-        return xp.pi / 2 / xp.agm(xp.number(1), xp.sqrt(self.complement))
+        return self.arithmetic.quarter_period(self.complement)
 
     @cached_property
     def conjugate_quarter(self) -> Any:
         """Return K', the quarter period of the complementary modulus; infinite (raises) for a closed cut, k = 0."""
-        xp = self.arithmetic
-        return xp.pi / 2 / xp.agm(xp.number(1), xp.sqrt(self.k_squared))
+        return self.arithmetic.quarter_period(self.k_squared)
 
     @cached_property
-    def aspect(self) -> float:
+    def aspect(self) -> Any:
         """Return K'/K, which sets how fast trigonometric sums in ψ converge; infinite for k = 0."""
+        if self._stacked:
+            return self.conjugate_quarter / self.quarter
         return float(self.conjugate_quarter / self.quarter) if self.k_squared > 0 else float("inf")
+
+    @property
+    def _stacked(self) -> bool:
+        return isinstance(self.k_squared, np.ndarray)
 
     def __call__(self, psi: Values) -> tuple[Values, Values, Values]:
         """Return sn, cn, dn at v = Kψ/π for any real ψ; sn and cn have period 4π in ψ, and their signs say where."""
@@ -58,17 +64,24 @@ class Jacobi:
 
     def _first_half(self, psi: Values) -> tuple[Values, Values, Values]:
         """Return sn, cn, dn for 0 ≤ ψ ≤ π/2 (v ≤ K/2) by theta series in whichever nome is at most e^(−π)."""
+        if self._stacked:
+            pairs = zip(self._trigonometric(psi), self._hyperbolic(psi), strict=True)
+            s, c, d = (np.where(self.aspect >= 1, *pair) for pair in pairs)
+            return s, c, d
         return self._trigonometric(psi) if self.aspect >= 1 else self._hyperbolic(psi)
 
     @cached_property
     def _log_nome(self) -> Any:
+        if self._stacked:
+            return -self.arithmetic.pi * np.maximum(self.aspect, 1 / self.aspect)
         ratio = self.conjugate_quarter / self.quarter
         return -self.arithmetic.pi * (ratio if self.aspect >= 1 else 1 / ratio)
 
     @cached_property
     def _terms(self) -> int:
         """Number of terms m ≥ 1 with nome^(m²−m) above the precision; the exponent is what is left after growth to v = K/2."""
-        return int(np.ceil(0.5 + np.sqrt(0.25 + self.arithmetic.nats / -float(self._log_nome))))
+        decay = math.pi if self._stacked else -float(self._log_nome)
+        return int(np.ceil(0.5 + np.sqrt(0.25 + self.arithmetic.nats / decay)))
 
     def _constants(self) -> tuple[Any, Any, Any]:
         """Return θ_2/q^{1/4}, θ_3, θ_4 at zero."""
@@ -94,7 +107,7 @@ class Jacobi:
         xp = self.arithmetic
         z = psi / 2
         sine, cosine = xp.sin(z), xp.cos(z)
-        if self.k_squared == 0:
+        if not self._stacked and self.k_squared == 0:
             return sine, cosine, 0 * psi + 1
         t2, t3, t4 = self._constants()
         z1, z2, z3, z4 = 2 * sine, 2 * cosine, 0 * psi + 1, 0 * psi + 1

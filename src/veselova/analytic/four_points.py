@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from veselova.analytic.elliptic import Jacobi
 from veselova.analytic.precision import Arithmetic, Values
 
@@ -21,7 +23,10 @@ __all__ = ["FourPoints"]
 
 @dataclass(frozen=True)
 class FourPoints:
-    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for both."""
+    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for both.
+
+    In doubles they may be arrays (N, 1), for N intervals at once.
+    """
 
     arithmetic: Arithmetic
     before: Any
@@ -66,14 +71,28 @@ class FourPoints:
 
     def angle(self, below: Any, above: Any, increasing: bool) -> Any:
         """Return ψ in (−π, π] of such a point, on the way back negative: v = F(am v, k) = sn·R_F(cn², dn², 1)."""
-        xp, jacobi = self.arithmetic, self.jacobi
-        sn_squared, cn_squared = self.squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
-        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
+        xp = self.arithmetic
+        squares = self.squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
         # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
-        if sn_squared <= cn_squared:
-            v = xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
-        else:  # sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn
-            reflected = jacobi.complement / dn_squared
-            v = jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))
-        psi = xp.pi * v / jacobi.quarter
+        v = self._from_left(*squares) if squares[0] <= squares[1] else self._from_right(*squares)
+        psi = xp.pi * v / self.jacobi.quarter
         return psi if increasing else -psi
+
+    def angles(self, below: Values, above: Values, increasing: Values) -> Values:
+        """Return the same for one point on each of many intervals, shape (N, 1)."""
+        squares = self.squares(np.maximum(below, 0), np.maximum(above, 0))
+        v = np.where(squares[0] <= squares[1], self._from_left(*squares), self._from_right(*squares))
+        psi = np.pi * v / self.jacobi.quarter
+        return np.asarray(np.where(increasing, psi, -psi))
+
+    def _from_left(self, sn_squared: Any, cn_squared: Any) -> Any:
+        xp, jacobi = self.arithmetic, self.jacobi
+        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
+        return xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
+
+    def _from_right(self, sn_squared: Any, cn_squared: Any) -> Any:
+        """sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn."""
+        xp, jacobi = self.arithmetic, self.jacobi
+        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
+        reflected = jacobi.complement / dn_squared
+        return jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(reflected * sn_squared, reflected, xp.number(1))

@@ -31,9 +31,9 @@ class Interval:
     @cached_property
     def points(self) -> FourPoints:
         """Return the interval with its neighbours b_0 and b_3."""
-        d, j, last = self.curve.differences, self.left, 2 * self.curve.genus
-        before, after = d[j - 1, j] if j > 0 else None, d[j + 1, j + 2] if j + 2 <= last else None
-        return FourPoints(self.curve.arithmetic, before, d[j, j + 1], after)
+        width, j, last = self.curve.width, self.left, 2 * self.curve.genus
+        before, after = width(j - 1) if j > 0 else None, width(j + 1) if j + 2 <= last else None
+        return FourPoints(self.curve.arithmetic, before, width(j), after)
 
     @property
     def jacobi(self) -> Jacobi:
@@ -52,18 +52,20 @@ class Interval:
     def to_branch_points(self, below: Values, above: Values) -> Values:
         """Return |λ−b_i| for all i, shape (..., 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
         d, j = self.curve.differences, self.left
-        return np.concatenate([d[: j + 1, j] + below[..., None], above[..., None] + d[j + 1, j + 1 :]], axis=-1)
+        return np.concatenate(
+            [d[..., None, : j + 1, j] + below[..., None], above[..., None] + d[..., None, j + 1, j + 1 :]], axis=-1
+        )
 
     def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
-        """Return (m, r) with dλ/(2√|R|) = m/Π_l r_l dψ: m (N,), and r_l, l = 1…g−1, (N, g−1), the root of the ends of gap l."""
+        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (..., N), and r_l, l = 1…g−1, (..., N, g−1), gap l's root."""
         xp, g, j = self.curve.arithmetic, self.curve.genus, self.left
         roots = xp.sqrt(self.to_branch_points(below, above))
         nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
-        roots[:, nearest] = xp.number(1)  # the four nearest went into the substitution
-        return self.points.density / np.prod(roots[:, [0, 1, 2 * g]], axis=1), roots[:, 2:-1:2] * roots[:, 3::2]
+        roots[..., nearest] = xp.number(1)  # the four nearest went into the substitution
+        return self.points.density / np.prod(roots[..., [0, 1, 2 * g]], axis=-1), roots[..., 2:-1:2] * roots[..., 3::2]
 
     @cached_property
-    def strip(self) -> float:
+    def strip(self) -> Any:
         """Return πK'/2K, half the width of the strip about the real ψ-axis in which the forms are analytic."""
         return math.pi * self.jacobi.aspect / 2
 
@@ -91,13 +93,14 @@ class Interval:
         return np.array([common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)], dtype=object)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
-        """Return λ−ζ_l, l = 1…g−1, shape (N, g−1), with ζ_l the midpoint of gap l."""
+        """Return λ−ζ_l, l = 1…g−1, shape (..., N, g−1), with ζ_l the midpoint of gap l."""
         zeros, j = self.curve.midpoints, self.left
         split = j // 2
-        return np.concatenate([below[:, None] - zeros[j, :split], -(above[:, None] + zeros[j + 1, split:])], axis=1)
+        left, right = zeros[..., None, j, :split], zeros[..., None, j + 1, split:]
+        return np.concatenate([below[..., None] - left, -(above[..., None] + right)], axis=-1)
 
     def forms(self, below: Values, above: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N): holomorphic forms p_k dλ/(2√|R|).
+        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (..., g, N): holomorphic forms p_k dλ/(2√|R|).
 
         p_g = Π(λ−ζ_l) over the midpoints ζ_l of all inner gaps, and p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l is divided by
         the root of its own gap's ends, so every factor is of order one at any genus.
@@ -105,8 +108,9 @@ class Interval:
         common, of_gaps = self.measure(below, above)
         numerators = self.to_midpoints(below, above)
         factors = numerators / of_gaps
-        one = np.ones_like(below)[:, None]
-        lower = np.cumprod(np.concatenate([one, factors], axis=1), axis=1)
-        upper = np.cumprod(np.concatenate([one, factors[:, ::-1]], axis=1), axis=1)[:, ::-1]
-        omitted = lower[:, :-1] * upper[:, 1:] / of_gaps
-        return np.asarray((common[:, None] * np.concatenate([omitted, lower[:, -1:]], axis=1)).T)
+        one = np.ones_like(below)[..., None]
+        lower = np.cumprod(np.concatenate([one, factors], axis=-1), axis=-1)
+        upper = np.cumprod(np.concatenate([one, factors[..., ::-1]], axis=-1), axis=-1)[..., ::-1]
+        omitted = lower[..., :-1] * upper[..., 1:] / of_gaps
+        forms = common[..., None] * np.concatenate([omitted, lower[..., -1:]], axis=-1)
+        return np.asarray(np.swapaxes(forms, -1, -2))

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.precision import Values
+from veselova.analytic.twofold import exact_product
 
 __all__ = ["LinearFlow"]
 
 Array = NDArray[np.float64]
-
-#: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
-_SPLITTER = 134217729.0
 
 
 @dataclass(frozen=True)
@@ -40,22 +38,9 @@ class LinearFlow:
 
         x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
         """
-        product, error = _exact_product(x[:, None], self.rates)
+        product, error = exact_product(x[:, None], self.rates)
         return np.asarray(np.fmod(product, 2.0) + (error + x[:, None] * self.rests))
 
     def phases(self, x: Array) -> Array:
         """Return z(x), reduced as ``advance`` is."""
         return self.start + self.advance(x)
-
-
-def _exact_product(a: Array, b: Array) -> tuple[Array, Array]:
-    """Return (p, e) with a·b = p + e exactly, p the rounded product."""
-    product = a * b
-    a_high, b_high = _upper_half(a), _upper_half(b)
-    a_low, b_low = a - a_high, b - b_high
-    return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
-
-
-def _upper_half(x: Array) -> Array:
-    scaled = _SPLITTER * x
-    return np.asarray(scaled - (scaled - x))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +27,10 @@ _EXTRA_NODES = 4
 
 @dataclass(frozen=True)
 class Periods(AngleSeries):
-    """The period data of a curve in the curve's arithmetic."""
+    """The period data of a curve in the curve's arithmetic; of many at once, then ``nodes`` are those of every interval."""
 
     curve: Curve
+    nodes: int | None = None
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -61,11 +63,15 @@ class Periods(AngleSeries):
         Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
+        return self.nodes if self.nodes is not None else int(self.needed_nodes(interval))
+
+    def needed_nodes(self, interval: Interval) -> Any:
+        """Return that number; of many curves a column of them."""
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return int(np.ceil(self.arithmetic.nats / rate)) + _EXTRA_NODES
+        return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
     def _series(self, interval: Interval) -> Values:
-        """Return the cosine coefficients of the forms on an interval, shape (g, N): value = Σ_m h_m cos mψ."""
+        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
         psi = self.arithmetic.nodes(self.node_count(interval))
         coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
         if self.arithmetic.certified:
@@ -105,9 +111,9 @@ class Periods(AngleSeries):
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [
-            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap)[:, 0] for s, gap in enumerate(self.gaps)
+            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap)[..., 0] for s, gap in enumerate(self.gaps)
         ]
-        return np.cumsum(np.stack(over_gaps, axis=1), axis=1)
+        return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
 
     @cached_property
     def riemann_matrix_residual(self) -> float:
@@ -119,4 +125,4 @@ class Periods(AngleSeries):
     def riemann_matrix(self) -> Values:
         """Return T, symmetric, with Riemann matrix τ = iT."""
         raw = self.inverse_cycles @ self.conjugate_cycles
-        return np.asarray((raw + raw.T) / 2)
+        return np.asarray((raw + np.swapaxes(raw, -1, -2)) / 2)

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import elliprf
+from scipy.special import ellipkm1, elliprf
 
 __all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
 
@@ -104,12 +104,12 @@ class Arithmetic(ABC):
         return sums
 
     def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (K, N) as values."""
-        count = values.shape[1]
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
+        count = values.shape[-1]
         table = self.cos(self.array(list(range(4 * count))) * (self.pi / (2 * count)))
         waves = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)]
         coefficients = self.product(values, waves) * 2 / count
-        coefficients[:, 0] = coefficients[:, 0] / 2
+        coefficients[..., 0] = coefficients[..., 0] / 2
         return np.asarray(coefficients)
 
     @staticmethod
@@ -128,6 +128,10 @@ class Arithmetic(ABC):
     def product(self, a: Values, b: Values) -> Values:
         """Return the matrix product."""
         return np.asarray(a @ b)
+
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``."""
+        return self.pi / 2 / self.agm(self.number(1), self.sqrt(complement))
 
     def agm(self, a: Any, b: Any) -> Any:
         """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically from any ratio."""
@@ -162,13 +166,17 @@ class Double(Arithmetic):
         """Return Carlson's R_F(x, y, z), entrywise."""
         return elliprf(x, y, z)
 
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``, entrywise."""
+        return ellipkm1(complement)
+
     def inverse(self, matrix: Values) -> Values:
-        """Return the inverse of a square matrix."""
+        """Return the inverse of a square matrix, or of each of a stack."""
         return np.asarray(np.linalg.inv(matrix))
 
-    def determinant(self, matrix: Values) -> float:
-        """Return the determinant of a square matrix."""
-        return float(np.linalg.det(matrix))
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix, or of each of a stack."""
+        return np.linalg.det(matrix)
 
 
 #: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.

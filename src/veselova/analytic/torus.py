@@ -13,7 +13,7 @@ from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.torus_problem import TorusProblem
 
-__all__ = ["torus"]
+__all__ = ["actions", "torus"]
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
         branch_points=np.array(curve.branch_points) / unit,
         origins=tuple(f"{o.kind}{moving.axes[o.index] + 1 if o.kind == 'I' else o.index + 1}" for o in curve.origins),
         periods=periods,
-        actions=_actions(solution.periods) / root,
+        actions=actions(solution.periods) / root,
         rotation_numbers=np.array(solution.in_time.rates / solution.in_time.rates[0]),
         signs=_signs(problem),
         riemann_matrix=np.array(solution.periods.riemann_matrix),
@@ -63,20 +63,21 @@ def _signs(problem: TorusProblem) -> NDArray[np.int64]:
     return np.array([(x > 0) - (x < 0) or (v > 0) - (v < 0) for x, v in pairs], dtype=np.int64)
 
 
-def _actions(periods: Periods) -> Array:
+def actions(periods: Periods) -> Array:
     """Return J_s = (1/2π)∮ p_s dλ_s over cut s, p_s = ½√|λ Π(λ−c_k)/Π(λ−I_i)|, the momentum to λ_s of the metric |dq|².
 
     With p_s dλ = |Π(λ−c_k)| dλ/(2√|R|), c_1 = 0 included, it is a mean over the angle of the cut.
     """
-    curve, actions = periods.curve, []
+    curve, found = periods.curve, []
     places = curve.layout("c").places
     for cut in periods.cuts:
         psi = periods.arithmetic.nodes(periods.node_count(cut))
         below, above = cut.distances(psi)
-        to_constants = cut.to_branch_points(below, above)[:, places]
+        to_constants = cut.to_branch_points(below, above)[..., places]
         common, of_gaps = cut.measure(below, above)
-        actions.append(np.mean(common * to_constants[:, 0] * np.prod(to_constants[:, 1:] / of_gaps, axis=1)))
-    return np.array(actions)
+        densities = common * to_constants[..., 0] * np.prod(to_constants[..., 1:] / of_gaps, axis=-1)
+        found.append(np.mean(densities, axis=-1))
+    return np.stack(found, axis=-1)
 
 
 def _monomial_cycles(periods: Periods) -> Array:

@@ -1,0 +1,124 @@
+"""Many tori at once: the numbers of ``torus``, problem by problem, whatever else is computed with them."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import fields
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from veselova import Veselova, torus
+from veselova.analytic.tori import Tori, tori
+from veselova.analytic.twofold import Twofold
+
+Array = np.ndarray[Any, Any]
+
+NUMBERS = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]
+
+
+def starts(rng: np.random.Generator, count: int, n: int, ratio: float) -> tuple[Array, Array, Array]:
+    return np.exp(rng.uniform(0, np.log(ratio), (count, n))), rng.normal(size=(count, n)), rng.normal(size=(count, n))
+
+
+def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Array, Array]:
+    """Return starts with nearly equal A's, near planes q_i = 0, with q̇ nearly along q, and with directions that hardly move."""
+    A, q, q_dot = starts(rng, count, n, 10.0)
+    kind, part = np.arange(count) % 4, 10.0 ** -rng.uniform(0, 11, count)
+    A[:, 1] = np.where(kind == 0, A[:, 0] * (1 + part), A[:, 1])
+    q[:, 0] *= np.where((kind == 1) | (kind == 3), part, 1)
+    q_dot[:, 0] *= np.where(kind == 3, part, 1)
+    q_dot = np.where((kind == 2)[:, None], q + part[:, None] * q_dot, q_dot)
+    return A, q, q_dot
+
+
+def deviation(found: Tori, i: int, problem: Veselova) -> float:
+    """Return the largest difference of any number to that of ``torus``, relative to it (for phases: of a cycle)."""
+    expected = torus(problem)
+    assert expected.origins == tuple(found.origins[i])
+    assert expected.regime == "generic"
+    worst = 0.0
+    for name in NUMBERS:
+        there, here = np.atleast_1d(getattr(expected, name)), np.atleast_1d(getattr(found, name)[i])
+        assert there.shape == here.shape
+        apart = np.abs(np.mod(here - there + 0.5, 1) - 0.5) if name == "phases" else np.abs(here - there)
+        size = np.where((there == 0) | (name == "phases"), 1, np.abs(there))
+        worst = max(worst, float(np.max(apart / size, initial=0)))
+    return worst
+
+
+@pytest.mark.parametrize("n", range(2, 8))
+def test_many_tori_are_those_of_each(n: int, rng: np.random.Generator) -> None:
+    for ratio in (2.0, 100.0):
+        A, q, q_dot = starts(rng, 15, n, ratio)
+        found = tori(A, q, q_dot)
+        assert np.all(found.known)
+        assert max(deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in range(15)) < 1e-14
+
+
+@pytest.mark.parametrize("n", range(3, 7))
+def test_narrow_gaps_cost_no_digit(n: int, rng: np.random.Generator) -> None:
+    A, q, q_dot = difficult(rng, 40, n)
+    found = tori(A, q, q_dot)
+    known = np.flatnonzero(found.known)
+    assert known.size >= 25
+    assert max(deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in known.tolist()) < 1e-14
+
+
+def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
+    for n in (2, 3, 5):
+        A, q, q_dot = difficult(rng, 120, n)
+        whole, order = tori(A, q, q_dot), rng.permutation(120)
+        parts = [order[:1], order[1:2], order[2:9], order[9:], order]
+        for part in parts:
+            alone = tori(A[part], q[part], q_dot[part])
+            for field in fields(Tori):
+                assert getattr(alone, field.name).tobytes() == getattr(whole, field.name)[part].tobytes(), field.name
+
+
+@pytest.mark.parametrize(
+    ("A", "q", "q_dot"),
+    [
+        ([2, 2, 1], [1, 1, 1], [1, 0, -1]),
+        ([3, 2, 1], [0, 1, 1], [1, 1, -1]),
+        ([3, 2, 1], [1, 1, 1], [0, 0, 0]),
+        ([3, 2, 1], [1, 1, 1], [2, 2, 2]),
+        ([3, 2, 1], [1, 1e-200, 1], [1, 1, -1]),
+        ([3e200, 2, 1], [1, 1, 1], [1, 0, -1]),
+        ([3, 2 + 1e-15, 2], [1, 1, 1], [1, 0, -1]),
+        ([3, 2, 1], [1e-12, 1, 1], [1e-12, 1, -1]),
+        ([3, 2, -1], [1, 1, 1], [1, 0, -1]),
+        ([3, 2, np.nan], [1, 1, 1], [1, 0, -1]),
+        ([3, 2, 1], [0, 0, 0], [1, 0, -1]),
+        ([3, 2, 1], [1, 1, np.inf], [1, 0, -1]),
+    ],
+)
+def test_what_needs_more_digits_is_left_out(A: list[float], q: list[float], q_dot: list[float]) -> None:
+    """And what is no problem at all; a neighbour is computed all the same."""
+    found = tori([A, [3, 2, 1]], [q, [1, 1, 1]], [q_dot, [1, 0, -1]])
+    assert found.known.tolist() == [False, True]
+    assert all(np.all(np.isnan(getattr(found, name)[0])) and np.all(np.isfinite(getattr(found, name)[1])) for name in NUMBERS)
+
+
+@pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])
+def test_twofold_numbers_have_thirty_digits(operation: Any, rng: np.random.Generator) -> None:
+    a, b = (Twofold.of(x) + rng.normal(size=200) * 1e-17 for x in rng.normal(size=(2, 200)))
+    near = b * 1e-9 - a  # so that a + near cancels
+    for left, right in ((a, b), (a, near), (b, a)):
+        found = operation(left, right)
+        for i in range(200):
+            exact = operation(_exact(left, i), _exact(right, i))
+            assert abs(_exact(found, i) - exact) <= abs(exact) * Fraction(1, 2**100)
+
+
+def test_twofold_roots_have_thirty_digits(rng: np.random.Generator) -> None:
+    squares = Twofold.of(rng.uniform(1e-30, 1e30, 200)) + 1e-3
+    roots = squares.sqrt()
+    for i in range(200):
+        assert abs(_exact(roots, i) ** 2 / _exact(squares, i) - 1) <= Fraction(1, 2**100)
+
+
+def _exact(number: Twofold, i: int) -> Fraction:
+    return Fraction(float(number.high[i])) + Fraction(float(number.low[i]))
