@@ -38,6 +38,7 @@ from veselova.service.settings import Settings
 from veselova.service.summaries import OtherVersion, computed_chunk, lost_chunk
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.time_limit import TimeIsUp, time_limit
+from veselova.service.torus_columns import columns_of_torus
 from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
@@ -61,21 +62,21 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
 def test_axes_are_combined_and_the_last_runs_fastest() -> None:
     sweep = request(vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1)
     assert sweep.shape == (2, 3)
-    assert [dict(sweep.columns(row)) for row in (0, 1, 3)] == [
+    assert [dict(sweep.columns(sweep.values(row))) for row in (0, 1, 3)] == [
         {"A.0": 2, "q_dot.1": 1},
         {"A.0": 2, "q_dot.1": 1.5},
         {"A.0": 3, "q_dot.1": 1},
     ]
-    problem = sweep.request_of(4).problem.problem().as_dict()
+    problem = sweep.request_of(sweep.values(4)).problem.problem().as_dict()
     assert (problem["A"][0], problem["A"][1], problem["q_dot"][1]) == (3, "1.5", 1.5)
 
 
 def test_a_draw_depends_on_seed_and_row_alone() -> None:
     sweep, other = request(), request(seed=8)
     assert sweep.total == 15
-    assert dict(sweep.columns(11)) == dict(request().columns(11)) != dict(other.columns(11))
-    assert dict(sweep.columns(11)) != dict(sweep.columns(12))
-    assert dict(request(samples=9).columns(3)) == dict(sweep.columns(3))
+    assert sweep.values(11) == request().values(11) != other.values(11)
+    assert sweep.values(11) != sweep.values(12)
+    assert request(samples=9).values(3) == sweep.values(3)
 
 
 @pytest.mark.parametrize(
@@ -88,14 +89,14 @@ def test_a_draw_depends_on_seed_and_row_alone() -> None:
 )
 def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
     sweep = request(vary={"/A": stated}, samples=300)
-    drawn = np.array([list(dict(sweep.columns(row)).values()) for row in range(300)])
+    drawn = np.array([list(dict(sweep.columns(sweep.values(row))).values()) for row in range(300)])
     assert drawn.shape == (300, 3)
     assert inside(drawn)
 
 
 def test_a_logarithmic_grid_has_equal_ratios() -> None:
     sweep = request(vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1)
-    assert np.allclose([dict(sweep.columns(row))["A.0"] for row in range(3)], [1, 10, 100], rtol=1e-14)
+    assert np.allclose([dict(sweep.columns(sweep.values(row)))["A.0"] for row in range(3)], [1, 10, 100], rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +167,7 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
     times = {"start": 0, "stop": 3, "count": 7}
     sweep = request(times=times)
     for row, found in enumerate(rows(sweep, 0, 4)):
-        problem = sweep.request_of(row).problem.problem()
+        problem = sweep.request_of(sweep.values(row)).problem.problem()
         expected, motion = vs.torus(problem), vs.solve(problem, np.linspace(0, 3, 7))
         assert found["row"] == row
         assert found["outcome"] == "solved"
@@ -198,6 +199,59 @@ def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:
     assert found[0]["regime"] == "rest"
     assert found[2]["detail"].startswith("problem.A[0]: required a finite number greater than 0; given -1")
     assert found[2]["energy"] is None
+
+
+def test_tori_that_are_computed_together_are_those_of_torus() -> None:
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
+    sweep = request(problem=plain, vary={"/A": {"uniform": [1, 3]}, "/q_dot": {"normal": [0, 1]}}, samples=40)
+    for row, found in enumerate(rows(sweep, 0, 40)):
+        assert (found["row"], found["outcome"], found["detail"]) == (row, "solved", "")
+        expected = dict(columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem())))
+        assert list(found) == [
+            "row",
+            *(f"{name}.{i}" for name in ("A", "q_dot") for i in range(3)),
+            "outcome",
+            "detail",
+            *expected,
+        ]
+        for name, value in expected.items():
+            assert found[name] == (pytest.approx(value, rel=1e-14, abs=1e-15) if isinstance(value, float) else value), name
+
+
+def test_rows_do_not_depend_on_how_a_sweep_is_cut() -> None:
+    """Problems that can be computed together stand beside others, which are computed, or refused, one by one."""
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
+    sweep = request(problem=plain, vary={"/A/0": [2, "2", 1.5, -1, "x", 4], "/q/1": [0.1, 0], "/q_dot/1": [0, 0.5]}, samples=1)
+    whole = rows(sweep, 0, sweep.total)
+    alone = [rows(sweep, row, row + 1)[0] for row in range(sweep.total)]
+    for together, single in zip(whole, alone, strict=True):
+        assert {name: value for name, value in together.items() if value is not None} == single
+    assert [row["outcome"] for row in whole] == ["solved"] * 12 + ["invalid-input"] * 8 + ["solved"] * 4
+    assert whole[1]["energy"] == pytest.approx(whole[5]["energy"], rel=1e-14)
+    assert [whole[i]["regime"] for i in (0, 1, 3, 9)] == ["rest", "generic", "generic", "closed-cut"]
+
+
+def test_a_start_off_the_sphere_is_refused_in_a_sweep_too() -> None:
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0, 0.8], "q_dot": [0.8, 1, -0.6], "normalize": False}
+    sweep = request(problem=plain, vary={"/q/1": [0, 1e-5, 1e-4], "/q_dot/1": [1, 2]}, samples=1)
+    found = rows(sweep, 0, 6)
+    assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
+    assert found[4]["detail"].startswith("problem.q: required a vector of unit length to 1e-9 (or normalize=True); given length")
+    assert found[2]["detail"].startswith("problem.q_dot: required a vector orthogonal to q to 1e-9")
+
+
+def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: Any) -> Any:
+        raise ZeroDivisionError
+
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
+    sweep = request(problem=plain, budget_s=0.4)
+    expected = rows(sweep, 0, 2)
+    for failure in (broken, lambda *_: _for_ever()):
+        monkeypatch.setattr("veselova.analytic.tori.tori", failure)
+        found = rows(sweep, 0, 2)
+        assert [row["outcome"] for row in found] == ["solved"] * 2
+        assert np.allclose([row["mean_rate"] for row in found], [row["mean_rate"] for row in expected], rtol=1e-14)
 
 
 def test_a_problem_over_its_budget_is_given_up() -> None:
@@ -291,13 +345,15 @@ def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
     other = request(vary={"/A/0": [3, 4, 5], "/q_dot/1": [0.5, 1]}, samples=1)
     assert sweep.id != other.id
     kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert [dict(kept.columns(row)) for row in range(6)] == [dict(sweep.columns(row)) for row in range(6)]
+    assert [dict(kept.columns(kept.values(row))) for row in range(6)] == [
+        dict(sweep.columns(sweep.values(row))) for row in range(6)
+    ]
 
 
 def test_integers_of_any_length_are_kept_exactly() -> None:
     sweep = request(vary={"/A/0": [10**30]}, samples=1)
     kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert kept.request_of(0).problem.problem().as_dict()["A"] == [str(10**30), "1.5", 1]
+    assert kept.request_of(kept.values(0)).problem.problem().as_dict()["A"] == [str(10**30), "1.5", 1]
 
 
 def test_a_place_varies_by_the_numbers_of_numpy(tmp_path: Path) -> None:

@@ -14,12 +14,15 @@ import numpy as np
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_number
 
-__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "parameters", "replaced", "tabulated"]
+__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replaced", "tabulated"]
 
 Path = tuple[str | int, ...]
 
 #: No problem has as many places, and the product of so many axes has no name.
 _MOST_PARAMETERS = 64
+
+#: Larger integers need not be doubles.
+_LARGEST_INTEGER = 2**53
 
 _DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 _SPACINGS = ("linear", "log")
@@ -107,8 +110,15 @@ def components(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
+def is_double(value: Any) -> bool:
+    """Return whether a value of the JSON is a number that a double holds exactly."""
+    return (type(value) is float and math.isfinite(value)) or (type(value) is int and abs(value) <= _LARGEST_INTEGER)
+
+
 def tabulated(value: Any) -> float | str | None:
     """Return a scalar of the JSON as tables hold it: a number wherever it states one."""
+    if is_double(value):
+        return float(value) + 0.0  # a zero has no sign
     try:
         return float(exact_number(value, ()))
     except InvalidInput:

@@ -15,15 +15,15 @@ import orjson
 from veselova.engines import Prepared
 from veselova.mechanics.errors import Unsolved, VeselovaError
 from veselova.mechanics.problem import Problem
-from veselova.mechanics.torus import Torus
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
-from veselova.service.parameters import components
+from veselova.service.parameters import Path, components
 from veselova.service.problem_details import problem_code
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.tasks import requested_trajectory, warm_up
 from veselova.service.time_limit import TimeIsUp, time_limit
+from veselova.service.torus_columns import columns_at_once, columns_of_torus
 from veselova.version import __version__
 
 __all__ = ["SOLVED", "Chunk", "OtherVersion", "computed_chunk", "lost_chunk"]
@@ -32,9 +32,6 @@ _LOG = logging.getLogger("veselova.sweeps")
 
 #: What the column ``outcome`` says of a problem that was solved; else it names the reason, and ``detail`` explains it.
 SOLVED = "solved"
-
-#: What a torus has to say in numbers, and how each is called in the table.
-_OF_TORUS = ("energy", "constants", "branch_points", "frequencies_tau1", "frequencies_t", "rotation_numbers", "actions", "phases")
 
 Row = dict[str, Any]
 
@@ -62,7 +59,9 @@ def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk
         raise OtherVersion(f"a worker of the cluster runs veselova {__version__}, and this is {version}")
     _warm_up()
     sweep = _sweep(request)
-    answers = [_answer(sweep, row) for row in range(start, stop)]
+    values = {row: sweep.values(row) for row in range(start, stop)}
+    together = _together(sweep, values)
+    answers = [_answer(sweep, row, values[row], together.get(row)) for row in range(start, stop)]
     return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
 
 
@@ -81,16 +80,30 @@ def _warm_up() -> None:
 def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
     """Return the chunk of one problem whose worker died over it."""
     detail = "the worker process ended over this problem, as it does when memory runs out"
-    return Chunk(1, _parquet([_row(sweep, row, "worker-lost", detail)]))
+    return Chunk(1, _parquet([_row(sweep, row, sweep.values(row), "worker-lost", detail)]))
 
 
-def _answer(sweep: SweepRequest, row: int) -> tuple[Row, Mapping[str, Any]]:
-    """Return the row of one problem, and the series that are kept of it."""
-    found: Row = {}
+def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Row]:
+    """Return what can be found for many problems at once, within the budgets of all; the others are answered one by one."""
+    try:
+        with time_limit(sweep.budget_s * len(values)):
+            return columns_at_once(sweep, values)
+    except TimeIsUp:
+        return {}
+    except Exception:
+        _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
+        return {}
+
+
+def _answer(sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Row | None) -> tuple[Row, Mapping[str, Any]]:
+    """Return the row of one problem, unless its columns were ``found`` already, and the series that are kept of it."""
+    if found is not None:
+        return {**_row(sweep, row, values, SOLVED, ""), **found}, {}
+    found = {}
     kept: dict[str, Any] = {}
     try:
         with time_limit(sweep.budget_s):
-            for column, value in _findings(sweep.request_of(row), kept, sweep.trajectories):
+            for column, value in _findings(sweep.request_of(values), kept, sweep.trajectories):
                 found[column] = value
         outcome, detail = SOLVED, ""
     except TimeIsUp:
@@ -100,11 +113,11 @@ def _answer(sweep: SweepRequest, row: int) -> tuple[Row, Mapping[str, Any]]:
     except Exception as error:
         _LOG.exception("problem %d of sweep %s failed", row, sweep.id)
         outcome, detail = problem_code(error), "an unexpected error; it has been logged"
-    return {**_row(sweep, row, outcome, detail), **found}, kept
+    return {**_row(sweep, row, values, outcome, detail), **found}, kept
 
 
-def _row(sweep: SweepRequest, row: int, outcome: str, detail: str) -> Row:
-    return {"row": row, **dict(sweep.columns(row)), "outcome": outcome, "detail": detail}
+def _row(sweep: SweepRequest, row: int, values: Mapping[Path, Any], outcome: str, detail: str) -> Row:
+    return {"row": row, **dict(sweep.columns(values)), "outcome": outcome, "detail": detail}
 
 
 def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
@@ -112,7 +125,7 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
     problem = request.problem.problem()
     prepared = Prepared(problem)
     if prepared.has_torus:
-        yield from _of_torus(prepared.torus())
+        yield from columns_of_torus(prepared.torus())
     elif isinstance(problem, TorusProblem):
         yield "regime", "rest"
     if isinstance(request, TrajectoryRequest):
@@ -121,14 +134,6 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
         if keep:
             kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)
         yield from _of_motion(problem, trajectory, names)
-
-
-def _of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
-    for name in _OF_TORUS:
-        yield from components(name, np.asarray(getattr(found, name)).tolist())
-    yield "mean_rate", found.mean_rate
-    yield "regime", found.regime
-    yield "origins", " ".join(found.origins)
 
 
 def _of_motion(problem: Problem, trajectory: Trajectory, names: list[str]) -> Iterator[tuple[str, Any]]:

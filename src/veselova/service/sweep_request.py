@@ -16,8 +16,9 @@ from veselova.mechanics.errors import InvalidInput, VeselovaError, shown
 from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus_problem import TorusProblem
+from veselova.mechanics.veselova import Veselova
 from veselova.service.examples import BODY4_PROBLEM
-from veselova.service.parameters import Axis, Draw, Parameter, Path, components, parameters, replaced, tabulated
+from veselova.service.parameters import Axis, Draw, Parameter, Path, components, is_double, parameters, replaced, tabulated
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
 from veselova.service.systems import SYSTEMS, Times
 from veselova.version import __version__
@@ -57,8 +58,10 @@ _MOST_PROBLEMS = 1_000_000_000
 #: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be valid.
 _LOOKED_AT = 16
 
-#: Problems in one chunk: about a second of work for small n, by their number, the times of their motions and what is kept.
+#: Problems in one chunk: about a second of work for small n, by their number (less for tori that are computed together), the
+#: times of their motions and what is kept.
 _CHUNK_ROWS = 250
+_CHUNK_TORI = 2000
 _CHUNK_TIMES = 20_000
 _CHUNK_VALUES = 1_000_000
 
@@ -123,7 +126,7 @@ class SweepRequest(TorusRequest):
         first: VeselovaError | None = None
         for row in rows:
             try:
-                request = self.request_of(row)
+                request = self.request_of(self.values(row))
                 request.problem.problem()
                 if isinstance(request, TrajectoryRequest):
                     request.time_grid()
@@ -139,17 +142,17 @@ class SweepRequest(TorusRequest):
         """Return the parameters; raises InvalidInput."""
         return parameters(self.vary, self.problem.model_dump(exclude_none=True), _MOST_VALUES)
 
-    @property
+    @cached_property
     def axes(self) -> list[Axis]:
         """Return the parameters that take given values."""
         return [parameter for parameter in self.varied if isinstance(parameter, Axis)]
 
-    @property
+    @cached_property
     def draws(self) -> list[Draw]:
         """Return the parameters that are drawn at random."""
         return [parameter for parameter in self.varied if isinstance(parameter, Draw)]
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Return the numbers of values of the axes, the last axis running fastest, then the samples where there are draws."""
         return (*(len(axis.values) for axis in self.axes), *((self.samples,) if self.draws else ()))
@@ -168,9 +171,9 @@ class SweepRequest(TorusRequest):
             found |= {draw.path: draw.drawn(random) for draw in self.draws}
         return {parameter.path: found[parameter.path] for parameter in self.varied}
 
-    def columns(self, row: int) -> Iterator[tuple[str, Any]]:
+    def columns(self, values: Mapping[Path, Any]) -> Iterator[tuple[str, Any]]:
         """Yield the values of the parameters in one problem by the names of their columns, component by component."""
-        for path, value in self.values(row).items():
+        for path, value in values.items():
             for name, scalar in components(".".join(map(str, path)), value):
                 found = tabulated(scalar)
                 yield name, str(found) if name in self._texts and found is not None else found
@@ -182,13 +185,24 @@ class SweepRequest(TorusRequest):
         stated = ((name, scalar) for name, scalar in scalars if isinstance(scalar, (str, bool)))
         return frozenset(name for name, scalar in stated if isinstance(tabulated(scalar), str))
 
-    def request_of(self, row: int) -> TorusRequest | TrajectoryRequest:
+    def request_of(self, values: Mapping[Path, Any]) -> TorusRequest | TrajectoryRequest:
         """Return the request of one problem: for its motion where there are times, for its torus else. Raises InvalidRequest."""
-        problem = replaced(self.problem.model_dump(exclude_none=True), self.values(row))
+        problem = replaced(self.problem.model_dump(exclude_none=True), values)
         if self.times is None:
             return read_request(TorusRequest, {"problem": problem, "budget_s": self.budget_s})
         asked = {name: getattr(self, name) for name in ("times", "engine", "method", "formulation", "outputs", "budget_s")}
         return read_request(TrajectoryRequest, {"problem": problem, **asked})
+
+    @property
+    def tori_at_once(self) -> bool:
+        """Return whether tori alone are asked for, of a system whose tori can be computed many at a time."""
+        return self.times is None and self.problem.system == Veselova.system
+
+    @property
+    def _states_doubles(self) -> bool:
+        """Return whether all numbers of the base problem are doubles, and not rationals that are to be taken exactly."""
+        stated = self.problem.model_dump(exclude={"system", "normalize"}, exclude_none=True)
+        return all(is_double(scalar) for name, value in stated.items() for _, scalar in components(name, value))
 
     @property
     def row_values(self) -> int:
@@ -207,7 +221,8 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        return max(1, min(_CHUNK_ROWS, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
+        rows = _CHUNK_TORI if self.tori_at_once and self._states_doubles else _CHUNK_ROWS
+        return max(1, min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
 
     @property
     def canonical(self) -> bytes:
