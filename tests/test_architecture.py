@@ -131,7 +131,29 @@ def test_client_and_schemas_load_neither_engine(statement: str) -> None:
     assert answer.stdout.strip() == "[]"
 
 
-def test_importing_the_package_loads_no_part() -> None:
-    check = "import veselova, sys; print([m for m in sys.modules if m.startswith('veselova.') and m != 'veselova.version'])"
-    answer = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
-    assert answer.stdout.strip() == "[]"
+def _loaded_by(statement: str) -> set[str]:
+    """Return the modules of no standard library that a statement loads, those of other packages by their first names."""
+    check = "import sys; print(*[m for m in sys.modules if m.startswith('veselova.')], *{m.split('.')[0] for m in sys.modules})"
+    answer = subprocess.run([sys.executable, "-c", f"{statement}\n{check}"], capture_output=True, text=True, check=True)
+    return set(answer.stdout.splitlines()[-1].split()) - set(sys.stdlib_module_names)
+
+
+def test_importing_the_package_loads_no_part_and_no_library() -> None:
+    bare = _loaded_by("pass")  # what the environment loads into every process
+    assert _loaded_by("import veselova") - bare == {"veselova", "veselova.version"}
+
+
+def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
+    loaded = _loaded_by("import veselova; veselova.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1])")
+    assert "numpy" in loaded
+    assert not loaded & {"scipy", "mpmath", "flint", "heyoka", "matplotlib", "pydantic", "veselova.engines"}
+
+
+@pytest.mark.parametrize("command", [[], ["solve"]])
+def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
+    statement = f"import sys; sys.argv = ['veselova', *{command}, '--help']\nfrom veselova.service import cli\n"
+    loaded = _loaded_by(statement + "try:\n    cli.main()\nexcept SystemExit:\n    pass")
+    assert "typer" in loaded
+    assert {name for name in loaded if name.startswith("veselova.mechanics.")} == {"veselova.mechanics.errors"}
+    libraries = {"numpy", "scipy", "mpmath", "matplotlib", "starlette", "fastapi", "httpx2", "sqlalchemy", "distributed"}
+    assert not loaded & (libraries | {"veselova.analytic", "veselova.numeric", "veselova.engines"})

@@ -1,15 +1,21 @@
-"""RFC 9457 problem documents: the one table from exception to HTTP status and code."""
+"""RFC 9457 problem documents: the one table from exception to HTTP status and code.
+
+The command line has it too, and no use for the framework: that is imported where a response is made.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import orjson
-from starlette.exceptions import HTTPException
-from starlette.responses import Response
 
 from veselova.mechanics.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved
+
+if TYPE_CHECKING:
+    from starlette.exceptions import HTTPException
+    from starlette.responses import Response
 
 __all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_code", "problem_document", "problem_response"]
 
@@ -77,7 +83,7 @@ def problem_document(error: Exception) -> dict[str, Any]:
     if isinstance(error, Refused):
         status, title = _REFUSALS[error.code]
         return _document(status, error.code, title, error.detail)
-    if isinstance(error, HTTPException):
+    if _is_of_framework(error):
         code, title = _FRAMEWORK.get(error.status_code, ("http-error", "The request was refused"))
         return _document(error.status_code, code, title, str(error.detail))
     status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
@@ -100,11 +106,19 @@ def problem_code(error: Exception) -> str:
 
 def problem_response(error: Exception) -> Response:
     """Return the HTTP response that carries the problem document of an exception."""
+    from starlette.responses import Response
+
     document = problem_document(error)
-    headers = dict(error.headers or {}) if isinstance(error, HTTPException) else {}
+    headers = dict(error.headers or {}) if _is_of_framework(error) else {}
     if isinstance(error, Refused) and error.retry_after is not None:
         headers["Retry-After"] = str(error.retry_after)
     return Response(orjson.dumps(document), document["status"], headers, MEDIA_TYPE)
+
+
+def _is_of_framework(error: Exception) -> TypeGuard[HTTPException]:
+    """Return whether an exception is an HTTPException; a framework that is not loaded has raised none."""
+    framework = sys.modules.get("starlette.exceptions")
+    return framework is not None and isinstance(error, framework.HTTPException)
 
 
 def _document(status: int, code: str, title: str, detail: str) -> dict[str, Any]:
