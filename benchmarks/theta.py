@@ -1,48 +1,106 @@
-"""One theta value: ours against python-flint (Arb) at 53 bits, at random phases of random Riemann matrices.
+"""One theta function at one point: ours against python-flint (Arb) at 53 bits, scattered and along an orbit.
 
-    python benchmarks/theta.py      needs python-flint (extra `test`)
+    python benchmarks/theta.py [TIMES]      needs python-flint (extra `test`); default 10⁶ times
 
-Prints per genus the time of one value at one point (ours: 2000 points, one characteristic and the denominator; FLINT: all
-characteristics at once, as its binding gives them, divided by their number), the ratio, and the largest difference.
+Scattered: random phases of random Riemann matrices, one characteristic. Along an orbit: the Riemann matrix, phases and
+frequencies of a random body with n = g+1, random times in [0, 1000], in the windows in which the closed form takes many
+times. FLINT's binding gives all 4^g characteristics at once: "of all" is such a call, which is what one value costs there,
+and "per value" that over 4^g. Both ratios are printed. The error is the largest difference to FLINT at 128 bits, over the
+largest value of the function; "of the orbit" is what one rounding of the frequencies makes of it at t = 1000, which no
+evaluation can better.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
-from flint import acb, acb_mat
+from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.clock import UniformClock
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta
+from veselova.analytic.windows import Windows
 
-POINTS = 2000
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from draws import random_problem, random_riemann_matrix
+
+SCATTERED = 2000
+SPAN = 1000.0
 
 
-def main() -> None:
-    print("g    ours µs   FLINT µs (of all)   ratio   FLINT µs (per value)   largest difference")
+def flint_values(T: np.ndarray, points: list[list[arb]], characteristic: Characteristic, bits: int) -> tuple[np.ndarray, float]:
+    """Return the values of one characteristic at points, and the seconds of one call."""
+    ctx.prec = bits
+    tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
+    index = int("".join(map(str, [*characteristic.epsilon, *characteristic.delta])), 2)
+    columns = [acb_mat([[acb(x)] for x in point]) for point in points]
+    began = time.perf_counter()
+    tables = [tau.theta(column) for column in columns]
+    each = (time.perf_counter() - began) / len(points)
+    ctx.prec = 53
+    return np.array([complex(table[0, index]).real for table in tables]), each
+
+
+def row(genus: int, T: np.ndarray, z: list[list[arb]], ours: np.ndarray, each: float, size: float) -> str:
+    """Return one line of a table."""
+    characteristic = Characteristic.of_branch_point(2, genus)
+    _, theirs = flint_values(T, z, characteristic, 53)
+    error = np.max(np.abs(flint_values(T, z, characteristic, 128)[0] - ours)) / size
+    ratios = f"{theirs / each:.0f} | {theirs / 4**genus / each:.0f}"
+    return f"| {genus} | {each * 1e6:.3f} µs | {theirs * 1e6:.0f} µs | {ratios} | {error:.1e} |"
+
+
+def scattered(genus: int) -> str:
+    """Return the line of random phases."""
+    rng = np.random.default_rng(genus)
+    T, z = random_riemann_matrix(rng, genus), rng.uniform(0, 1, (SCATTERED, genus))
+    theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
+    theta.values(z[:10], [characteristic])
+    began = time.perf_counter()
+    ours = theta.values(z, [characteristic])[:, 0]
+    each = (time.perf_counter() - began) / SCATTERED
+    count = 40 if genus < 4 else 5
+    points = [[arb(float(x)) for x in point] for point in z[:count]]
+    return row(genus, T, points, ours[:count], each, float(np.max(np.abs(ours))))
+
+
+def along_orbit(genus: int, count: int) -> str:
+    """Return the line of an orbit."""
+    solution = Solution(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
+    T, start, rates = np.array(solution.periods.riemann_matrix), solution.in_time.start, solution.in_time.rates
+    theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
+    times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
+    clock = UniformClock(LinearFlow.of(start, rates), 1.0)
+    fewest = solution.costs(times).fewest_in_window(32, "panels")
+
+    def evaluation(z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
+
+    began = time.perf_counter()
+    ours = Windows(times, float(np.max(np.abs(rates))), fewest).along(clock, rates, evaluation).series[0][:, 0]
+    each = (time.perf_counter() - began) / times.size
+    chosen = np.linspace(0, times.size - 1, 40 if genus < 4 else 5).astype(int)
+    ctx.prec = 128
+    points = [[arb(float(z)) + arb(float(f)) * arb(float(times[i])) for z, f in zip(start, rates, strict=True)] for i in chosen]
+    size = float(np.max(np.abs(ours)))
+    slope = np.max(np.abs(np.gradient(ours[:2000], times[:2000]))) / size
+    return row(genus, T, points, ours[chosen], each, size) + f" {slope * SPAN * np.finfo(float).eps:.1e} |"
+
+
+def main(count: int) -> None:
+    print("Scattered\n\n| g | ours | FLINT, of all | ratio | ratio per value | error |\n|---|---|---|---|---|---|")
     for genus in range(1, 5):
-        rng = np.random.default_rng(genus)
-        basis = np.linalg.qr(rng.normal(size=(genus, genus)))[0]
-        T = basis @ np.diag(np.exp(rng.uniform(np.log(0.3), np.log(3), genus))) @ basis.T
-        T = (T + T.T) / 2
-        z = rng.uniform(0, 1, (POINTS, genus))
-        theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
-        theta.values(z[:10], [characteristic])
-        began = time.perf_counter()
-        ours = theta.values(z, [characteristic])[:, 0]
-        each = (time.perf_counter() - began) / POINTS
-        tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
-        index = int("".join(map(str, [*characteristic.epsilon, *characteristic.delta])), 2)
-        count, worst = (40 if genus < 4 else 5), 0.0
-        began = time.perf_counter()
-        values = [tau.theta(acb_mat([[acb(float(x))] for x in z[i]])) for i in range(count)]
-        theirs = (time.perf_counter() - began) / count
-        for i, value in enumerate(values):
-            worst = max(worst, abs(complex(value[0, index]).real - ours[i]))
-        row = f"{genus}   {each * 1e6:8.2f}   {theirs * 1e6:17.0f}   {theirs / each:5.0f}"
-        print(f"{row}   {theirs / 4**genus * 1e6:20.1f}   {worst:18.1e}")
+        print(scattered(genus), flush=True)
+    print(f"\nAlong an orbit, {count} times\n\n| g | ours | FLINT, of all | ratio | ratio per value | error | of the orbit |")
+    print("|---|---|---|---|---|---|---|")
+    for genus in range(1, 5):
+        print(along_orbit(genus, count), flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000)

@@ -149,7 +149,7 @@ def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
     assert not loaded & {"scipy", "mpmath", "flint", "heyoka", "matplotlib", "pydantic", "veselova.engines"}
 
 
-@pytest.mark.parametrize("command", [[], ["solve"]])
+@pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])
 def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
     statement = f"import sys; sys.argv = ['veselova', *{command}, '--help']\nfrom veselova.service import cli\n"
     loaded = _loaded_by(statement + "try:\n    cli.main()\nexcept SystemExit:\n    pass")

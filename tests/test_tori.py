@@ -67,6 +67,17 @@ def test_narrow_gaps_cost_no_digit(n: int, rng: np.random.Generator) -> None:
     assert max(deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in known.tolist()) < 1e-14
 
 
+@pytest.mark.sweep
+@pytest.mark.parametrize("n", range(2, 8))
+def test_a_thousand_tori_are_those_of_each(n: int) -> None:
+    rng = np.random.default_rng(n)
+    for draw in (lambda: starts(rng, 250, n, 2.0), lambda: starts(rng, 250, n, 1e4), lambda: difficult(rng, 500, n)):
+        A, q, q_dot = draw()
+        found = tori(A, q, q_dot)
+        for i in np.flatnonzero(found.known).tolist():
+            assert deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) < 2e-14
+
+
 def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
     for n in (2, 3, 5):
         A, q, q_dot = difficult(rng, 120, n)
