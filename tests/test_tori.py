@@ -27,8 +27,9 @@ def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Arra
     """Return starts with nearly equal A's, near planes q_i = 0, with q̇ nearly along q, and with directions that hardly move."""
     A, q, q_dot = starts(rng, count, n, 10.0)
     kind, part = np.arange(count) % 4, 10.0 ** -rng.uniform(0, 11, count)
+    on_plane = 10.0 ** -rng.uniform(0, 40, count)
     A[:, 1] = np.where(kind == 0, A[:, 0] * (1 + part), A[:, 1])
-    q[:, 0] *= np.where((kind == 1) | (kind == 3), part, 1)
+    q[:, 0] *= np.where(kind == 1, on_plane, np.where(kind == 3, part, 1))
     q_dot[:, 0] *= np.where(kind == 3, part, 1)
     q_dot = np.where((kind == 2)[:, None], q + part[:, None] * q_dot, q_dot)
     return A, q, q_dot
@@ -97,6 +98,7 @@ def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
         ([3, 2, 1], [1, 1, 1], [0, 0, 0]),
         ([3, 2, 1], [1, 1, 1], [2, 2, 2]),
         ([3, 2, 1], [1, 1e-200, 1], [1, 1, -1]),
+        ([3, 2, 1], [1, 1, 1], [1e60, 0, -1e60]),
         ([3e200, 2, 1], [1, 1, 1], [1, 0, -1]),
         ([3, 2 + 1e-15, 2], [1, 1, 1], [1, 0, -1]),
         ([3, 2, 1], [1e-12, 1, 1], [1e-12, 1, -1]),

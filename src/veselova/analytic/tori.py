@@ -33,8 +33,9 @@ _NARROWEST = 1e-12
 #: Numbers of nodes are rounded up to one of these; who needs more has a gap that is worth a call of its own.
 _NODES = np.array([12, 16, 20, 24, 32, 40, 52, 64])
 
-#: Largest |log₂| of all A's of a problem together, and of any component of q and q̇: products of them stay floats.
-_MOST_BINARY_DIGITS = 300
+#: Largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i: products of them, and what these round,
+#: stay floats.
+_MOST_BINARY_DIGITS = 150
 
 #: Largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
 _MOST_DIMENSIONS = 9
@@ -108,13 +109,13 @@ def _stacks(spectra: Spectra) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]
     for code in np.unique(order[spectra.known]):
         members = np.flatnonzero(spectra.known & (order == code))
         points, origins = _branch_points(spectra, members, lower[members[0]])
-        differences = (points[:, None, :] - points[:, :, None]).high
-        curves = Curve(DOUBLE, points.high, differences, origins)
-        wide = np.min(np.diagonal(differences, 1, 1, 2), axis=1) > _NARROWEST
+        wide = np.min((points[:, 1:] - points[:, :-1]).high, axis=1) > _NARROWEST
+        members, points = members[wide], points[wide]
+        curves = Curve(DOUBLE, points.high, (points[:, None, :] - points[:, :, None]).high, origins)
         nodes = _node_counts(Periods(curves))
-        for count in np.unique(nodes[wide & (nodes > 0)]):
-            chosen = np.flatnonzero(wide & (nodes == count))
-            stack = Curve(DOUBLE, points.high[chosen], differences[chosen], origins)
+        for count in np.unique(nodes[nodes > 0]):
+            chosen = np.flatnonzero(nodes == count)
+            stack = Curve(DOUBLE, points.high[chosen], curves.differences[chosen], origins)
             yield members[chosen], _numbers(spectra, members[chosen], points[chosen], Periods(stack, int(count)))
 
 
