@@ -34,14 +34,14 @@ SPAN = 1000.0
 
 
 def flint_values(T: np.ndarray, points: list[list[arb]], characteristic: Characteristic, bits: int) -> tuple[np.ndarray, float]:
-    """Return the values of one characteristic at points, and the seconds of one call."""
+    """Return the values of one characteristic at points, and the processor seconds of one call."""
     ctx.prec = bits
     tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
     index = int("".join(map(str, [*characteristic.epsilon, *characteristic.delta])), 2)
     columns = [acb_mat([[acb(x)] for x in point]) for point in points]
-    began = time.perf_counter()
+    began = time.process_time()
     tables = [tau.theta(column) for column in columns]
-    each = (time.perf_counter() - began) / len(points)
+    each = (time.process_time() - began) / len(points)
     ctx.prec = 53
     return np.array([complex(table[0, index]).real for table in tables]), each
 
@@ -61,9 +61,9 @@ def scattered(genus: int) -> str:
     T, z = random_riemann_matrix(rng, genus), rng.uniform(0, 1, (SCATTERED, genus))
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     theta.values(z[:10], [characteristic])
-    began = time.perf_counter()
+    began = time.process_time()
     ours = theta.values(z, [characteristic])[:, 0]
-    each = (time.perf_counter() - began) / SCATTERED
+    each = (time.process_time() - began) / SCATTERED
     count = 40 if genus < 4 else 5
     points = [[arb(float(x)) for x in point] for point in z[:count]]
     return row(genus, T, points, ours[:count], each, float(np.max(np.abs(ours))))
@@ -81,9 +81,9 @@ def along_orbit(genus: int, count: int) -> str:
     def evaluation(z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
 
-    began = time.perf_counter()
+    began = time.process_time()
     ours = Windows(times, float(np.max(np.abs(rates))), fewest).along(clock, rates, evaluation).series[0][:, 0]
-    each = (time.perf_counter() - began) / times.size
+    each = (time.process_time() - began) / times.size
     chosen = np.linspace(0, times.size - 1, 40 if genus < 4 else 5).astype(int)
     ctx.prec = 128
     points = [[arb(float(z)) + arb(float(f)) * arb(float(times[i])) for z, f in zip(start, rates, strict=True)] for i in chosen]
