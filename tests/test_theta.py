@@ -11,10 +11,12 @@ from flint import acb, acb_mat, ctx
 
 from draws import random_problem, random_riemann_matrix
 from problems import tagged
+from veselova import solve
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.lattice import lattice_points
 from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta
+from veselova.mechanics.errors import Unsolved
 
 
 def all_characteristics(genus: int) -> list[Characteristic]:
@@ -145,6 +147,36 @@ def test_quotients_agree_with_inversion_in_angles(n: int, rng: np.random.Generat
         assert np.max(np.abs(by_theta.q - by_angles.q)) < 2e-14
         assert np.max(np.abs(by_theta.normals - by_angles.normals)) < 2e-14
         assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(np.abs(by_angles.components))
+
+
+def test_reduced_coordinates_leave_the_functions_as_they_are(rng: np.random.Generator) -> None:
+    """Near a separatrix, where the basis is far from that of Z^g, against the lattice sum of Gaussians around each point."""
+    for genus in (2, 3, 4):
+        T = random_riemann_matrix(rng, genus) + 1e-2 * np.eye(genus)
+        difference = np.zeros(genus)
+        difference[:2] = 1, -1
+        # A nearly null vector e_1 − e_2: T is projected off it.
+        projection = np.eye(genus) - np.outer(difference, difference) / 2
+        T = projection @ T @ projection + 5e-3 * np.outer(difference, difference)
+        inverse = np.linalg.inv(T)
+        inverse = (inverse + inverse.T) / 2
+        z = rng.uniform(-3, 3, (6, genus))
+        characteristics = all_characteristics(genus)
+        found = Theta(T).values(z, characteristics)
+        for row, point in zip(found, z, strict=True):
+            for characteristic, value in zip(characteristics, row, strict=True):
+                y = point + np.array(characteristic.delta) / 2
+                nearest = np.rint(y)
+                x = lattice_points(inverse, np.sqrt(39 / np.pi + (y - nearest) @ inverse @ (y - nearest)), nearest - y)
+                terms = np.exp(-np.pi * np.sum((x @ inverse) * x, axis=1))
+                signs = np.cos(np.pi * ((x + y) @ np.array(characteristic.epsilon)))
+                scale = np.sqrt(np.linalg.det(inverse))
+                assert abs(value - scale * (terms @ signs)) < 3e-13 * scale * np.sum(terms)
+
+
+def test_theta_sums_that_would_fill_the_memory_are_refused(rng: np.random.Generator) -> None:
+    with pytest.raises(Unsolved, match=r"too-many-terms.*angles serve"):
+        solve(random_problem(rng, 14), [1.0], method="theta")
 
 
 def test_one_index_constants_are_the_values_at_half_periods() -> None:

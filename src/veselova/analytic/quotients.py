@@ -18,10 +18,14 @@ from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.frame import Attitude, Frame, slopes
 from veselova.analytic.theta import Theta
+from veselova.mechanics.errors import Unsolved
 
 __all__ = ["ThetaQuotients"]
 
 Array = NDArray[np.float64]
+
+#: Terms of all functions together: 4 GB of tables.
+_MOST_TERMS = 2.5e8
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,17 @@ class ThetaQuotients:
 
     theta: Theta | EnclosedTheta
     frame: Frame
+
+    @classmethod
+    def of(cls, T: Array, frame: Frame) -> ThetaQuotients:
+        """Return the route in double precision; raises Unsolved (``too-many-terms``) where its tables would fill the memory."""
+        theta, functions = Theta(T), len(T) * (len(T) + 3) + 1
+        if not theta.cost * functions <= _MOST_TERMS:
+            most = f"{_MOST_TERMS:.0e} can be kept; angles serve at any n"
+            raise Unsolved(
+                "too-many-terms", f"n = {len(T) + 1}: {functions} theta functions of some {theta.cost:.1e} terms; {most}"
+            )
+        return cls(theta, frame)
 
     @cached_property
     def _characteristics(self) -> list[Characteristic]:

@@ -25,7 +25,6 @@ from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
-from veselova.analytic.theta import Theta
 from veselova.analytic.windows import NODES, Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
@@ -243,7 +242,7 @@ class Solution:
     @cached_property
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
-        return ThetaQuotients(Theta(np.asarray(self.periods.riemann_matrix, dtype=np.float64)), self.frame)
+        return ThetaQuotients.of(np.asarray(self.periods.riemann_matrix, dtype=np.float64), self.frame)
 
     @cached_property
     def largest_period(self) -> float:

@@ -88,6 +88,11 @@ class Theta:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
         return centred_points(self._parts[2], float(np.sqrt(_EXPONENT / np.pi)))
 
+    @property
+    def cost(self) -> float:
+        """Return about the number of lattice terms, without forming them, and what their Gaussians and waves take."""
+        return self._coordinates.cost(self.T)
+
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
