@@ -351,12 +351,15 @@ def test_sigterm_ends_work_in_flight_after_its_grace(tmp_path: Path) -> None:
         assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
 
 
-def test_the_server_stays_small(server: Server) -> None:
-    """Resident memory of the server and one warm worker, idle: below 300 MB."""
+def test_the_server_stays_small(tmp_path: Path) -> None:
+    """Resident memory of a server of its own and its worker after the first answers: below 300 MB."""
 
     def resident(pid: int) -> float:
         line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS"))
         return float(line.split()[1]) / 1024
 
-    with_one_worker = resident(server.process.pid) + max(resident(worker) for worker in server.workers())
+    with running_server(tmp_path, workers="1") as own:
+        for engine in ("analytic", "numeric"):
+            assert post(own, "/v1/trajectories", {**GOOD, "engine": engine}).status_code == 200
+        with_one_worker = resident(own.process.pid) + max(resident(worker) for worker in own.workers())
     assert with_one_worker < 300
