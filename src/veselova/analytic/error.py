@@ -39,10 +39,10 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
     start = solution.start_rounding if method == "theta" else 0.0
-    phase = _PHASE * _EPSILON + start + rounding * elapsed[:, None] * frequencies
-    along_flow = rounding * elapsed + clock.error(tau1)
+    at_once = float(np.sum((_PHASE * _EPSILON + start) * steepness.by_phase))
+    with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
     evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
-    error = evaluation * _EPSILON + phase @ steepness.by_phase + steepness.along_flow * along_flow
+    error = evaluation * _EPSILON + at_once + with_time * elapsed + steepness.along_flow * clock.error(tau1)
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
         error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
     return np.asarray(error)

@@ -199,15 +199,16 @@ class _Filling:
         columns = [np.reshape(part, (count, NODES, -1)) / size for part, size in zip(series, sizes, strict=True)]
         table, tails = _in_time(rate.reshape(count, NODES), stretch, length, np.concatenate(columns, axis=2))
         settled = (tails <= _TAIL) | ((tails <= _NOISE_TAIL) & (tails > _STALLED * cells.tails))
-        widths = np.cumsum([part.shape[2] for part in columns])
+        borders = np.cumsum([1, *(part.shape[2] for part in columns)])
+        tables = [table[:, :, a:b] * size for a, b, size in zip(borders[:-1], borders[1:], sizes, strict=True)]
         wholes = [part.reshape(self._times.size, -1) for part in self._room(series)]
         for w in np.flatnonzero(settled):
             for first in range(cells.first[w], cells.last[w], _TIMES_IN_WINDOW):
                 rows = slice(first, min(first + _TIMES_IN_WINDOW, cells.last[w]))
-                values = _polynomials((self._times[rows] - cells.starts[w]) * (2 / length) - 1).T @ table[w]
-                self._tau1[rows] = tau1[w] + values[:, 0] * stretch[w]
-                for whole, size, end, width in zip(wholes, sizes, widths, np.diff(widths, prepend=0), strict=True):
-                    np.multiply(values[:, 1 + end - width : 1 + end], size, out=whole[rows])
+                polynomials = _polynomials((self._times[rows] - cells.starts[w]) * (2 / length) - 1).T
+                self._tau1[rows] = tau1[w] + (polynomials @ table[w, :, 0]) * stretch[w]
+                for whole, coefficients in zip(wholes, tables, strict=True):
+                    np.matmul(polynomials, coefficients[w], out=whole[rows])
             self._open[cells.first[w] : cells.last[w]] = False
             self._error[cells.first[w] : cells.last[w]] = 2 * tails[w] + _SUM_ROUNDING
         return replace(cells, tails=tails)[~settled]
