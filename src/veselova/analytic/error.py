@@ -27,6 +27,9 @@ _RATE = 4.0
 #: The same where they carry guard digits: 30 digits in the leading and the following double.
 _GUARDED_RATE = 1e-30
 
+#: Times at which the steepness of the attitude is looked at besides, near a separatrix.
+_ON_ORBIT = 24
+
 #: Rounding of the principal axes and of the data along them, in units of the conditioning floor.
 _AXES_ROUNDING = 8.0
 
@@ -34,6 +37,9 @@ _AXES_ROUNDING = 8.0
 def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock, method: str) -> Array:
     """Return a bound on every component of q and frame at each time, shape (N,)."""
     steepness = solution.steepness
+    if solution.near_separatrix:  # the frame turns within a hundredth of the torus, which a sample of it may miss
+        rows = np.linspace(0, times.size - 1, min(times.size, _ON_ORBIT)).astype(int)
+        steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
     frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.

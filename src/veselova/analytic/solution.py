@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
 
@@ -25,6 +24,7 @@ from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
+from veselova.analytic.steepness import Steepness
 from veselova.analytic.windows import NODES, Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
@@ -48,8 +48,7 @@ _LARGE_PERIOD = 8.0
 #: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
 _LARGE_CANCELLATION = 10.0
 
-#: Above genus three a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still
-#: give 1e-12, at a cost that grows as the gap closes, and theta sums are cheap up to genus three only.
+#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still give 1e-12.
 _NARROW_GAP_HIGH_GENUS = 1e-12
 
 #: Largest genus at which theta sums are taken there all the same.
@@ -65,19 +64,6 @@ _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 _SAMPLES = 48
 _FEW = 16
 _FEW_SAMPLES = 4
-
-
-@dataclass(frozen=True)
-class Steepness:
-    """The largest |∂(frame entry)/∂z_k|, shape (g,), and |d(frame entry)/dτ₁| along the flow."""
-
-    by_phase: Array
-    along_flow: float
-
-    @classmethod
-    def of(cls, slopes: Array, rates: Array) -> Steepness:
-        """Return it from derivatives in every phase, shape (N, n², g)."""
-        return cls(np.max(np.abs(slopes), axis=(0, 1)), float(np.max(np.abs(slopes @ rates))))
 
 
 class Solution:
@@ -228,7 +214,7 @@ class Solution:
         genus, rates = self.curve.genus, self.in_tau1.rates
         sample = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (_SAMPLES if genus <= _FEW else _FEW_SAMPLES, genus))
         if self.near_separatrix:
-            return Steepness.of(2 * self.quotients.slopes(np.concatenate([sample / np.pi, self._origin[None, :]])), rates)
+            return self.steepness_at(np.concatenate([sample / np.pi, self._origin[None, :]]))
         psi = np.concatenate([sample, self.start.angles[None, :]])
         to_angles = np.linalg.inv(self.inversion.jacobian(psi))
         if genus <= _FEW:
@@ -238,6 +224,10 @@ class Solution:
         slopes = 2 * self.frame.slopes(psi, to_angles @ np.column_stack([signs, rates]))
         spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
         return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
+
+    def steepness_at(self, z: Array) -> Steepness:
+        """Return the same at phases z (N, g), doubled too, near a separatrix."""
+        return Steepness.of(2 * self.quotients.slopes(z), self.in_tau1.rates)
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
