@@ -28,6 +28,8 @@ _LEAST_PART = Decimal("1e-30")
 #: A bracket over more than this is not one in which Newton's method converges quadratically.
 _WIDE_BRACKET = 1000
 
+#: Newton's method that changes less than this part of the distance converges, however wide the bracket.
+_CONVERGING = Decimal("1e-3")
 
 #: Iterations settle at this relative change, or at so many roundings; from there every plain Newton step doubles the digits.
 _SETTLED, _SETTLED_DIGITS = Decimal("1e-300"), 300
@@ -98,7 +100,7 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
         least, most = (own, most) if value > 0 else (least, own)
         new = own - value / derivative if derivative < 0 else 2 * most
         # Towards a nearly double zero at the pole Newton's method only halves the distance, which may be 1e-300.
-        slow = step % 4 == 3 and most > _WIDE_BRACKET * least
+        slow = step % 4 == 3 and most > _WIDE_BRACKET * least and abs(new - own) > _CONVERGING * own
         if slow or not (least <= new <= most and new > 0):
             new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
         change, own = abs(new - own), new
