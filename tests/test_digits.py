@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from decimal import Decimal
+from decimal import ROUND_DOWN, Context, Decimal, Inexact, localcontext
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -245,6 +245,20 @@ def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generat
         found = inversion.invert(inversion.map(psi))
         assert all(a.overlaps(b) for a, b in zip(found.ravel(), psi.ravel(), strict=True))
         assert max(float(a.rad()) for a in found.ravel()) < 1e-36
+
+
+def test_the_decimal_context_of_the_caller_plays_no_part() -> None:
+    context = Context(prec=3, rounding=ROUND_DOWN, Emin=-9, Emax=9, traps=[Inexact])
+    expected = vs.solve(body3(), [1, 2], digits=30).decimals
+    with localcontext(context):
+        frame = vs.solve(body3(), [1, 2]).frame
+        found = vs.solve(body3(), [1, 2], digits=30).decimals
+    assert np.array_equal(frame, vs.solve(body3(), [1, 2]).frame)
+    assert found is not None
+    assert expected is not None
+    for name, radii in expected.radii.items():
+        assert np.array_equal(found.midpoints[name], expected.midpoints[name]), name
+        assert np.array_equal(found.radii[name], radii), name
 
 
 def test_decimals_turn_into_numbers_of_both_libraries() -> None:

@@ -10,7 +10,7 @@ import math
 import operator
 import threading
 from collections.abc import Callable
-from decimal import Decimal
+from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -31,6 +31,9 @@ _EXTRA_TERMS = 6
 
 #: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
+
+#: Where radii are rounded, whatever the caller's context of decimals.
+_UPWARDS = Context(prec=12, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX)
 
 _global = threading.RLock()
 
@@ -229,7 +232,7 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     rounding = abs(middle - flint.arb(flint.fmpq(*rounded.as_integer_ratio())))
     radius = (x.rad() + rounding).abs_upper()
     # Six digits of a number printed to nearest, and one in the last of them on top.
-    return rounded, Decimal(radius.str(6, radius=False)) * Decimal("1.00001") if radius else Decimal(0)
+    return rounded, _UPWARDS.multiply(Decimal(radius.str(6, radius=False)), Decimal("1.00001")) if radius else Decimal(0)
 
 
 def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:

@@ -99,7 +99,7 @@ class EnclosedMotion:
         largest = max(decimals.error)
         if not largest.is_finite():
             return working
-        return self.digits + math.ceil(largest.log10()) if largest else 0
+        return self.digits + largest.adjusted() + 1 if largest else 0
 
     def _attempt(
         self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]

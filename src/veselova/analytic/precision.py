@@ -191,7 +191,7 @@ class Decimals:
 
     def __init__(self, digits: int) -> None:
         self.digits = digits
-        self.epsilon = decimal.Decimal(10) ** -digits
+        self.epsilon = decimal.Decimal((0, (1,), -digits))
         self._context = decimal.Context(prec=digits + _GUARD, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
         self._outer = decimal.Context()
 

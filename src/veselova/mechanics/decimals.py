@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -57,7 +57,7 @@ class Decimals:
         """Return the decimals with what follows from q_dot and frame: q = e_1, and ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊."""
         q, q_dot = midpoints["frame"][:, :, 0], midpoints["q_dot"]
         r, r_dot = radii["frame"][:, :, 0], radii["q_dot"]
-        with localcontext(prec=digits + _SPARE_DIGITS):
+        with localcontext(Context(prec=digits + _SPARE_DIGITS)):
             product = q[:, :, None] * q_dot[:, None, :]
             spread = np.abs(q)[:, :, None] * r_dot[:, None, :] + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
             omega, omega_radius = product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
