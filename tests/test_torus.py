@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from draws import random_problem
 from problems import tagged
-from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Veselova, solve, torus
+from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Unsolved, Veselova, solve, torus
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -94,6 +94,16 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(n: int, rng: n
         change = (actions[0] - actions[1]) / (2 * step)
         terms = 2 * np.pi * found.frequencies_tau1 * change
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
+
+
+@pytest.mark.parametrize("small", [1e-81, 1e-140])
+def test_narrow_intervals_whose_product_is_no_float_are_refused_by_name(small: float) -> None:
+    """Two directions that hardly move make two neighbouring cuts of such widths squared."""
+    problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
+    for ask in (torus, lambda problem: solve(problem, [1.0])):
+        with pytest.raises(Unsolved) as raised:
+            ask(problem)
+        assert raised.value.outcome == "beyond-floats"
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ On cut s the integral of a⁻¹(p_1…p_g) from b_{2s−1} is g_{s0}ψ + Σ_m g_
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,6 +19,7 @@ from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.interval import Interval
 from veselova.analytic.precision import Arithmetic, Values
+from veselova.mechanics.errors import Unsolved
 
 __all__ = ["Periods"]
 
@@ -51,6 +53,12 @@ class Periods(AngleSeries):
     def gaps(self) -> tuple[Interval, ...]:
         """Return the gaps s = 0…g−1."""
         return tuple(Interval(self.curve, 2 * s) for s in range(self.genus))
+
+    def require_moduli(self) -> None:
+        """Raise Unsolved where k'² of an interval, which has the widths of both its neighbours as factors, is no double."""
+        if any(interval.jacobi.complement < sys.float_info.min for interval in (*self.cuts, *self.gaps)):
+            reason = "two of the narrow intervals beside one another have widths whose product leaves the range of a float"
+            raise Unsolved("beyond-floats", reason)
 
     @property
     def narrowest_gap(self) -> float:

@@ -80,6 +80,7 @@ class Solution:
         self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
         self.curve = Curve.of(self.spectrum, DOUBLE)
         self.periods = Periods(self.curve)
+        self.periods.require_moduli()
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, self.start.signs)
