@@ -59,6 +59,15 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
     return found
 
 
+def test_only_tori_that_are_computed_together_come_in_large_chunks() -> None:
+    """A second or so of work for either kind: a frame makes every problem one of its own."""
+    stated = {"system": "veselova", "A": [2, 1], "q": [1, 0], "q_dot": [0, 1]}
+    together, single = (
+        request(problem={**stated, **more}, vary={"/A/0": [2, 3]}, samples=1) for more in ({}, {"frame": [[1, 0], [0, 1]]})
+    )
+    assert together.chunk_rows > 4 * single.chunk_rows
+
+
 def test_axes_are_combined_and_the_last_runs_fastest() -> None:
     sweep = request(vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1)
     assert sweep.shape == (2, 3)

@@ -221,7 +221,8 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        rows = _CHUNK_TORI if self.tori_at_once and self._states_doubles else _CHUNK_ROWS
+        together = self.tori_at_once and self._states_doubles and "frame" not in self.problem.model_dump(exclude_none=True)
+        rows = _CHUNK_TORI if together else _CHUNK_ROWS
         return max(1, min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
 
     @property
