@@ -1,4 +1,4 @@
-"""``veselova bench``: how fast this machine is, in half a minute, as a table that can be pasted.
+"""``veselova bench``: how fast this machine is, in some ten seconds, as a table that can be pasted.
 
 Every line is one question, answered by the closed form and by its peer in the same process; the scripts in ``benchmarks/``
 ask more.
