@@ -37,7 +37,12 @@ class ThetaQuotients:
 
     @classmethod
     def of(cls, T: Array, frame: Frame) -> ThetaQuotients:
-        """Return the route in double precision; raises Unsolved (``too-many-terms``) where its tables would fill the memory."""
+        """Return the route in double precision.
+
+        Raises Unsolved where its tables would fill the memory (``too-many-terms``), or where T leaves the range of floats.
+        """
+        if not (np.all(np.isfinite(T)) and np.linalg.eigvalsh(T)[0] > 0):
+            raise Unsolved("beyond-floats", "periods leave the range of a float: the A's are too far apart")
         theta, functions = Theta(T), len(T) * (len(T) + 3) + 1
         if not theta.cost * functions <= _MOST_TERMS:
             most = f"{_MOST_TERMS:.0e} can be kept; angles serve at any n"
