@@ -8,6 +8,7 @@ import pytest
 from draws import random_problem
 from problems import TABLE, Case, tagged
 from veselova import NeumannSystem, solve
+from veselova.analytic.costs import Costs
 from veselova.analytic.solve import solve as solve_analytic
 
 #: The stated slack of every error estimate.
@@ -75,3 +76,13 @@ def test_the_clock_is_chosen_by_what_it_costs() -> None:
         estimates = found.provenance.details["clock_estimates"]
         assert found.provenance.details["clock"] == min(estimates, key=estimates.__getitem__)
     assert near.provenance.details["clock"] == "panels"
+
+
+def test_panels_are_the_cheaper_clock_of_any_high_dimension() -> None:
+    """Modes of the Fourier clock at n = 1000 are beyond any float, and so is det T at times."""
+    costs = Costs(genus=999, log_determinant=-500.0, cycles=10.0)
+    assert costs.modes > 1e25
+    assert costs.seconds("fourier", 10) == np.inf
+    assert costs.cheaper_clock(inversions=10) == "panels"
+    assert costs.fewest_in_window(32, "fourier") >= 4
+    assert costs.fewest_in_window(32, "panels") >= 4

@@ -30,6 +30,9 @@ _EXPONENT = 36.0
 _BODY = {1: 1.0, 2: 1.25, 3: 1.07, 4: 0.67}
 _HIGH_BODY = 0.29
 
+#: Modes of a clock that nobody takes: e to this, and no more are counted.
+_LARGEST_EXPONENT = 70.0
+
 #: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
 _MODE_INVERTED, _INVERSION = 0.13e-6, 1e-6
@@ -43,18 +46,17 @@ _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 2.0
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of an orbit with Riemann matrix iT, ``determinant`` = det T, over so many cycles of its fastest phase."""
+    """The costs of an orbit with Riemann matrix iT, ``log_determinant`` = log det T, over so many cycles of its fastest phase."""
 
     genus: int
-    determinant: float
+    log_determinant: float
     cycles: float
 
     @property
     def modes(self) -> float:
         """Return about how many modes the Fourier clock has."""
-        if not self.determinant > 0:
-            return math.inf
-        return _BODY.get(self.genus, _HIGH_BODY) * (_EXPONENT / math.pi) ** self.genus / self.determinant
+        exponent = self.genus * math.log(_EXPONENT / math.pi) - self.log_determinant
+        return _BODY.get(self.genus, _HIGH_BODY) * math.exp(exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT)
 
     def fewest_in_window(self, nodes: int, clock: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""

@@ -24,8 +24,9 @@ __all__ = ["ThetaQuotients"]
 
 Array = NDArray[np.float64]
 
-#: Terms of all functions together: 4 GB of tables.
+#: Terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
 _MOST_TERMS = 2.5e8
+_LARGEST_GENUS = 18
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,10 @@ class ThetaQuotients:
         if not (np.all(np.isfinite(T)) and np.linalg.eigvalsh(T)[0] > 0):
             raise Unsolved("beyond-floats", "periods leave the range of a float: the A's are too far apart")
         theta, functions = Theta(T), len(T) * (len(T) + 3) + 1
-        if not theta.cost * functions <= _MOST_TERMS:
-            most = f"{_MOST_TERMS:.0e} can be kept; angles serve at any n"
-            raise Unsolved(
-                "too-many-terms", f"n = {len(T) + 1}: {functions} theta functions of some {theta.cost:.1e} terms; {most}"
-            )
+        terms = theta.cost if len(T) <= _LARGEST_GENUS else np.inf
+        if not terms * functions <= _MOST_TERMS:
+            wanted = f"n = {len(T) + 1} takes {functions} theta functions of {min(terms, 1e11):.1e} terms or more"
+            raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
         return cls(theta, frame)
 
     @cached_property

@@ -185,11 +185,12 @@ class Solution:
 
     def costs(self, times: Array) -> Costs:
         """Return what the clocks cost for given times."""
-        return Costs(self.curve.genus, self._determinant, self.cycles(times))
+        return Costs(self.curve.genus, self._log_determinant, self.cycles(times))
 
     @cached_property
-    def _determinant(self) -> float:
-        return float(np.linalg.det(self.periods.riemann_matrix))
+    def _log_determinant(self) -> float:
+        sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
+        return float(logarithm) if sign > 0 else -np.inf
 
     def clock_estimates(self, times: Array) -> dict[str, float]:
         """Return the seconds that either clock was thought to take, those out of the question left out."""
