@@ -10,10 +10,13 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["GUARDED_FROM", "PANEL_CYCLES", "Costs"]
+__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs"]
 
 #: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
 GUARDED_FROM = 200.0
+
+#: Digits of the frequencies then.
+GUARD_DIGITS = 30
 
 #: Cycles that panels are willing to cover: minutes.
 PANEL_CYCLES = 5e4

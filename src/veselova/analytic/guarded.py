@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import ClockRate
+from veselova.analytic.costs import GUARD_DIGITS
 from veselova.analytic.curve import Curve
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.periods import Periods
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["GUARD_DIGITS", "guarded_flows"]
+__all__ = ["guarded_flows"]
 
-#: Digits of the frequencies, and those that balls may lose on the way to them.
-GUARD_DIGITS, _SPARE = 30, 6
+#: Digits that balls may lose on the way to the frequencies.
+_SPARE = 6
 
 
 def guarded_flows(spectrum: Spectrum, origin: NDArray[np.float64], time: str) -> tuple[LinearFlow, LinearFlow, float]:

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 
-__all__ = ["Coordinates", "centred_points", "lattice_points", "schur", "small_norm"]
+__all__ = ["RADIUS", "Coordinates", "centred_points", "lattice_points", "schur", "small_norm"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Terms below e^(−39) = 1e-17 of the largest do not count when splits are compared.
-_EXPONENT = 39.0
+#: Radius, in the norm of T or T⁻¹, of the terms above e^(−39) = 1e-17 of the largest; the others are left out.
+RADIUS = math.sqrt(39.0 / math.pi)
 
 #: Least eigenvalue of S for waves: there θ(z)/θ(0) stays above ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| = 0.42^|F|.
 _WAVE_FLOOR = 0.5
@@ -69,11 +69,11 @@ class Coordinates:
 
     def cost(self, T: Array) -> float:
         """Return the terms of a value, by volume, with what Gaussians and waves take; infinite where waves cancel."""
-        F, G, radius = list(self.waves), self.gaussians, math.sqrt(_EXPONENT / math.pi)
+        F, G = list(self.waves), self.gaussians
         S, _, inverse = schur(np.asarray(self.form(T)), F, G)
         if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
             return math.inf
-        bells, waves = _points(inverse, _spreads(inverse, radius)), _points(S, np.full(len(F), radius))
+        bells, waves = _points(inverse, _spreads(inverse)), _points(S, np.full(len(F), RADIUS))
         return bells * waves + _BELL * bells + (_WAVE * waves if F else 0.0)
 
     def form(self, T: Any) -> Any:
@@ -118,10 +118,10 @@ def _points(form: Array, radii: Array) -> float:
     return max(1.0, float(ball * np.prod(radii) / np.sqrt(np.linalg.det(form))))
 
 
-def _spreads(form: Array, radius: float) -> Array:
+def _spreads(form: Array) -> Array:
     """Return how far centred points reach along each Gram–Schmidt vector, along which r of the cell reaches ``half``."""
     half = np.sum(np.abs(np.linalg.cholesky(form)), axis=0) / 2 if len(form) else np.empty(0)
-    return np.asarray(half + np.sqrt(half**2 + radius**2))
+    return np.asarray(half + np.sqrt(half**2 + RADIUS**2))
 
 
 def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:

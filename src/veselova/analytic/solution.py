@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
-from veselova.analytic.costs import GUARDED_FROM, PANEL_CYCLES, Costs
+from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
@@ -54,7 +54,7 @@ _NARROW_GAP_HIGH_GENUS = 1e-12
 #: Largest genus at which theta sums are taken there all the same.
 _SEPARATRIX_GENUS = 7
 
-#: Cycles from which guarded frequencies, of 30 digits, leave none of the phases.
+#: Cycles from which guarded frequencies leave no digit of the phases.
 _MOST_CYCLES = 1e28
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
@@ -155,7 +155,8 @@ class Solution:
         """
         cycles, guarded = self.cycles(times), self.is_guarded(times)
         if not cycles <= _MOST_CYCLES:
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to 30 digits")
+            known = f"frequencies are known to {GUARD_DIGITS} digits"
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; {known}")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None and self.near_separatrix:

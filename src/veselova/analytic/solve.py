@@ -71,7 +71,7 @@ def solve(
         return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
         motion = _TorusMotion(problem, method, clock)
-        if solution is not None:
+        if solution is not None:  # no field of the motion: pickling leaves behind what can be computed again
             vars(motion)["_solution"] = solution
         return motion(grid)
     if certified and method == "theta":

@@ -23,14 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import Coordinates, centred_points, lattice_points, schur, small_norm
+from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, lattice_points, schur, small_norm
 
 __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
-
-#: Terms below e^(−39) = 1e-17 of the largest are left out.
-_EXPONENT = 39.0
 
 #: e^(−π·200) = 1e-273: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
 _VANISHING = 200.0
@@ -86,7 +83,7 @@ class Theta:
     @cached_property
     def _gaussian_lattice(self) -> Array:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
-        return centred_points(self._parts[2], float(np.sqrt(_EXPONENT / np.pi)))
+        return centred_points(self._parts[2], RADIUS)
 
     @property
     def cost(self) -> float:
@@ -102,7 +99,7 @@ class Theta:
         """Return one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all of them small."""
         S = self._parts[0]
         shift = np.array([epsilon[i] / 2 for i in self._split[0]])
-        x = lattice_points(S, np.sqrt(_EXPONENT / np.pi + small_norm(S, shift)), shift)
+        x = lattice_points(S, np.sqrt(RADIUS**2 + small_norm(S, shift)), shift)
         # The first coordinate that is not zero decides.
         leading = x[np.arange(len(x)), np.argmax(x != 0, axis=1)] if x.shape[1] else np.zeros(1)
         return np.asarray(x[leading >= 0])
