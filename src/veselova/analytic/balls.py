@@ -10,7 +10,7 @@ import math
 import operator
 import threading
 from collections.abc import Callable
-from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -32,8 +32,13 @@ _EXTRA_TERMS = 6
 #: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
 
-#: Where radii are rounded, whatever the caller's context of decimals.
-_UPWARDS = Context(prec=12, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX)
+#: Where midpoints are formed, and radii rounded, whatever the caller's context of decimals.
+_EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX)
+_UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX)
+
+#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero.
+_UNASKED_DIGITS = 5
+_UNASKED = 10**_UNASKED_DIGITS
 
 _global = threading.RLock()
 
@@ -139,7 +144,7 @@ class Balls(Arithmetic):
 
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
         """Return (midpoints rounded to so many significant digits, radii that cover the rounding), arrays of Decimal."""
-        pairs = np.frompyfunc(lambda x: _decimal(flint.arb(x), digits), 1, 2)(values)
+        pairs = np.frompyfunc(lambda x: _decimal(x, digits), 1, 2)(values)
         return np.asarray(pairs[0], dtype=object), np.asarray(pairs[1], dtype=object)
 
     def sine_sums(self, coefficients: Values) -> Sums:
@@ -171,11 +176,8 @@ class Balls(Arithmetic):
 
     @staticmethod
     def _array(matrix: Any) -> Values:
-        rows = matrix.tolist()
-        result = np.empty((matrix.nrows(), matrix.ncols()), dtype=object)
-        for i, row in enumerate(rows):
-            result[i, :] = row
-        return result
+        entries = np.fromiter(matrix.entries(), dtype=object, count=matrix.nrows() * matrix.ncols())
+        return entries.reshape(matrix.nrows(), matrix.ncols())
 
 
 class _Series:
@@ -225,14 +227,18 @@ _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
 def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
+    """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many digits."""
+    x = flint.arb(x)
     if not x.is_finite():
         return Decimal(0), Decimal("Infinity")
-    middle = x.mid()
-    rounded = Decimal(middle.str(digits, radius=False))
-    rounding = abs(middle - flint.arb(flint.fmpq(*rounded.as_integer_ratio())))
-    radius = (x.rad() + rounding).abs_upper()
-    # Six digits of a number printed to nearest, and one in the last of them on top.
-    return rounded, _UPWARDS.multiply(Decimal(radius.str(6, radius=False)), Decimal("1.00001")) if radius else Decimal(0)
+    middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
+    rounded = (middle + _UNASKED // 2) // _UNASKED
+    radius += abs(middle - rounded * _UNASKED)
+    return _decimal_of(rounded, exponent + _UNASKED_DIGITS, _EXACT), _decimal_of(radius, exponent, _UPWARDS)
+
+
+def _decimal_of(mantissa: int, exponent: int, context: Context) -> Decimal:
+    return context.create_decimal(mantissa).scaleb(exponent, context) if mantissa else Decimal(0)
 
 
 def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:

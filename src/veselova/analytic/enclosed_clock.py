@@ -40,8 +40,8 @@ _SAMPLED_PANELS = 200
 #: nodes are taken where they are larger.
 _NEARLY, _MORE = 1e3, 1.25
 
-#: Newton's steps double the digits from those of a double.
-_FIRST_DIGITS = 10
+#: Newton's steps double the digits from those of a double, but for what they lose.
+_FIRST_DIGITS, _LOST_DIGITS = 12, 2
 
 #: Part of the slope at the approximate root that is certain next to it.
 _SLOPE = 0.5
@@ -138,11 +138,18 @@ def expected_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
     return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
 
 
+def _doublings(digits: int) -> list[int]:
+    """Return the digits of Newton's steps from a double to the one before the last."""
+    half = math.ceil(digits / 2) + _LOST_DIGITS
+    return [*_doublings(half), half] if half > _FIRST_DIGITS else []
+
+
 @dataclass(frozen=True)
 class _Panels:
     """Series in cos mθ of dt/dx on panels x = centre − half·cos θ from 0 on, x = |τ₁|.
 
-    rates (P, N) · truncation (P,) what they leave out · steepest: a bound of |d²t/dx²|, None where there is none
+    rates (P, N) · truncation (P,) what they leave out · steepest: a bound of |d²t/dx²|, None where there is none but that of the
+    series, |dT_m/dx| ≤ m²/half
     """
 
     arithmetic: Any
@@ -151,6 +158,16 @@ class _Panels:
     rates: Values
     truncation: Values
     steepest: Any
+
+    @property
+    def _certified(self) -> bool:
+        return self.steepest is not None
+
+    @cached_property
+    def _steepness(self) -> Values:
+        if self._certified:
+            return np.full(len(self.rates), self.steepest)
+        return np.asarray(self.arithmetic.at_most(self.rates) @ np.arange(self.rates.shape[1]) ** 2 / self.half)
 
     @cached_property
     def _waves(self) -> Values:
@@ -176,25 +193,30 @@ class _Panels:
         return result
 
     def _roots_on(self, p: int, times: Values, approximate: NDArray[np.float64]) -> Values:
-        """Newton's method on midpoints, then the residual over the least slope."""
+        """Newton's method on midpoints, then one step in intervals."""
         xp, left, right = self.arithmetic, self.centres[p] - self.half, self.centres[p] + self.half
         constant = self._ends[p] - np.sum(self._waves[p])
-        primitive, rates = np.concatenate([[constant], self._waves[p]]), np.concatenate([self.rates[p], xp.array([0])])
-        series = xp.cosine_sums(np.stack([primitive, rates], axis=1)[None])
+        values = xp.cosine_sums(np.concatenate([[constant], self._waves[p]])[None, :, None])
+        rates = xp.cosine_sums(self.rates[p][None, :, None])
 
-        def clock(x: Values) -> tuple[Values, Values]:
-            theta = 2 * xp.atan2(xp.sqrt(x - left), xp.sqrt(right - x))
-            value, rate = series(theta[:, None])[:, :, 0].T
+        def clock(x: Values, digits: int) -> tuple[Values, Values]:
+            """Return t and dt/dx; a slope of half the digits doubles those of a root."""
+            theta = 2 * xp.atan2(xp.sqrt(x - left), xp.sqrt(right - x))[:, None]
+            with xp.at(digits):
+                value = values(theta)[:, 0, 0]
+            with xp.at(digits // 2):
+                rate = rates(theta)[:, 0, 0]
             return xp.widened(value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
 
         lowest, highest = xp.midpoints(xp.array([left, right]))
         x = xp.array(np.clip(approximate, float(lowest), float(highest)))
-        for _ in range(1 + math.ceil(math.log2(xp.digits / _FIRST_DIGITS))):
-            value, rate = clock(x)
+        for digits in _doublings(xp.digits):
+            value, rate = clock(x, digits)
             x = xp.midpoints(x - (value - times) / rate)
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
-        value, rate = clock(x)
+        value, rate = clock(x, xp.digits)
         reach = xp.around_zero((value - times) / (_SLOPE * rate))
-        if self.steepest is not None and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * rate)):
+        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * rate)):
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
-        return np.asarray(x + reach)
+        # The root is x less the residual over a slope between the two.
+        return np.asarray(x - (value - times) / xp.widened(rate, reach * self._steepness[p]))

@@ -1,12 +1,13 @@
 """Theta functions in balls: the sums of analytic.theta to any number of digits.
 
-Every term is a constant times powers of a few numbers that depend on z, one for each coordinate, so a block of points costs a
-table of powers and one product of matrices for each characteristic.
+Every term is a constant times powers of a few numbers that depend on z, one for each coordinate. Characteristics with the same
+Gaussians and waves share one product of matrices: ε_G only gives signs to classes of k, δ_F only quarter turns to the waves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import Coordinates, centred_points, lattice_points, small_norm
+from veselova.analytic.lattice import Coordinates, centred_points, half_of, lattice_points, small_norm
 from veselova.analytic.precision import Values
 from veselova.mechanics.errors import Unsolved
 
@@ -36,7 +37,7 @@ class EnclosedTheta:
         self._xp, self._coordinates = arithmetic, Coordinates.cheapest(_symmetric(T))
         self._T = self._coordinates.form(T)
         self._F, self._G = list(self._coordinates.waves), self._coordinates.gaussians
-        self._constants: dict[Characteristic, tuple[Values, Values]] = {}
+        self._crossings: dict[tuple[int, ...], tuple[NDArray[np.int64], Values]] = {}
         if self.size > _MOST_TERMS:
             raise Unsolved("narrow-gap", f"theta sums of {arithmetic.digits} digits would have {self.size} terms at this gap")
 
@@ -48,7 +49,7 @@ class EnclosedTheta:
     @property
     def size(self) -> int:
         """Return the number of terms for characteristic zero."""
-        return len(self._gaussian_lattice) * len(self._wave_lattice((0,) * self.genus))
+        return len(self._gaussian_lattice) * len(self._wave_lattice((0,) * len(self._F)))
 
     @cached_property
     def _parts(self) -> tuple[Values, Values, Values]:
@@ -68,38 +69,66 @@ class EnclosedTheta:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
         return centred_points(_symmetric(self._parts[2]), self._radius).astype(np.int64)
 
-    def _wave_lattice(self, epsilon: tuple[int, ...]) -> NDArray[np.int64]:
-        """Return 2x for the x that matter, shape (X, |F|)."""
-        S, shift = _symmetric(self._parts[0]), np.array([epsilon[i] / 2 for i in self._F])
-        x = lattice_points(S, float(np.sqrt(self._radius**2 + small_norm(S, shift))), shift)
-        return np.rint(2 * x).astype(np.int64)
+    def _wave_lattice(self, epsilon_F: tuple[int, ...]) -> NDArray[np.int64]:
+        """Return 2x for one of each pair ±x that matters, shape (X, |F|)."""
+        S, shift = _symmetric(self._parts[0]), np.array(epsilon_F) / 2
+        x = np.rint(2 * lattice_points(S, float(np.sqrt(self._radius**2 + small_norm(S, shift))), shift)).astype(np.int64)
+        return np.asarray(half_of(x))
 
     def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
         """Return θ[ε;δ](z)·√det T_GG at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
 
         The first characteristic must be zero: what the sums leave out is measured against its values, which have no zeros.
         """
-        xp, result = self._xp, np.empty((len(z), len(characteristics)), dtype=object)
-        bells: dict[tuple[int, ...], tuple[Values, Values, Values]] = {}
-        turns: dict[tuple[Any, ...], tuple[Values, Values]] = {}
-        z = self._coordinates.points(z)
-        for index, given in enumerate(characteristics):
-            characteristic, sign = self._coordinates.characteristic(given)
-            delta = tuple(characteristic.delta[i] for i in self._G)
-            if delta not in bells:
-                bells[delta] = self._bells(z, delta)
-            bell, r, nearest = bells[delta]
-            epsilon = tuple(characteristic.epsilon[i] for i in self._F)
-            if (delta, epsilon) not in turns:
+        xp, F, G = self._xp, self._F, self._G
+        result, z = np.empty((len(z), len(characteristics)), dtype=object), self._coordinates.points(z)
+        for delta_G, families in self._families(characteristics).items():
+            bells, r, nearest = self._bells(z, delta_G)
+            turns = xp.turns((z[:, F] - (r @ self._parts[1].T if F and G else 0)) / 2)
+            for epsilon, members in families.items():
+                x, table = self._crossing(epsilon)
+                products = [xp.product(bells[:, rows], table[rows]).T for _, rows in self._classes]
                 # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
-                phases = z[:, self._F] - (r @ self._parts[1].T if self._G and self._F else 0)
-                turns[delta, epsilon] = xp.waves(self._wave_lattice(characteristic.epsilon), xp.turns(phases / 2))
-            cosines, sines = turns[delta, epsilon]
-            real, imaginary = self._table(characteristic)
-            sums = np.sum(cosines.T * xp.product(bell, real) - sines.T * xp.product(bell, imaginary), axis=1)
-            odd = np.array(nearest @ np.array([characteristic.epsilon[i] for i in self._G], dtype=int), dtype=float) % 2
-            result[:, index] = sign * (np.where(odd == 1, -sums, sums) if self._G else sums)
+                cosines, sines = xp.waves(x, turns)
+                waves = np.stack([cosines, -sines, -cosines, sines]) if F else None
+                for place, characteristic, sign in members:
+                    sums = sign * self._sums(characteristic, products, waves, x)
+                    odd = np.array(nearest @ [characteristic.epsilon[i] for i in G], dtype=float) % 2 == 1 if G else False
+                    result[:, place] = np.where(odd, -sums, sums)
         return np.asarray(xp.widened(result, np.abs(result[:, :1]) * xp.epsilon))
+
+    def _sums(self, characteristic: Characteristic, products: list[Values], waves: Values | None, x: NDArray[np.int64]) -> Values:
+        """Return the sums of a characteristic, (N,), from the products of its family and its waves c, −s, −c, s, (4, X, N)."""
+        epsilon_G, delta_F = (
+            np.array([of[i] for i in places], dtype=np.int64)
+            for of, places in ((characteristic.epsilon, self._G), (characteristic.delta, self._F))
+        )
+        signed = [
+            -product if parity @ epsilon_G % 2 else product for (parity, _), product in zip(self._classes, products, strict=True)
+        ]
+        weighted = np.sum(signed, axis=0)
+        if waves is None:
+            return np.asarray(weighted[0])
+        count, quarters = len(x), x @ delta_F
+        real, imaginary = (waves[(quarters + turn) % 4, np.arange(count)] for turn in (0, 3))
+        return np.asarray(np.sum(real * weighted[:count] - imaginary * weighted[count:], axis=0))
+
+    def _families(
+        self, characteristics: Sequence[Characteristic]
+    ) -> Mapping[tuple[int, ...], Mapping[tuple[int, ...], list[tuple[int, Characteristic, int]]]]:
+        """Return the places, characteristics in these coordinates and signs, by δ_G and then by ε_F."""
+        families: dict[Any, dict[Any, list[tuple[int, Characteristic, int]]]] = defaultdict(lambda: defaultdict(list))
+        for place, given in enumerate(characteristics):
+            local, sign = self._coordinates.characteristic(given)
+            delta_G, epsilon_F = tuple(local.delta[i] for i in self._G), tuple(local.epsilon[i] for i in self._F)
+            families[delta_G][epsilon_F].append((place, local, sign))
+        return families
+
+    @cached_property
+    def _classes(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Return the parities of k that there are, (|G|,), each with its places on the Gaussian lattice."""
+        parities, which = np.unique(self._gaussian_lattice % 2, axis=0, return_inverse=True)
+        return [(parity, np.flatnonzero(which.ravel() == place)) for place, parity in enumerate(parities)]
 
     def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values]:
         """Return (e^{−π rᵀT_GG⁻¹r + 2π kᵀT_GG⁻¹r}, r, n) with y_G = n + r, k on the Gaussian lattice."""
@@ -113,26 +142,22 @@ class EnclosedTheta:
         heights = xp.powers(self._gaussian_lattice, xp.exp(2 * xp.pi * projected))
         return (heights * xp.exp(-xp.pi * np.sum(projected * r, axis=1))).T, r, nearest
 
-    def _table(self, characteristic: Characteristic) -> tuple[Values, Values]:
-        """Return e^{−πxᵀSx − πkᵀT_GG⁻¹k} (−1)^{2k·ε_G} e^{2πi x·(Ck + δ_F)}, real and imaginary parts, shape (K, X)."""
-        if characteristic in self._constants:
-            return self._constants[characteristic]
-        xp, (S, C, inverse) = self._xp, self._parts
-        k, x = self._gaussian_lattice, self._wave_lattice(characteristic.epsilon)
-        weights = np.ones((len(k), len(x)), dtype=object)
-        if self._G:
-            signs = 1 - 2 * ((k @ np.array([characteristic.epsilon[i] for i in self._G], dtype=np.int64)) % 2)
-            weights = weights * (signs * xp.exp(-xp.pi * np.sum((k @ inverse) * k, axis=1)))[:, None]
-        if self._F:
-            weights = weights * xp.exp(-xp.pi * np.sum((x @ S) * x, axis=1) / 4)
-            delta = xp.array([xp.number(characteristic.delta[i]) / 2 for i in self._F])
-            phases = (k @ C.T if self._G else xp.array(np.zeros((1, len(self._F))))) + delta
-            cosines, sines = xp.waves(x, xp.turns(phases / 2))
-            table = weights * cosines.T, weights * sines.T
-        else:
-            table = xp.array(weights), xp.array(np.zeros(weights.shape))
-        self._constants[characteristic] = table
-        return table
+    def _crossing(self, epsilon_F: tuple[int, ...]) -> tuple[NDArray[np.int64], Values]:
+        """Return 2x of the waves, one of each pair ±x, and the real and imaginary parts of
+
+        w_x e^{−πxᵀSx − πkᵀT_GG⁻¹k} e^{2πi x·Ck}, w = 1 at zero and 2 elsewhere, side by side, shape (K, 2X).
+        """
+        if epsilon_F not in self._crossings:
+            xp, (S, C, inverse) = self._xp, self._parts
+            k, x = self._gaussian_lattice, self._wave_lattice(epsilon_F)
+            bells = xp.exp(-xp.pi * np.sum((k @ inverse) * k, axis=1))[:, None] if self._G else xp.array([[1]])
+            weights = bells * (xp.exp(-xp.pi * np.sum((x @ S) * x, axis=1) / 4) if self._F else 1)
+            weights = weights * np.where(np.any(x != 0, axis=1), 2, 1)
+            cosines, sines = weights, 0 * weights
+            if self._F and self._G:
+                cosines, sines = (weights * wave.T for wave in xp.waves(x, xp.turns((k @ C.T) / 2)))
+            self._crossings[epsilon_F] = x, np.concatenate([cosines, sines], axis=1)
+        return self._crossings[epsilon_F]
 
 
 def _symmetric(form: Values) -> Array:

@@ -14,11 +14,18 @@ from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.analytic.spectrum import Resolved, Spectrum, tangent
 from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.spheroconic import to_spheroconic
 
 __all__ = ["enclosed", "resting_spheroconic", "spheroconic"]
 
 #: Digits of the balls against those in which the zeros were found: differences of nearby zeros and poles enter what follows.
 _FINER = 2
+
+#: Digits of zeros found in double precision.
+_DOUBLE_DIGITS = 12
+
+#: How much more than perturbation theory a step in intervals may leave open.
+_ROOM = 16
 
 #: Newton's steps from the zeros found to those digits.
 _STEPS = 2
@@ -45,11 +52,43 @@ def enclosed(found: Resolved) -> Spectrum:
 
 
 def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
-    """Return the λ's of positions q (N, m), shape (N, m−1): eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹."""
-    poles = [xp.rational(x) for x in inverse]
-    middles = [_zeros_of_position(poles, [xp.rational(x) ** 2 for x in row], _FINER * xp.digits) for row in q]
-    radius = 4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon
-    return np.asarray(xp.widened(xp.array(middles).reshape(len(q), -1), (radius * inverse[-1])[:, None]))
+    """Return the λ's of positions q (N, m), shape (N, m−1): the zeros of Σ q_i² Π_{k≠i}(λ−I_k), all positions at once.
+
+    They are eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹: where an interval Newton step cannot show as much,
+    as it cannot where two nearly meet, they are found one position at a time.
+    """
+    coefficients = (q * q) @ _products_of_others(inverse, xp)
+    zeros = xp.array(to_spheroconic(1 / inverse.astype(float), q.astype(float)))
+
+    def polynomial(x: Values) -> tuple[Values, Values]:
+        value, slope = coefficients[:, -1:], np.zeros((len(q), 1), dtype=object)
+        for k in range(coefficients.shape[1] - 2, -1, -1):
+            value, slope = value * x + coefficients[:, k : k + 1], slope * x + value
+        return value, slope
+
+    digits = _DOUBLE_DIGITS
+    while digits < xp.digits:
+        value, slope = polynomial(zeros)
+        zeros, digits = xp.midpoints(zeros - xp.midpoints(value) / xp.midpoints(slope)), 2 * digits
+    radius = (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
+    around = zeros + xp.around_zero(_ROOM * radius)[:, None]
+    step = zeros - polynomial(zeros)[0] / polynomial(around)[1]
+    for row in [row for row in range(len(q)) if not xp.inside(step[row], around[row])]:
+        poles = [xp.rational(x) for x in inverse]
+        middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
+        step[row] = xp.widened(xp.array(middle), radius[row])
+    return np.asarray(step)
+
+
+def _products_of_others(inverse: Values, xp: Any) -> Values:
+    """Return the coefficients of Π_{k≠i}(λ−I_k), lowest first, shape (m, m)."""
+    rows = []
+    for i in range(len(inverse)):
+        row = xp.array([1])
+        for other in np.delete(inverse, i):
+            row = np.concatenate([[0], row]) - other * np.concatenate([row, [0]])
+        rows.append(row)
+    return np.stack(rows)
 
 
 def resting_spheroconic(moving: Moving, xp: Balls) -> Values:

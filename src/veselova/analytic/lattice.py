@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 
-__all__ = ["RADIUS", "Coordinates", "centred_points", "lattice_points", "schur", "small_norm"]
+__all__ = ["RADIUS", "Coordinates", "centred_points", "half_of", "lattice_points", "schur", "small_norm"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -181,3 +181,10 @@ def lattice_points(form: Array, radius: float, shift: Array) -> Array:
         left = np.maximum(left[parent] - (upper[i, i] * (x - centre[parent])) ** 2, 0.0)
         points = np.column_stack([x, points[parent]])
     return points
+
+
+def half_of(points: Any) -> Any:
+    """Return one of each pair ±x of points (K, d): that whose first coordinate beside zero is positive, and zero itself."""
+    if not points.shape[1]:
+        return points
+    return points[points[np.arange(len(points)), np.argmax(points != 0, axis=1)] >= 0]

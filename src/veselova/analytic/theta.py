@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, lattice_points, schur, small_norm
+from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, half_of, lattice_points, schur, small_norm
 
 __all__ = ["Theta"]
 
@@ -99,10 +99,7 @@ class Theta:
         """Return one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all of them small."""
         S = self._parts[0]
         shift = np.array([epsilon[i] / 2 for i in self._split[0]])
-        x = lattice_points(S, np.sqrt(RADIUS**2 + small_norm(S, shift)), shift)
-        # The first coordinate that is not zero decides.
-        leading = x[np.arange(len(x)), np.argmax(x != 0, axis=1)] if x.shape[1] else np.zeros(1)
-        return np.asarray(x[leading >= 0])
+        return np.asarray(half_of(lattice_points(S, np.sqrt(RADIUS**2 + small_norm(S, shift)), shift)))
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
