@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.enclosed_windows import expected_terms
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -30,8 +31,8 @@ _NODES_PER_DIGIT = 2.6
 #: Nodes that a clock is willing to evaluate: minutes.
 _MOST_NODES = 100_000
 
-#: Nodes per panel in double precision that show how fast series fall, and the digits down to which they do.
-_SAMPLE, _SAMPLE_DIGITS = 64, 11
+#: Nodes per panel in double precision that show how fast series fall.
+_SAMPLE = 64
 
 #: Panels looked at for that.
 _SAMPLED_PANELS = 200
@@ -114,12 +115,7 @@ class EnclosedClock:
         tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
         values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), _SAMPLE)
-        series = np.abs(DOUBLE.cosine_series(values)) / np.abs(values[:, :1])
-        # The largest coefficient from each on: a falling bound, read off where it still is above rounding.
-        falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
-        seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))
-        per_digit = seen / max(1.0, -math.log10(falling[min(seen, _SAMPLE - 1)]))
-        return math.ceil(per_digit * float(self._xp.digits)) + LAST_COEFFICIENTS
+        return expected_terms(values / values[:, :1], self._xp.digits)
 
     def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         if count * nodes > _MOST_NODES:

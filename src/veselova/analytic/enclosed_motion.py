@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.balls import Balls, balls
+from veselova.analytic.clock import Clock
 from veselova.analytic.enclosed_rest import resting_series
 from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.precision import Values
@@ -36,8 +38,15 @@ _MOVED = 2
 _MORE = 4
 _ATTEMPTS = 6
 
+#: Moving directions up to which theta sums are shorter than inversions.
+_THETA_SIZE = 3
+
 #: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
 _SHOWN = 3
+
+
+#: −x to the last digit, whatever the caller's context of decimals.
+_negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 
 
 @dataclass(frozen=True)
@@ -60,12 +69,12 @@ class EnclosedMotion:
         if not any(self.problem.exact.tangent):
             return self._resting(grid, began)
         solution = Solution(self.problem)
-        approximate = solution.clock(grid).tau1(grid)[0]
-        method = self.method or ("theta" if solution.near_separatrix and not self.certified else "angles")
+        clock = solution.clock(grid)
+        method = self.method or self._cheaper(solution)
         working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
         for _ in range(_ATTEMPTS):
             try:
-                decimals, details = self._attempt(solution, method, working, exact, approximate)
+                decimals, details = self._attempt(solution, method, working, exact, clock)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
                 continue
@@ -75,6 +84,11 @@ class EnclosedMotion:
                 return self._trajectory(method, grid, decimals, details, began)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+
+    def _cheaper(self, coarse: Solution) -> str:
+        """Return the route that takes less: theta sums are short for n = 3, and near a separatrix at any n, but not bounded."""
+        short = coarse.near_separatrix or (coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta")
+        return "theta" if short and not self.certified else "angles"
 
     def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:
         working = 2 * self.digits + _SPARE
@@ -90,8 +104,13 @@ class EnclosedMotion:
         return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
 
     def _decimals(self, series: Mapping[str, Values], xp: Balls) -> Decimals:
-        pairs = {name: xp.decimals(values, self.digits + _SHOWN) for name, values in series.items()}
-        midpoints, radii = ({name: pair[i] for name, pair in pairs.items()} for i in (0, 1))
+        """Return the decimals; q is the first column of the frame, and ω is skew: its upper half is converted."""
+        digits, upper = self.digits + _SHOWN, np.triu_indices(self.problem.n, 1)
+        pairs = {name: xp.decimals(series[name], digits) for name in series if name not in ("q", "omega")}
+        (frame, spread), (omega, slack) = pairs["frame"], xp.decimals(series["omega"][:, *upper], digits)
+        pairs["q"] = frame[:, :, 0], spread[:, :, 0]
+        pairs["omega"] = _square(omega, np.asarray(_negative(omega)), upper), _square(slack, slack, upper)
+        midpoints, radii = ({name: pairs[name][i] for name in series} for i in (0, 1))
         return Decimals(self.digits, self.certified, midpoints, radii)
 
     def _missing(self, decimals: Decimals, working: int) -> int:
@@ -102,13 +121,21 @@ class EnclosedMotion:
         return self.digits + largest.adjusted() + 1 if largest else 0
 
     def _attempt(
-        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], approximate: NDArray[np.float64]
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock
     ) -> tuple[Decimals, Any]:
         solution = EnclosedSolution(coarse, working, self.certified, method)
         with solution.arithmetic as xp:
-            series, clock = solution.series(xp.array(exact), approximate)
+            series, details = solution.series(xp.array(exact), clock)
             if solution.separatrices:  # the start was moved; what another move would change stands for what this one did
                 neighbour = EnclosedSolution(coarse, working, self.certified, method, -solution.distance)
-                other, _ = neighbour.series(xp.array(exact), approximate)
+                other, _ = neighbour.series(xp.array(exact), clock)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
-            return self._decimals(series, xp), {"clock": clock.name, "clock_size": clock.size}
+            return self._decimals(series, xp), details
+
+
+def _square(above: Values, below: Values, upper: tuple[Values, Values]) -> Values:
+    """Return matrices (N, n, n) with zero diagonals from what stands above and below, (N, n(n−1)/2)."""
+    size = int(upper[1][-1]) + 1
+    result = np.full((len(above), size, size), Decimal(0))
+    result[:, upper[0], upper[1]], result[:, upper[1], upper[0]] = above, below
+    return result

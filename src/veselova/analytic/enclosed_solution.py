@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -13,11 +12,12 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
-from veselova.analytic.clock import ClockRate, clock_rate
+from veselova.analytic.clock import Clock, ClockRate, clock_rate
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
 from veselova.analytic.enclosed_theta import EnclosedTheta
+from veselova.analytic.enclosed_windows import EnclosedWindows
 from veselova.analytic.enclosure import enclosed, spheroconic
 from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.periods import Periods
@@ -35,6 +35,9 @@ __all__ = ["EnclosedSolution", "frame_around", "series_of"]
 #: A rotation this near to a matrix of signs is one: beyond, constants of motion are so close together that the natural frame of
 #: the problem, in double precision, is taken for a given one.
 _NEARLY_NATURAL = 1e-9
+
+#: What a mode of the Fourier clock costs in nodes of panels, at once and with every time.
+_NODES_PER_MODE, _TIMES_PER_NODE = 5, 100
 
 
 class EnclosedSolution:
@@ -71,36 +74,60 @@ class EnclosedSolution:
                 self._quotients = ThetaQuotients(theta, self.frame)
             position = None if self._quotients is None else self._quotients.position
             self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse.rate_at)
-        self._panels_only = coarse.near_separatrix
+        self._coarse = coarse
 
-    def series(
-        self, times: Values, approximate: NDArray[np.float64]
-    ) -> tuple[Mapping[str, Values], EnclosedClock | EnclosedFourier]:
-        """Return the series of a trajectory along the principal axes, by name, and the clock that was used.
+    def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
+        """Return the series of a trajectory along the principal axes, by name, and what they took.
 
-        times (N,) exact · approximate (N,) the τ₁ there in double precision, in units where the largest I is 1.
+        times (N,) exact, increasing · coarse: the clock in double precision, in units where the largest I is 1.
         """
         xp, moving, n = self.arithmetic, self.moving, self.problem.n
-        clock = self._clock(approximate)
-        tau1 = clock.tau1(times, approximate)
-        attitude = self._attitude(self.orbit.phases(tau1))
+        tau1, attitude, details = self._motion(times, coarse)
         q_dot = (attitude.q_prime * clock_rate(self.spectrum, "t", xp)(attitude.q)[:, None]) @ self._directions.T
         frame = np.empty((len(times), n, n), dtype=object)
         frame[:, :, 0] = attitude.q @ self._directions.T
         frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part
-        return series_of(moving, q_dot, frame, attitude.spheroconic, tau1, xp), clock
+        points = attitude.spheroconic
+        if not points.size:
+            points = spheroconic(attitude.q, self.spectrum.inverse, xp)
+        return series_of(moving, q_dot, frame, points, tau1, xp), details
 
-    def _attitude(self, z: Values) -> Attitude:
-        if self._quotients is None:
-            return self.frame.at(self.orbit.rate.inversion.invert(z))
-        attitude = self._quotients.at(z)
-        return replace(attitude, spheroconic=spheroconic(attitude.q, self.spectrum.inverse, self.arithmetic))
+    def _motion(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
+        """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs less."""
+
+        def sampled(t: NDArray[np.float64]) -> NDArray[np.float64]:
+            attitude = self._coarse.attitude(coarse.tau1(t)[1], "angles")
+            return np.concatenate([attitude.q, attitude.normals.reshape(len(t), -1)], axis=1)
+
+        windows, size = None, self.moving.size
+        if not (self.arithmetic.certified or self._coarse.near_separatrix):
+            cycles = self._coarse.cycles(np.array([0.0, float(times[-1] - times[0])]))
+            windows = EnclosedWindows.worth_while(times, cycles, sampled, self.arithmetic)
+        while windows is not None:
+            tau1, attitude, details = self._evaluated(windows.times, coarse)
+            table = [tau1, attitude.q, attitude.components, attitude.normals.reshape(len(tau1), -1)]
+            found = windows.at(times, np.column_stack(table))
+            if found is not None:
+                q, components, normals = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
+                attitude = Attitude(q, normals.reshape(len(times), size, -1), components, found[:, :0])
+                return found[:, 0], attitude, details
+            windows = windows.finer()
+        return self._evaluated(times, coarse)
+
+    def _evaluated(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
+        approximate = coarse.tau1(times.astype(float))[0]
+        clock = self._clock(approximate)
+        tau1 = clock.tau1(times, approximate)
+        z = self.orbit.phases(tau1)
+        attitude = self._quotients.at(z) if self._quotients is not None else self.frame.at(self.orbit.rate.inversion.invert(z))
+        return tau1, attitude, {"clock": clock.name, "clock_size": clock.size, "evaluations": len(times)}
 
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
-        """Return the clock with fewer evaluations; only that of panels is bounded."""
+        """Return the cheaper clock; only that of panels is bounded."""
         nodes = expected_nodes(self.orbit, approximate)
         modes = expected_modes(self.moving.size - 1, self.arithmetic.digits)
-        if self.arithmetic.certified or self._panels_only or nodes < modes or modes > MOST_MODES:
+        worth = modes * (_NODES_PER_MODE + approximate.size / _TIMES_PER_NODE)
+        if self.arithmetic.certified or self._coarse.near_separatrix or nodes < worth or modes > MOST_MODES:
             return EnclosedClock(self.orbit, approximate, self.arithmetic.certified)
         return EnclosedFourier(self.orbit)
 

@@ -57,13 +57,16 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     They are eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹: where an interval Newton step cannot show as much,
     as it cannot where two nearly meet, they are found one position at a time.
     """
-    coefficients = (q * q) @ _products_of_others(inverse, xp)
+    weights = (q * q)[:, :, None]
     zeros = xp.array(to_spheroconic(1 / inverse.astype(float), q.astype(float)))
 
     def polynomial(x: Values) -> tuple[Values, Values]:
-        value, slope = coefficients[:, -1:], np.zeros((len(q), 1), dtype=object)
-        for k in range(coefficients.shape[1] - 2, -1, -1):
-            value, slope = value * x + coefficients[:, k : k + 1], slope * x + value
+        """Return Σ_{i≤k} w_i Π_{j≠i, j≤k}(x−I_j) and its derivative for k = m, one k from the other."""
+        value, slope, product, product_slope = weights[:, 0], 0 * x, x - inverse[0], 1
+        for weight, pole in zip(np.moveaxis(weights[:, 1:], 1, 0), inverse[1:], strict=True):
+            distance = x - pole
+            value, slope = value * distance + weight * product, slope * distance + value + weight * product_slope
+            product, product_slope = product * distance, product_slope * distance + product
         return value, slope
 
     digits = _DOUBLE_DIGITS
@@ -78,17 +81,6 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
         middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
         step[row] = xp.widened(xp.array(middle), radius[row])
     return np.asarray(step)
-
-
-def _products_of_others(inverse: Values, xp: Any) -> Values:
-    """Return the coefficients of Π_{k≠i}(λ−I_k), lowest first, shape (m, m)."""
-    rows = []
-    for i in range(len(inverse)):
-        row = xp.array([1])
-        for other in np.delete(inverse, i):
-            row = np.concatenate([[0], row]) - other * np.concatenate([row, [0]])
-        rows.append(row)
-    return np.stack(rows)
 
 
 def resting_spheroconic(moving: Moving, xp: Balls) -> Values:

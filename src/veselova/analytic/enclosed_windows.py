@@ -1,0 +1,148 @@
+"""A motion at many times in balls, from few: Chebyshev series of time on windows of one length.
+
+The series pass through midpoints alone. What the values at the nodes leave open enters times the Lebesgue constant of the nodes,
+by which interpolation magnifies at most; what a series leaves out follows from its last coefficients, so no window is certified.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
+
+__all__ = ["EnclosedWindows", "expected_terms"]
+
+Array = NDArray[np.float64]
+
+#: Nodes of a series in double precision that shows how fast one falls, and the digits down to which it does.
+_SAMPLE, _SAMPLE_DIGITS = 64, 11
+
+#: Windows looked at for that, and times below which none is.
+_SAMPLED, _FEW_TIMES = 40, 300
+
+#: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n = 3 to 6, 30 to 100 digits.
+_NODE, _TERM = 1.2, 1 / 600
+
+#: How much larger than the precision the last coefficients of a series may be (they are rounding there), the nodes taken over
+#: those expected, for windows that were not looked at, and how many more are taken where coefficients are larger.
+_NEARLY, _SPARE, _MORE = 1e3, 1.08, 1.25
+
+#: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
+_RECURRENCE_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class EnclosedWindows:
+    """``count`` windows from ``first`` on, each 2·half long with so many Chebyshev points: t = centre − half·cos θ."""
+
+    arithmetic: Any
+    first: Any
+    half: Any
+    count: int
+    nodes: int
+
+    @classmethod
+    def worth_while(
+        cls, times: Values, cycles: float, sampled: Callable[[Array], Array], arithmetic: Any
+    ) -> EnclosedWindows | None:
+        """Return the windows by which increasing times (N,), over so many cycles of the fastest phase, cost least; None without.
+
+        ``sampled``: the motion in double precision at increasing times, columns (N, K) of size one.
+        """
+        if len(times) < _FEW_TIMES:
+            return None
+        xp = arithmetic
+        first, last = (float(x) for x in (times[0], times[-1]))
+        choices = {}
+        for length in (2.0, 1.0, 0.5, 0.25):
+            count = max(1, math.ceil(cycles / length))
+            nodes = math.ceil(_SPARE * expected_terms(_samples(first, last, count, sampled), xp.digits))
+            choices[len(times) * nodes * _TERM + count * nodes * _NODE] = count, nodes
+        cost = min(choices)
+        if not cost < len(times):
+            return None
+        count, nodes = choices[cost]
+        return cls(xp, times[0], (times[-1] - times[0]) / (2 * count), count, nodes)
+
+    def finer(self) -> EnclosedWindows:
+        """Return the windows with more nodes."""
+        return EnclosedWindows(self.arithmetic, self.first, self.half, self.count, math.ceil(_MORE * self.nodes))
+
+    @cached_property
+    def _centres(self) -> Values:
+        return np.asarray(self.first + self.half * (2 * np.arange(self.count) + 1))
+
+    @cached_property
+    def times(self) -> Values:
+        """Return the nodes, exact numbers, shape (count·nodes,), increasing."""
+        xp = self.arithmetic
+        return np.asarray(xp.midpoints(self._centres[:, None] - self.half * xp.cos(xp.nodes(self.nodes))).ravel())
+
+    def at(self, times: Values, values: Values) -> Values | None:
+        """Return a motion at times (N,) from its values at the nodes, (count·nodes, K); None where it is not resolved."""
+        xp, columns = self.arithmetic, values.shape[1]
+        result = np.empty((len(times), columns), dtype=object)
+        table = np.moveaxis(values.reshape(self.count, self.nodes, columns), 1, 2).reshape(-1, self.nodes)
+        middle = xp.midpoints(table)
+        open_ = np.max(xp.at_most(table - middle), axis=1)
+        series = xp.midpoints(xp.cosine_series(middle))
+        size = np.max(xp.at_most(middle), axis=1)
+        last = np.sum(xp.at_most(series[:, -LAST_COEFFICIENTS:]), axis=1)
+        if not np.all(last <= _NEARLY * (open_ + xp.epsilon * size)):
+            return None
+        # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
+        slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
+        shape = (self.count, columns)
+        for w, rows in self._rows(times):
+            waves = self._waves((self._centres[w] - times[rows]) / self.half)
+            sums = xp.product(waves.T, series.reshape(*shape, self.nodes)[w].T)
+            result[rows] = xp.widened(sums, slack.reshape(shape)[w])
+        return result
+
+    def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:
+        """Return the windows that hold times, and which."""
+        places = np.clip(np.floor(((times - self.first) / (2 * self.half)).astype(float)), 0, self.count - 1)
+        borders = np.searchsorted(places, np.arange(self.count + 1)).tolist()
+        for w, (first, last) in enumerate(pairwise(borders)):
+            if first < last:
+                yield w, slice(first, last)
+
+    def _waves(self, x: Values) -> Values:
+        """Return T_0 … T_{nodes−1} at x (N,), shape (nodes, N), by T_{j+k} = 2T_jT_k − T_{j−k}."""
+        xp = self.arithmetic
+        with xp.at(xp.digits + _RECURRENCE_DIGITS):
+            waves, twice = [1 + 0 * x, x], [None, 2 * x]
+            for m in range(2, self.nodes):
+                waves.append(twice[m // 2] * waves[m - m // 2] - waves[m % 2])
+                if 2 * m <= self.nodes:
+                    twice.append(2 * waves[m])
+        return np.stack(waves[: self.nodes])
+
+
+def _samples(first: float, last: float, count: int, sampled: Callable[[Array], Array]) -> Array:
+    """Return values (…, _SAMPLE) of a motion at the nodes of some of the windows."""
+    half = (last - first) / (2 * count)
+    chosen = np.unique(np.linspace(0, count - 1, _SAMPLED).astype(np.int64))
+    times = first + half * (2 * chosen[:, None] + 1) - half * np.cos(DOUBLE.nodes(_SAMPLE))
+    return np.moveaxis(sampled(times.ravel()).reshape(len(chosen), _SAMPLE, -1), 1, 2)
+
+
+def expected_terms(values: Array, digits: int) -> int:
+    """Return the terms of Chebyshev series of so many digits, from values (…, S) at S nodes in double precision.
+
+    A falling bound, the largest coefficient from each on, is read off where it is still above rounding.
+    """
+    count = values.shape[-1]
+    series = np.abs(DOUBLE.cosine_series(values.reshape(-1, count))) / np.max(np.abs(values))
+    falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
+    seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))
+    per_digit = seen / max(1.0, -math.log10(falling[min(seen, count - 1)]))
+    return math.ceil(per_digit * digits) + LAST_COEFFICIENTS
