@@ -93,7 +93,7 @@ class EnclosedWindows:
         table = np.moveaxis(values.reshape(self.count, self.nodes, columns), 1, 2).reshape(-1, self.nodes)
         middle = xp.midpoints(table)
         open_ = np.max(xp.at_most(table - middle), axis=1)
-        series = xp.midpoints(xp.cosine_series(middle))
+        series = xp.cosine_series(middle)
         size = np.max(xp.at_most(middle), axis=1)
         last = np.sum(xp.at_most(series[:, -LAST_COEFFICIENTS:]), axis=1)
         if not np.all(last <= _NEARLY * (open_ + xp.epsilon * size)):

@@ -1,0 +1,134 @@
+"""Many times with many digits: windows in balls, and what they are made of."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+
+import veselova as vs
+from draws import random_riemann_matrix
+from test_theta import all_characteristics, as_flint_orders
+from veselova.analytic.balls import balls
+from veselova.analytic.enclosed_theta import EnclosedTheta
+from veselova.analytic.enclosed_windows import EnclosedWindows
+from veselova.analytic.enclosure import spheroconic
+from veselova.analytic.precision import Decimals
+from veselova.analytic.secular import zeros_between_poles
+from veselova.mechanics.veselova import Veselova
+
+#: The stated slack of every error estimate.
+SLACK = 2
+
+BODIES = {
+    "three": Veselova([3, 2, "1.2"], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"]),
+    "four": Veselova([4, 3, 2, 1], [1, 1, 1, 1], [1, -2, 3, 1], normalize=True),
+    "equal": Veselova([3, 3, 2, 1], [1, 2, 1, 1], [2, -1, 3, 1], normalize=True),
+    "frozen": Veselova([4, 3, 2, 1], [1, 1, 0, 1], [1, -2, 0, 1], normalize=True),
+    "plane": Veselova([3, 2], ["0.6", "0.8"], ["0.8", "-0.6"]),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
+    """A dense stretch before t = 0, one after it, and times between that no window could serve alone."""
+    times = np.unique(np.concatenate([np.linspace(-1, -0.5, 900), np.linspace(-0.4, 1, 30), np.linspace(1, 1.5, 900)]))
+    chosen = np.arange(0, times.size, 97)
+    many, single = vs.solve(BODIES[name], times, digits=30), vs.solve(BODIES[name], times[chosen], digits=30)
+    assert many.provenance.details["evaluations"] < times.size / 3
+    assert single.provenance.details["evaluations"] == chosen.size
+    for series in ("frame", "q", "q_dot", "omega", "spheroconic", "tau1"):
+        found, expected = many.decimals, single.decimals
+        difference = np.abs(found.midpoints[series][chosen] - expected.midpoints[series])
+        assert np.all(difference <= SLACK * (found.radii[series][chosen] + expected.radii[series])), series
+    assert max(many.decimals.error) < 1e-30
+
+
+@pytest.mark.parametrize("method", ["theta", "angles"])
+def test_windows_in_balls_serve_either_route_and_far_times(method: str) -> None:
+    start, chosen = 10**8, [0, 399, 799]
+    times = [start + Fraction(k, 400) for k in range(800)]
+    many = vs.solve(BODIES["three"], times, digits=25, method=method)
+    single = vs.solve(BODIES["three"], [times[k] for k in chosen], digits=35, method=method)
+    assert (many.provenance.details["clock"], many.provenance.method) == ("fourier", method)
+    assert many.provenance.details["evaluations"] < 400
+    difference = np.abs(many.decimals.midpoints["frame"][chosen] - single.decimals.midpoints["frame"])
+    assert np.max(difference) < 1e-25
+
+
+def test_a_certified_motion_comes_from_no_window() -> None:
+    times = np.linspace(0, 0.1, 400)
+    found = vs.solve(BODIES["plane"], times, certified=True)
+    assert found.provenance.details["evaluations"] == times.size
+
+
+def test_windows_that_do_not_resolve_a_motion_say_so() -> None:
+    with balls(30, False) as xp:
+        windows = EnclosedWindows(xp, xp.number(-1), xp.number(1), 2, 20)
+        times = xp.array(np.linspace(-1, 3, 50))
+
+        def motion(t: Any) -> Any:
+            return np.column_stack([xp.sin(9 * t), xp.cos(t)])
+
+        while (found := windows.at(times, motion(windows.times))) is None:
+            windows = windows.finer()
+        assert windows.nodes > 30
+        error = np.abs(found - motion(times))
+        assert all(ball.contains(0) for ball in (found - motion(times)).ravel())
+        assert float(np.max(xp.at_most(error))) < 1e-27
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3])
+def test_theta_functions_in_balls_hold_flints(genus: int, rng: np.random.Generator) -> None:
+    characteristics = all_characteristics(genus)
+    for smallest in (0.3, 0.02):
+        T, z = random_riemann_matrix(rng, genus, smallest), rng.uniform(-2, 2, genus)
+        with balls(40, False) as xp:
+            found = EnclosedTheta(xp.array(T), xp).values(xp.array(z)[None, :], characteristics)[0]
+            tau = flint.acb_mat([[flint.acb(0, float(x)) for x in row] for row in T])
+            theirs = tau.theta(flint.acb_mat([[flint.acb(float(x))] for x in z]))
+            for characteristic, value in zip(characteristics, found, strict=True):
+                ratio = theirs[0, as_flint_orders(characteristic)] / theirs[0, 0]
+                assert (value / found[0]).overlaps(ratio.real), characteristic
+                assert float((value / found[0]).rad()) < 1e-37 * (1 + abs(float(value / found[0])))
+
+
+@pytest.mark.parametrize("digits", [20, 60])
+def test_lambdas_of_many_positions_hold_those_of_each(digits: int, rng: np.random.Generator) -> None:
+    """At random, on a coordinate plane, beside one, and where two of them all but meet."""
+    inverse = [Fraction(1, 5), Fraction(1, 4), Fraction(1, 4) + Fraction(1, 10**9), Fraction(1)]
+    rows = [*rng.normal(size=(5, 4)).tolist(), [0.6, 0, 0.8, 0], [0.6, 1e-25, 0.5, 0.3], [0.6, 1e-9, 1e-9, 0.8], [0, 0, 0, 1]]
+    with balls(digits, False) as xp:
+        q = xp.array(rows)
+        q = q / xp.sqrt(np.sum(q * q, axis=1))[:, None]
+        found = spheroconic(q, xp.array(inverse), xp)
+        for row, balls_of_row in zip(q, found, strict=True):
+            with Decimals(3 * digits) as exact:
+                squares = [xp.rational(x) ** 2 for x in row]
+                zeros = zeros_between_poles(exact.array(inverse), exact.array(squares), 0, exact)
+            for ball, zero in zip(balls_of_row, zeros, strict=True):
+                assert abs(xp.rational(ball) - Fraction(zero)) <= xp.rational(ball.rad()) + Fraction(1, 10 ** (2 * digits))
+                assert float(ball.rad()) < 10.0 ** (3 - digits)
+
+
+def test_decimals_cover_their_balls() -> None:
+    generator = random.Random(2)
+    with balls(60) as xp:
+
+        def exactly(x: Any) -> Fraction:
+            return xp.rational(x)
+
+        for _ in range(3000):
+            middle = xp.number(generator.uniform(-1, 1)) * xp.number(10) ** generator.choice([0, 0, -3, 5, -150, 150, -40])
+            radius = xp.number(generator.random()) * xp.number(2) ** generator.choice([-200, -600, -3, 5])
+            ball = xp.widened(middle * generator.choice([0, 1]), radius * generator.choice([0, 1]))
+            midpoints, radii = xp.decimals(np.array([ball]), 53)
+            off = abs(Fraction(midpoints[0]) - exactly(ball))
+            assert exactly(ball.rad()) + off <= Fraction(radii[0])
+            loose = exactly(ball.rad()) + Fraction(1, 10**52) * max(abs(exactly(ball)), exactly(ball.rad()))
+            assert Fraction(radii[0]) <= loose * Fraction(100_002, 100_000)
+            assert len(midpoints[0].as_tuple().digits) <= 54
