@@ -87,6 +87,10 @@ CLASSES = (
 )
 
 
+#: Attempts at A's for one start.
+_HOPELESS = 1000
+
+
 def _fractions(rng: np.random.Generator, n: int, low: float) -> list[Fraction]:
     return [Fraction(int(x), 1000) for x in rng.integers(int(1000 * low), 1000, n)]
 
@@ -97,7 +101,11 @@ def _wedge(q: list[Fraction], v: list[Fraction]) -> list[Fraction]:
 
 def _umbilic(rng: np.random.Generator, n: int, q: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
     """Return A and q with Σ_{j≥1} q_j²/(I_0−I_j) = 0: where q_0 = 0 and q̇_0 ≠ 0 then F_0 = 0, so some c_k = I_0 exactly."""
+    attempts = 0
     while True:
+        attempts += 1
+        if attempts % _HOPELESS == 0:  # no A goes with coordinates as different as these
+            q = _fractions(rng, n, -1.0)
         inverse = [Fraction(int(x), 1000) for x in rng.integers(300, 3000, n)]
         q = [x if x else Fraction(1, 7) for x in q]
         if len({*inverse}) < n:
