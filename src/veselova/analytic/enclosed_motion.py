@@ -18,6 +18,7 @@ from veselova.analytic.clock import Clock
 from veselova.analytic.enclosed_rest import resting_series
 from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.precision import Values
+from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import InvalidInput, Unsolved
@@ -87,7 +88,9 @@ class EnclosedMotion:
 
     def _cheaper(self, coarse: Solution) -> str:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix at any n, but not bounded."""
-        short = coarse.near_separatrix or (coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta")
+        size = moving_part(self.problem).size  # beside a direction that doubles do not see sums cancel
+        harmless = size == coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta"
+        short = coarse.near_separatrix or harmless
         return "theta" if short and not self.certified else "angles"
 
     def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -25,7 +27,7 @@ from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import Moving, moving_part
 from veselova.analytic.solution import Solution
-from veselova.analytic.spectrum import resolved
+from veselova.analytic.spectrum import Spectrum, resolved
 from veselova.analytic.start import start
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -35,6 +37,9 @@ __all__ = ["EnclosedSolution", "frame_around", "series_of"]
 #: A rotation this near to a matrix of signs is one: beyond, constants of motion are so close together that the natural frame of
 #: the problem, in double precision, is taken for a given one.
 _NEARLY_NATURAL = 1e-9
+
+#: Least distance of two branch points in doubles, whose squares of roots are to be doubles too.
+_LEAST_WIDTH = 1e-290
 
 #: What a mode of the Fourier clock costs in nodes of panels, at once and with every time.
 _NODES_PER_MODE, _TIMES_PER_NODE = 5, 100
@@ -63,7 +68,8 @@ class EnclosedSolution:
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
-            inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(Curve.of(found.spectrum, DOUBLE))))
+            doubles = AbelJacobi(Periods(_in_doubles(found.spectrum)))
+            inversion = AbelJacobi(Periods(curve), doubles)
             begin = start(found.spectrum, curve, self.spectrum)
             self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
             rate = ClockRate.of(self.spectrum, inversion, "t")
@@ -73,7 +79,14 @@ class EnclosedSolution:
                 theta = EnclosedTheta(inversion.periods.riemann_matrix, self.arithmetic)
                 self._quotients = ThetaQuotients(theta, self.frame)
             position = None if self._quotients is None else self._quotients.position
-            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse.rate_at)
+            rate_in_doubles = ClockRate.of(found.spectrum, doubles, "t")
+
+            def coarse_rate(z: NDArray[np.float64]) -> NDArray[np.float64]:
+                if coarse.moving.size == self.moving.size:
+                    return coarse.rate_at(z)
+                return rate_in_doubles.at(doubles.invert(z))  # a direction moves that doubles do not see
+
+            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse_rate)
         self._coarse = coarse
 
     def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
@@ -115,7 +128,7 @@ class EnclosedSolution:
         return self._evaluated(times, coarse)
 
     def _evaluated(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
-        approximate = coarse.tau1(times.astype(float))[0]
+        approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(self._coarse.moving.unit / self.moving.unit)
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         z = self.orbit.phases(tau1)
@@ -166,6 +179,14 @@ class EnclosedSolution:
         if not self.moving.frozen:
             return 0
         return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
+
+
+def _in_doubles(spectrum: Spectrum) -> Curve:
+    """Return the curve from which inversions in balls start: widths that doubles cannot hold are taken for wider ones."""
+    curve = Curve.of(spectrum, DOUBLE)
+    places = np.arange(len(curve.branch_points))
+    widths = np.maximum(np.abs(curve.differences), _LEAST_WIDTH)
+    return replace(curve, differences=np.sign(places - places[:, None]) * widths)
 
 
 def series_of(

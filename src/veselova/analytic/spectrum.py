@@ -26,8 +26,9 @@ from veselova.mechanics.errors import InternalContradiction
 
 __all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
 
-#: Branch points nearer than this part of the largest count as one: differences are doubles, and their squares roots of them.
-_COINCIDE = -290
+#: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to hold their differences, and
+#: squares of roots of them.
+_COINCIDE = 290
 
 #: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by 1e-16) for the sums themselves.
 _SPARE = 12
@@ -89,21 +90,22 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> R
     """Return the spectrum in which every interval is open and known to twice ``digits``.
 
     Coincidences are opened by moving the start by ``distance``, by default 10^(−2·digits−10); where I_i = c_k is an end of a
-    closed cut, or moves less than 1e-145 of the rest, the direction is frozen.
+    closed cut, or moves less than the root of 1e-290 of the rest, or of 10^(−4·digits−40), the direction is frozen.
     """
     opening = Fraction(1, 10 ** (2 * digits + 10))
     moving = moving.opened(opening)
     separatrices: set[int] = set()
     while True:
         found = spectrum(moving, digits)
-        closed = [j for j, width in enumerate(found.widths) if width < _threshold(found.arithmetic)]
+        threshold = found.arithmetic.number(10) ** -_coinciding(digits)
+        closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices)))
         j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.moved(0, opening)
-        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10**-_COINCIDE)):
+        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10 ** _coinciding(digits))):
             moving = moving.without(axis)
         elif axis in separatrices:
             raise InternalContradiction("a closed gap did not open")
@@ -112,14 +114,15 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> R
             moving = moving.moved(axis, opening if distance is None else distance)
 
 
-def _threshold(arithmetic: Arithmetic) -> Any:
-    return arithmetic.number(10) ** _COINCIDE
+def _coinciding(digits: int) -> int:
+    """Return the digits beyond which branch points count as one: more than a start that is moved has, squared."""
+    return max(_COINCIDE, 4 * digits + 40)
 
 
 def spectrum(moving: Moving, digits: int) -> Spectrum:
     """Return the spectra of what moves with enough digits for all differences of neighbouring branch points."""
     wanted = 2 * digits + _SPARE
-    most = wanted - _COINCIDE
+    most = wanted + _coinciding(digits)
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
         found = _spectrum(moving, extended(working), digits)
