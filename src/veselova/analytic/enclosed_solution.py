@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,6 +17,7 @@ from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import Clock, ClockRate, clock_rate
 from veselova.analytic.curve import Curve
+from veselova.analytic.drift import Drift
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
 from veselova.analytic.enclosed_theta import EnclosedTheta
@@ -49,18 +51,21 @@ class EnclosedSolution:
     """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
 
     ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only angles can be); else estimated.
-    ``method``: ``theta`` or ``angles``. ``distance`` as in Solution. Raises Unsolved (``not-enclosed``) where a bound cannot be
-    closed.
+    ``method``: ``theta`` or ``angles``. ``distance`` as in Solution, ``beyond`` as in analytic.spectrum. Raises Unsolved
+    (``not-enclosed``) where a bound cannot be closed.
     """
 
-    def __init__(self, coarse: Solution, digits: int, certified: bool, method: str, distance: Fraction | None = None) -> None:
+    def __init__(
+        self, coarse: Solution, digits: int, certified: bool, method: str, distance: Fraction | None = None, beyond: int = 0
+    ) -> None:
         problem = coarse.problem
         #: How far a start on a separatrix is moved.
-        self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
-        found = resolved(moving_part(problem), digits, self.distance)
-        if certified and (found.separatrices or found.moving.turned):
-            what = "a separatrix" if found.separatrices else "equal A's with two moving directions"
-            raise Unsolved("not-enclosed", f"{what}: the start is moved by far less than any digit, which is no bound")
+        self.distance = Fraction(1, 10 ** (2 * digits + 10 + beyond)) if distance is None else distance
+        found = resolved(moving_part(problem), digits, self.distance, beyond)
+        if certified and found.separatrices:
+            raise Unsolved(
+                "not-enclosed", "a separatrix: phases say little of the body there, and theta functions are not bounded"
+            )
         self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
         self.arithmetic: Any = balls(digits, certified)
         self.spectrum = enclosed(found)
@@ -103,7 +108,17 @@ class EnclosedSolution:
         points = attitude.spheroconic
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
-        return series_of(moving, q_dot, frame, points, tau1, xp), details
+        series = series_of(moving, q_dot, frame, points, tau1, xp)
+        return (series if self._drift is None else self._drifted(series, self._drift, tau1)), details
+
+    def _drifted(self, series: Mapping[str, Values], drift: Drift, tau1: Values) -> Mapping[str, Values]:
+        """Return the series of the moved start, widened to hold those of the given one."""
+        xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
+        late, velocity, turned, points = drift.bounds(tau1, xp)
+        q_dot = xp.widened(series["q_dot"], velocity[:, None])
+        frame = xp.widened(series["frame"], turned[:, None, None])
+        spheroconic = xp.widened(series["spheroconic"], points[:, None] / unit)
+        return _with_derived(q_dot, frame, spheroconic, xp.widened(series["tau1"], late * xp.sqrt(unit)))
 
     def _motion(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
         """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs less."""
@@ -157,21 +172,48 @@ class EnclosedSolution:
     @cached_property
     def _start_frame(self) -> Values:
         """Return e_2 … e_n at t = 0: the given ones, made exactly orthonormal."""
-        xp, exact = self.arithmetic, self.problem.exact
-        rows = exact.frame if exact.frame is not None else self.problem.frame
-        return frame_around(self._directions @ self.spectrum.q, rows, xp)[:, 1:]
+        return frame_around(self._directions @ self.spectrum.q, self._rows, self.arithmetic)[:, 1:]
+
+    @property
+    def _rows(self) -> Any:
+        return self.problem.exact.frame if self.problem.exact.frame is not None else self.problem.frame
+
+    @cached_property
+    def _natural_signs(self) -> NDArray[np.float64] | None:
+        """Return ℜ where e_2 … e_n are the normals but for signs: in the natural frame, where nothing rests."""
+        if not self.problem.exact.natural or self.moving.frozen:
+            return None
+        raw = self._start_normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:]
+        signs = np.rint(raw)
+        return signs if np.max(np.abs(raw - signs)) < _NEARLY_NATURAL else None
+
+    @cached_property
+    def _start_normals(self) -> Values:
+        return np.asarray(self.frame.at(self._angles).normals[0])
 
     @cached_property
     def _rotation(self) -> Values:
-        """Return the constant ℜ of (orth); a matrix of signs for the natural frame, where nothing rests."""
-        xp = self.arithmetic
-        normals = self.frame.at(self._angles).normals[0]
-        if self.problem.exact.natural and not self.moving.frozen:
-            raw = normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:]
-            signs = np.rint(raw)
-            if np.max(np.abs(raw - signs)) < _NEARLY_NATURAL:
-                return np.asarray(xp.array(signs))
-        return np.asarray(normals.T @ self._directions.T @ self._start_frame)
+        """Return the constant ℜ of (orth)."""
+        if self._natural_signs is not None:
+            return np.asarray(self.arithmetic.array(self._natural_signs))
+        return np.asarray(self._start_normals.T @ self._directions.T @ self._start_frame)
+
+    @cached_property
+    def _drift(self) -> Drift | None:
+        """Return how far the start that was moved may get from the given one, where that has to be bounded."""
+        xp, given = self.arithmetic, moving_part(self.problem)
+        if not xp.certified or self.moving == given:
+            return None
+        drift = Drift.of(given, self.moving, xp)
+        if self._natural_signs is None:
+            q = xp.array(self.problem.exact.q)
+            frames = [frame_around(x, self._rows, xp) for x in (q / xp.sqrt(np.sum(q * q)), self._directions @ self.spectrum.q)]
+            return replace(drift, frames=np.sum(xp.at_most(frames[0] - frames[1])))
+        # An eigenvector turns by at most 2√2 δT over the distance of its eigenvalue (Davis, Kahan; Yu, Wang, Samworth).
+        constants = self.spectrum.constants
+        gaps = [abs(x - y) for x, y in itertools.combinations(constants, 2)] + [xp.number(1)]
+        inverse = sum((1 / gap for gap in gaps), xp.number(0))
+        return replace(drift, frames=drift.matrix * (1 + 3 * len(constants) * inverse))
 
     @cached_property
     def _frozen_part(self) -> Any:
@@ -197,15 +239,13 @@ def series_of(
     frozen = np.tile(xp.array([1 / a for a in moving.frozen]), (len(tau1), 1))
     coordinates = np.concatenate([spheroconic / unit, frozen], axis=1)
     order = np.argsort(coordinates.astype(float), axis=1, kind="stable")
+    return _with_derived(q_dot, frame, np.take_along_axis(coordinates, order, axis=1), tau1 * xp.sqrt(unit))
+
+
+def _with_derived(q_dot: Values, frame: Values, spheroconic: Values, tau1: Values) -> Mapping[str, Values]:
     product = frame[:, :, :1] * q_dot[:, None, :]
-    return {
-        "q": frame[:, :, 0],
-        "q_dot": q_dot,
-        "frame": frame,
-        "omega": product - np.swapaxes(product, 1, 2),
-        "spheroconic": np.take_along_axis(coordinates, order, axis=1),
-        "tau1": tau1 * xp.sqrt(unit),
-    }
+    omega = product - np.swapaxes(product, 1, 2)
+    return {"q": frame[:, :, 0], "q_dot": q_dot, "frame": frame, "omega": omega, "spheroconic": spheroconic, "tau1": tau1}
 
 
 def frame_around(q: Values, rows: Any, arithmetic: Any) -> Values:

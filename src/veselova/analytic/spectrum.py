@@ -86,18 +86,20 @@ class Resolved:
     separatrices: tuple[int, ...]
 
 
-def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> Resolved:
+def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyond: int = 0) -> Resolved:
     """Return the spectrum in which every interval is open and known to twice ``digits``.
 
-    Coincidences are opened by moving the start by ``distance``, by default 10^(−2·digits−10); where I_i = c_k is an end of a
-    closed cut, or moves less than the root of 1e-290 of the rest, or of 10^(−4·digits−40), the direction is frozen.
+    Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by ``distance`` where that is
+    given; where I_i = c_k is an end of a closed cut, or moves less than the root of 1e-290 of the rest, or of 10^−10 times
+    that move squared, the direction is frozen.
     """
-    opening = Fraction(1, 10 ** (2 * digits + 10))
+    exponent = 2 * digits + 10 + beyond
+    opening, coinciding = Fraction(1, 10**exponent), max(_COINCIDE, 2 * exponent + 20)
     moving = moving.opened(opening)
     separatrices: set[int] = set()
     while True:
-        found = spectrum(moving, digits)
-        threshold = found.arithmetic.number(10) ** -_coinciding(digits)
+        found = spectrum(moving, digits, coinciding)
+        threshold = found.arithmetic.number(10) ** -coinciding
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices)))
@@ -105,7 +107,7 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> R
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.moved(0, opening)
-        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10 ** _coinciding(digits))):
+        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10**coinciding)):
             moving = moving.without(axis)
         elif axis in separatrices:
             raise InternalContradiction("a closed gap did not open")
@@ -114,15 +116,10 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None) -> R
             moving = moving.moved(axis, opening if distance is None else distance)
 
 
-def _coinciding(digits: int) -> int:
-    """Return the digits beyond which branch points count as one: more than a start that is moved has, squared."""
-    return max(_COINCIDE, 4 * digits + 40)
-
-
-def spectrum(moving: Moving, digits: int) -> Spectrum:
-    """Return the spectra of what moves with enough digits for all differences of neighbouring branch points."""
+def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectrum:
+    """Return the spectra of what moves with enough digits for all differences of neighbours above 10^−coinciding."""
     wanted = 2 * digits + _SPARE
-    most = wanted + _coinciding(digits)
+    most = wanted + coinciding
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
         found = _spectrum(moving, extended(working), digits)

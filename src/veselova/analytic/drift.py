@@ -1,0 +1,133 @@
+"""How far the motion of a start that was moved may be from that of the start itself: a bound, for certified answers.
+
+Both are motions of Neumann's system (Theorem LR→Nn), q'' = (β−a)q with a = A⁻¹, β = 2(aq,q) − E and E = (q',q') + (aq,q)
+constant. For u = q₀−q₁ and w = u', with |a₀−a₁| ≤ δ and (q₀+q₁, u) = 0,
+
+    |w'| ≤ M|u| + f,   M = max|β−a_i| + 2(max a − min a),   f = 3δ + |E₀−E₁|,
+
+so |u| ≤ D, |w| ≤ μD with D = (|u(0)| + |w(0)|/μ + f/M) e^{μ|τ₁|}, μ = √M. The frame turns with E' = (q'qᵀ − qq'ᵀ)E, skew: two
+frames part by at most ∫2(|w| + |q'||u|). Clocks part by ∫|ρ₀−ρ₁|, ρ = dt/dτ₁ = k√(q,Aq), and every series by what it moves in
+that time. Coarse numbers are doubles, rounded up by far more than they are rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.precision import Values
+from veselova.analytic.reduction import Moving
+from veselova.analytic.spectrum import Spectrum, tangent
+
+__all__ = ["Drift", "expected_growth"]
+
+#: More than what a dozen operations in double precision round.
+_UP = 1 + 1e-12
+
+#: Digits in which starts are compared, in digits of the arithmetic and besides: they differ by 10^(−2·digits−20) or less.
+_TIMES, _BESIDE = 6, 120
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The bounds for one start, in units where the largest I of the moved one is 1; small numbers are balls, others doubles.
+
+    apart: |u(0)| + |w(0)|/μ + f/M · matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
+    frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| · bend: one of |q''|
+    clocks: |k₀−k₁| max√(q,Aq) + k δ((q,Aq)), per unit of τ₁ · clock_slope: k max A, by which |u| enters |ρ₀−ρ₁|
+    slowest: the least dt/dτ₁ · inverses: δ
+    """
+
+    apart: Any
+    matrix: Any
+    frames: Any
+    growth: float
+    speed: float
+    bend: float
+    clocks: Any
+    clock_slope: float
+    slowest: float
+    inverses: Any
+
+    @classmethod
+    def of(cls, given: Moving, moved: Moving, arithmetic: Any) -> Drift:
+        """Return the bounds for a start and the one that it was moved to, frames set aside."""
+        with arithmetic.at(_TIMES * arithmetic.digits + _BESIDE) as xp:
+            unit = xp.sqrt(xp.number(moved.unit / given.unit))
+            q0, p0, rate0 = tangent(given, xp)
+            p0, rate0 = p0 * unit, rate0 / unit
+            a0 = xp.array([moved.unit / (a * given.unit) for a in given.A])
+            q1, p1, rate1 = tangent(moved, xp)
+            places, signs = _matched(given, moved)
+            a1, (q1, p1) = a0.copy(), (_spread(x * signs, places, len(q0)) for x in (q1, p1))
+            a1[places] = xp.array([1 / a for a in moved.A])
+            energies = [np.sum(p * p) + np.sum(a * q * q) for a, q, p in ((a0, q0, p0), (a1, q1, p1))]
+            clocks = [1 / (rate * xp.sqrt(np.sum(q * q / a))) for a, q, rate in ((a0, q0, rate0), (a1, q1, rate1))]
+            u, w, inverses, A = (_norm(x, xp) for x in (q0 - q1, p0 - p1, a0 - a1, 1 / a0 - 1 / a1))
+            low, high = _range([*a0, *a1])
+            least, most = _range(energies)
+            slow, fast = _range(clocks)
+            speed = math.sqrt(most - low) * _UP
+            bend = max(2 * high - least - low, most - 2 * low + high) * _UP
+            level = (bend + 2 * (high - low)) * _UP
+            growth = math.sqrt(level) * _UP
+            force = 3 * inverses + abs(energies[0] - energies[1])
+            # √(q,Aq) lies between 1/√max a and 1/√min a, and (q,Aq) is moved by |A₀−A₁| + 2 max A |u|.
+            widest, least_root = _UP / math.sqrt(low), math.sqrt(high) * _UP
+            bounds = {
+                "apart": u + w / growth + force / (level / _UP**2),
+                "matrix": inverses + (4 * high + 2) * _UP * u + 2 * speed * w,
+                "clocks": abs(clocks[0] - clocks[1]) * widest + fast * least_root / 2 * _UP * A,
+                "inverses": inverses,
+            }
+            small = {name: xp.at_most(value).item() for name, value in bounds.items()}
+        coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": slow / least_root / _UP}
+        return cls(frames=arithmetic.number(0), clock_slope=fast * least_root / low * _UP, **coarse, **small)
+
+    def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
+        """Return how far τ₁, q̇, the frame (as an operator, so each entry) and the λ's may be from those at Neumann times (N,)
+        of the moved start, at the same times of the clock, each (N,)."""
+        steps = xp.at_most(np.abs(tau1))
+        apart = self.apart * xp.exp(self.growth * steps)
+        late = (steps * self.clocks + self.clock_slope * apart / self.growth) / self.slowest
+        turned = self.frames + 2 * (1 + self.speed / self.growth) * apart + self.speed * late
+        slope = (self.clocks + self.clock_slope * turned) / self.slowest / self.slowest
+        velocity = (self.growth * apart + self.bend * late) / self.slowest + self.speed * slope
+        return late, velocity, turned, 4 * turned + self.inverses
+
+
+def expected_growth(spectrum: Spectrum, tau1: float) -> int:
+    """Return the digits by which two motions part until a Neumann time, by the bound above."""
+    inverse, q, p = (x.astype(float) for x in (spectrum.inverse, spectrum.q, spectrum.q_prime))
+    low, energy = float(inverse[0]), float(np.sum(p * p) + np.sum(inverse * q * q))
+    level = max(2 - energy - low, energy - 2 * low + 1) + 2 * (1 - low)
+    return math.ceil(math.sqrt(level) * abs(tau1) / math.log(10))
+
+
+def _matched(given: Moving, moved: Moving) -> tuple[list[int], Values]:
+    """Return where the directions that are left were among the given ones, and the signs of those that were turned round."""
+    places, signs = [], []
+    for vector in moved.vectors:
+        for place, before in enumerate(given.vectors):
+            if vector == before or vector == {axis: -x for axis, x in before.items()}:
+                places.append(place)
+                signs.append(1 if vector == before else -1)
+    return places, np.array(signs, dtype=object)
+
+
+def _spread(values: Values, places: list[int], size: int) -> Values:
+    result = np.array([0 * values[0]] * size, dtype=object)
+    result[places] = values
+    return result
+
+
+def _norm(vector: Values, xp: Any) -> Any:
+    return xp.sqrt(np.sum(vector * vector))
+
+
+def _range(numbers: list[Any]) -> tuple[float, float]:
+    """Return doubles below and above all numbers, which are positive."""
+    return min(float(x.lower()) for x in numbers) / _UP, max(float(x.upper()) for x in numbers) * _UP
