@@ -17,6 +17,7 @@ from veselova.analytic.clock import Clock, Rate
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
+from veselova.analytic.waves import turns, waves
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["ColumnsForModes", "FourierClock", "grown"]
@@ -38,8 +39,8 @@ _FIRST_MODES = 64
 #: Smallest dt/dτ₁, as a part of its mean, that a Newton step of the inverse clock divides by.
 _LEAST_SLOPE = 0.05
 
-#: Entries of one block of (times × modes): 16 MB of temporaries.
-_BLOCK = 2_000_000
+#: Entries of one block of (times × modes): temporaries that stay in the cache.
+_BLOCK = 50_000
 
 #: A Newton step of this many cycles leaves an error of its square.
 _SETTLED = 1e-9
@@ -61,21 +62,34 @@ class FourierClock(Clock):
         offset, both = 2 * np.pi * (self._modes @ in_tau1.start), 2 * np.stack([self._amplitudes, 2 * coefficients], axis=1)
         wave = np.stack([np.cos(offset), np.sin(offset)], axis=1)
         self._weights = both * np.stack([wave[:, 0], -wave[:, 1]], axis=1), both * wave[:, ::-1]
+        self._at_start = np.cumsum(np.append(0.0, self._weights[1][:, 1])) / 2
+        self._highest = int(np.max(np.abs(self._modes), initial=0))
+        self._reach = 2 * float(np.sum(np.abs(self._amplitudes))) / mean
+        self._longest, self._fastest = 1 / (np.pi * np.abs(modes @ in_tau1.rates)), float(np.max(np.abs(in_tau1.rates)))
 
     @property
     def size(self) -> int:
         """Return the number of modes kept, m and −m counted once."""
         return int(self._modes.shape[0])
 
+    @property
+    def mean(self) -> float:
+        """Return F_0."""
+        return self._mean
+
+    def ahead(self, means: Array) -> tuple[Array, Array]:
+        """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
+        advance = self._in_time.advance(means)
+        return self._periodic(advance, self.size)[0], self._in_time.start + advance
+
     def error(self, tau1: Array) -> Array:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
 
         Modes left out are as small and hardly more numerous; independent errors add in squares.
         """
-        longest = 1 / (np.pi * np.abs(self._modes @ self._in_tau1.rates))
-        farthest = float(np.max(np.abs(tau1)))
-        spread = np.sqrt(np.sum(np.minimum(longest, farthest) ** 2)) if self.size else 0.0
-        return np.full(tau1.shape, 4 * _SMALLEST_MODE * (spread + 1 / float(np.max(np.abs(self._in_tau1.rates)))))
+        farthest = float(max(abs(tau1[0]), abs(tau1[-1])))
+        spread = np.sqrt(np.sum(np.minimum(self._longest, farthest) ** 2))
+        return np.full(tau1.shape, 4 * _SMALLEST_MODE * (spread + 1 / self._fastest))
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
@@ -91,17 +105,15 @@ class FourierClock(Clock):
         of_products, of_squares = self._weights[0][:size], self._weights[1][:size]
         for first in range(0, advance.shape[0], block):
             rows = slice(first, first + block)
-            half = np.pi * (advance[rows] @ modes.T)
-            sine = np.sin(half)
-            result[rows] = (sine * np.cos(half, out=half)) @ of_products - np.square(sine, out=sine) @ of_squares
-        result[:, 1] += np.sum(of_squares[:, 1]) / 2
+            half = waves(turns(np.pi * advance[rows], self._highest), modes)
+            result[rows] = (half.imag * half.real).T @ of_products - np.square(half.imag).T @ of_squares
+        result[:, 1] += self._at_start[size]
         return result[:, 0], result[:, 1]
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z): Newton's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
         uniform = self._in_time.advance(times)
-        reach = np.full_like(times, 2 * float(np.sum(np.abs(self._amplitudes))) / self._mean)
-        delta = np.zeros_like(times)
+        delta, reach = np.zeros_like(times), np.full_like(times, self._reach)
         for size in sorted({min(self.size, _FIRST_MODES), self.size}):
 
             def excess(delta: Array, size: int = size) -> tuple[Array, Array]:
@@ -111,14 +123,15 @@ class FourierClock(Clock):
             if size < self.size:  # a truncated sum need not increase: two plain steps towards it are all it is good for
                 for _ in range(2):
                     value, slope = excess(delta)
-                    delta = np.clip(delta - value / np.maximum(slope, _LEAST_SLOPE * self._mean), -reach, reach)
+                    newton = delta - value / np.maximum(slope, _LEAST_SLOPE * self._mean)
+                    delta = np.maximum(np.minimum(newton, self._reach), -self._reach)
             else:
-                delta = increasing_root(excess, delta, -reach, reach, _SETTLED / float(np.max(self._in_tau1.rates)))
+                delta = increasing_root(excess, delta, -reach, reach, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
         return times / self._mean + delta, z
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[Array, Array]:
+def _significant_modes(rate: Rate[Any]) -> tuple[NDArray[np.int64], Array]:
     """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
     columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
 
@@ -128,7 +141,7 @@ def _significant_modes(rate: Rate[Any]) -> tuple[Array, Array]:
         return values, np.abs(values) > threshold
 
     modes, values = grown(rate.inversion.periods.genus, determinants)
-    return modes.astype(np.float64), values.astype(np.float64)
+    return modes, values.astype(np.float64)
 
 
 class ColumnsForModes:

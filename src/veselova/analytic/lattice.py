@@ -126,9 +126,10 @@ def _spreads(form: Array) -> Array:
 
 def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:
     """Return (S, C, T_GG⁻¹): C = T_FG T_GG⁻¹, S = T_FF − C T_GF."""
-    inverse = np.linalg.inv(T[np.ix_(G, G)]) if G else np.empty((0, 0))
-    C = T[np.ix_(F, G)] @ inverse
-    S = T[np.ix_(F, F)] - C @ T[np.ix_(G, F)]
+    of_F, of_G = T[F], T[G]
+    inverse = np.linalg.inv(of_G[:, G]) if G else np.empty((0, 0))
+    C = of_F[:, G] @ inverse
+    S = of_F[:, F] - C @ of_G[:, F]
     return (S + S.T) / 2, C, (inverse + inverse.T) / 2
 
 

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprf
 
+from veselova.analytic.waves import cosine_sums, sine_sums
+
 __all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
@@ -153,6 +155,8 @@ class Double(Arithmetic):
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     floor = staticmethod(np.floor)
+    sine_sums = staticmethod(sine_sums)
+    cosine_sums = staticmethod(cosine_sums)
 
     def number(self, value: Any) -> float:
         """Return the nearest double."""
@@ -160,7 +164,7 @@ class Double(Arithmetic):
 
     def array(self, values: Any) -> Values:
         """Return a float64 array, entries correctly rounded."""
-        return np.array(np.vectorize(float, otypes=[float])(values) if np.size(values) else values, dtype=np.float64)
+        return np.array(values, dtype=np.float64)
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""

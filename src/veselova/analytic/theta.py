@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, half_of, lattice_points, schur, small_norm
+from veselova.analytic.waves import turns, waves
 
 __all__ = ["Theta"]
 
@@ -35,23 +36,49 @@ _VANISHING = 200.0
 #: i^m.
 _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
-#: Entries of one block of (points × lattice): 16 MB of temporaries.
-_BLOCK = 2_000_000
+#: Entries of one block of (points × lattice): temporaries that stay in the cache.
+_BLOCK = 100_000
 
 
 @dataclass(frozen=True)
 class _Family:
-    """Characteristics with the same Gaussians and waves: their places among those asked for, and what differs.
+    """M characteristics with the same Gaussians and waves.
 
-    tables (K, M·W): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
-    parities (|G|, M): 2ε_G · signs (M,): of the reduction of a characteristic modulo one, and det T_GG^{−1/2}
+    orders (X, |F|): 2x of the waves
+    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
     """
 
-    places: list[int]
-    waves: Array
+    orders: NDArray[np.int64]
     tables: Array
+
+    def sums(self, bells: Array, turned: NDArray[np.complex128]) -> Array:
+        """Return the sums without their signs, shape (M, N)."""
+        weighted = self.tables @ bells.T
+        if not self.orders.shape[1]:
+            return np.asarray(weighted)
+        along = waves(turned, self.orders)
+        parts = np.concatenate([along.real, along.imag])
+        weighted = weighted.reshape(-1, *parts.shape)
+        return np.asarray(np.sum(np.multiply(weighted, parts, out=weighted), axis=1))
+
+
+@dataclass(frozen=True)
+class _Group:
+    """The families with one δ_G, and of all their characteristics:
+
+    places  among those asked for · parities (|G|, M): 2ε_G · signs (M,): of their reduction modulo one, and det T_GG^{−1/2}
+    """
+
+    delta_G: Array
+    families: list[_Family]
+    places: list[int]
     parities: Array
     signs: Array
+
+    @cached_property
+    def highest(self) -> int:
+        """Return the largest 2|x_i| of the waves."""
+        return max(int(np.max(np.abs(family.orders), initial=0)) for family in self.families)
 
 
 @dataclass(frozen=True)
@@ -85,6 +112,11 @@ class Theta:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
         return centred_points(self._parts[2], RADIUS)
 
+    @cached_property
+    def _gaussian_norms(self) -> Array:
+        k = self._gaussian_lattice
+        return np.asarray(np.sum((k @ self._parts[2]) * k, axis=1))
+
     @property
     def cost(self) -> float:
         """Return about the number of lattice terms, without forming them, and what their Gaussians and waves take."""
@@ -107,15 +139,15 @@ class Theta:
         |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
         """
         result = np.empty((z.shape[0], len(characteristics)))
-        families, y = self._families(tuple(characteristics)), self._coordinates.points(z - 2 * np.rint(z / 2))
-        block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(f.tables.shape[1] for _, fs in families for f in fs)))
+        groups, y = self._groups(tuple(characteristics)), self._coordinates.points(z - 2 * np.rint(z / 2))
+        block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
         for first in range(0, z.shape[0], block):
             rows = slice(first, first + block)
-            for delta_G, members in families:
-                bells, r, nearest = self._bells(y[rows], delta_G)
-                for family in members:
-                    sums = self._sums(y[rows], family, bells, r)
-                    result[rows, family.places] = family.signs * (1 - 2 * np.mod(nearest @ family.parities, 2)) * sums
+            for group in groups:
+                bells, r, nearest = self._bells(y[rows], group.delta_G)
+                turned = turns(np.pi * (y[rows][:, self._split[0]] - r @ self._parts[1].T), group.highest)
+                sums = np.concatenate([family.sums(bells, turned) for family in group.families])
+                result[rows, group.places] = group.signs * (1 - 2 * np.mod(nearest @ group.parities, 2)) * sums.T
         return result
 
     def _bells(self, y: Array, delta_G: Array) -> tuple[Array, Array, Array]:
@@ -127,20 +159,11 @@ class Theta:
         if k.shape[1] == 0:
             return np.ones((y.shape[0], 1)), r, nearest
         projected = r @ inverse
-        quadratic = np.sum((k @ inverse) * k, axis=1) - 2 * projected @ k.T + np.sum(projected * r, axis=1)[:, None]
+        quadratic = self._gaussian_norms - (2 * projected) @ k.T + np.sum(projected * r, axis=1)[:, None]
         return np.exp(-np.pi * np.where(quadratic < _VANISHING, quadratic, np.inf)), r, nearest
 
-    def _sums(self, y: Array, family: _Family, bells: Array, r: Array) -> Array:
-        """Return the sums of a family without their signs, shape (N, M)."""
-        weighted = bells @ family.tables
-        if not family.waves.size:
-            return np.asarray(weighted)
-        phases = 2 * np.pi * ((y[:, self._split[0]] - r @ self._parts[1].T) @ family.waves.T)
-        waves = np.concatenate([np.cos(phases), np.sin(phases)], axis=1)
-        return np.asarray((weighted.reshape(len(y), -1, waves.shape[1]) @ waves[:, :, None])[:, :, 0])
-
-    def _families(self, characteristics: tuple[Characteristic, ...]) -> list[tuple[Array, list[_Family]]]:
-        """Return δ_G and the families of each."""
+    def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
+        """Return the families by δ_G."""
         if characteristics not in self._grouped:
             F, G = self._split
             local = [self._coordinates.characteristic(c) for c in characteristics]
@@ -148,25 +171,36 @@ class Theta:
             for place, (c, _) in enumerate(local):
                 places[tuple(c.delta[i] for i in G)][tuple(c.epsilon[i] for i in F)].append(place)
             self._grouped[characteristics] = [
-                (np.array(delta_G) / 2, [self._family([local[i] for i in of], of) for of in members.values()])
+                self._group(
+                    delta_G, [[local[i] for i in of] for of in members.values()], [i for of in members.values() for i in of]
+                )
                 for delta_G, members in places.items()
             ]
         return self._grouped[characteristics]
 
     @cached_property
-    def _grouped(self) -> dict[tuple[Characteristic, ...], list[tuple[Array, list[_Family]]]]:
+    def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
         return {}
 
-    def _family(self, members: list[tuple[Characteristic, int]], places: list[int]) -> _Family:
-        F, G = self._split
-        parities = np.array([[c.epsilon[i] for i in G] for c, _ in members], dtype=float).reshape(len(members), len(G)).T
-        tables = 1 - 2 * np.mod(self._gaussian_lattice @ parities, 2)
-        x, crossing = self._crossing(members[0][0].epsilon)
+    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[Characteristic, int]]], places: list[int]) -> _Group:
+        flat = [given for of in members for given in of]
+        parities = self._parities([c for c, _ in flat])
+        families = [self._family([c for c, _ in of]) for of in members]
+        return _Group(np.array(delta_G) / 2, families, places, parities, self._parts[3] * np.array([sign for _, sign in flat]))
+
+    def _parities(self, members: list[Characteristic]) -> Array:
+        G = self._split[1]
+        return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
+
+    def _family(self, members: list[Characteristic]) -> _Family:
+        F = self._split[0]
+        tables = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
+        x, crossing = self._crossing(members[0].epsilon)
         if F:
-            quarters = np.rint(2 * x @ np.array([[c.delta[i] for c, _ in members] for i in F])).astype(int) % 4
+            quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
             turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
             tables = (tables[:, :, None] * np.concatenate([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
-        return _Family(places, x, tables, parities, self._parts[3] * np.array([sign for _, sign in members]))
+        return _Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
 
     def _crossing(self, epsilon: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
         """Return the x of the waves and w_x e^{2πi x·Ck}, shape (K, X); w_x counts x and −x."""
