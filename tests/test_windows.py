@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,23 @@ def test_far_windows_keep_every_digit() -> None:
     many, single = solve(problem, times), solve(problem, times[chosen])
     assert many.provenance.details["evaluations"] < 500
     assert np.max(np.abs(many.frame[chosen] - single.frame)) < 1e-13
+
+
+def test_stretches_far_apart_have_windows_of_their_own() -> None:
+    problem = random_problem(np.random.default_rng(6), 3)
+    times = np.unique(np.concatenate([start + np.linspace(0, 3, 700) for start in (-1e6, -2.0, 10.0, 1e5)]))
+    many, chosen = solve(problem, times), np.arange(0, times.size, 13)
+    assert many.provenance.details["evaluations"] < times.size
+    assert_one_motion(many, solve(problem, times[chosen]), chosen)
+
+
+def test_series_from_windows_share_their_rows_and_survive_pickling() -> None:
+    problem = random_problem(np.random.default_rng(6), 3)
+    many = solve(problem, np.linspace(0, 10, 2000))
+    kept = pickle.loads(pickle.dumps(many))
+    for name in problem.outputs:
+        assert np.array_equal(many.series(name), kept.series(name))
+        assert not many.series(name).flags.writeable
 
 
 def test_windows_serve_neumann_time() -> None:

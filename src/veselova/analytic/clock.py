@@ -144,6 +144,15 @@ class Clock(ABC):
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z modulo 2) at physical times."""
 
+    @property
+    @abstractmethod
+    def mean(self) -> float:
+        """Return F_0, the mean of dt/dτ₁."""
+
+    @abstractmethod
+    def ahead(self, means: Array) -> tuple[Array, Array]:
+        """Return (t − u, z modulo 2) at mean times u = F_0τ₁."""
+
     @abstractmethod
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times."""
@@ -165,6 +174,15 @@ class UniformClock(Clock):
 
     def __init__(self, in_time: LinearFlow, rate: float) -> None:
         self._in_time, self._rate = in_time, rate
+
+    @property
+    def mean(self) -> float:
+        """Return F_0, a change of units."""
+        return self._rate
+
+    def ahead(self, means: Array) -> tuple[Array, Array]:
+        """Return (0, z): the mean time is the time."""
+        return np.zeros_like(means), self._in_time.phases(means)
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z)."""

@@ -1,7 +1,7 @@
 """What an orbit costs, and which clock is the cheaper for given times: seconds on one core, from measurements.
 
 The Fourier clock costs its modes once, and all of them again at every inversion; panels cost evaluations all along the orbit, and
-their inversions nothing to speak of. A window of many times (analytic.windows) inverts the clock twice, a single time once.
+their inversions nothing to speak of. A window of many times (analytic.windows) takes one sum of them, a single time an inversion.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ _LARGEST_EXPONENT = 70.0
 
 #: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
-_MODE_INVERTED, _INVERSION = 0.13e-6, 1e-6
-_PANEL_CYCLE = {1: 2e-5, 2: 5e-5, 3: 1.5e-4, 4: 4.5e-4}
-_EVALUATION = {1: 1e-6, 2: 2e-6, 3: 5e-6, 4: 12e-6}
-_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 1.5e-3, 25e-6
+_MODE_INVERTED, _INVERSION = 0.02e-6, 1e-6
+_PANEL_CYCLE = {1: 1.6e-5, 2: 4e-5, 3: 6e-5, 4: 1.6e-4}
+_EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
+_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 
 #: An inversion on panels, and the cycles that these reach beyond the times.
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 2.0

@@ -48,7 +48,11 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     at_once = float(np.sum((_PHASE * _EPSILON + start) * steepness.by_phase))
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
     evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
-    error = evaluation * _EPSILON + at_once + with_time * elapsed + steepness.along_flow * clock.error(tau1)
+    error = clock.error(tau1)  # in place from here on: fresh memory costs more than sums
+    error *= steepness.along_flow
+    elapsed *= with_time
+    error += elapsed
+    error += evaluation * _EPSILON + at_once
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
         error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
     return np.asarray(error)

@@ -29,7 +29,7 @@ def increasing_root(
     for _ in range(_MOST_STEPS):
         value, slope = function(x)
         low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-        newton = x - np.divide(value, slope, out=np.full_like(x, np.inf), where=slope > 0)
+        newton = x - value / np.where(slope > 0, slope, np.nan)
         inside = (newton >= low) & (newton <= high)
         trial = np.where(inside, newton, (low + high) / 2)
         step, x = np.abs(trial - x), trial

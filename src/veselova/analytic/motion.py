@@ -33,7 +33,11 @@ class Motion(ABC, Generic[P]):
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times."""
-        began, grid = time.perf_counter(), validated_times(times)
+        return self.along(validated_times(times))
+
+    def along(self, grid: Array) -> Trajectory:
+        """Return the trajectory at validated times."""
+        began = time.perf_counter()
         if not self.problem.moves:
             provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)

@@ -33,7 +33,7 @@ class PanelClock(Clock):
     name: ClassVar[str] = "panels"
 
     def __init__(self, rate: Callable[[Array], Array], mean: float, in_tau1: LinearFlow, earliest: float, latest: float) -> None:
-        self._in_tau1 = in_tau1
+        self._in_tau1, self._mean = in_tau1, mean
         # The mean clock's estimate; extended where that was short.
         self._panels = PanelIntegral(rate, in_tau1, min(earliest, 0.0) / mean, max(latest, 0.0) / mean)
         while self._panels.values[0] > min(earliest, 0.0) or self._panels.values[-1] < max(latest, 0.0):
@@ -43,6 +43,18 @@ class PanelClock(Clock):
     def size(self) -> int:
         """Return the number of nodes."""
         return self._panels.size
+
+    @property
+    def mean(self) -> float:
+        """Return F_0."""
+        return self._mean
+
+    def ahead(self, means: Array) -> tuple[Array, Array]:
+        """Return (t − u, z) at mean times u within the panels, or near."""
+        tau1 = means / self._mean
+        while tau1[0] < self._panels.borders[0] or tau1[-1] > self._panels.borders[-1]:
+            self._panels.extend()
+        return self.time(tau1) - means, self._in_tau1.phases(tau1)
 
     def error(self, tau1: Array) -> Array:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share."""

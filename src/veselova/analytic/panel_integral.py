@@ -72,9 +72,12 @@ class PanelIntegral:
         return np.asarray(self.values[panel] + self.within(panel, x)[0])
 
     def error(self, tau1: Array) -> Array:
-        """Return the tails of the panels between zero and Neumann times, twice."""
-        panel = self.panel_of(self.borders, tau1)
-        return np.asarray(2 * np.maximum(np.abs(self._tails[panel + 1]), np.abs(self._tails[panel])))
+        """Return the tails of the panels between zero and increasing Neumann times, twice."""
+        tails = 2 * np.maximum(np.abs(self._tails[1:]), np.abs(self._tails[:-1]))
+        if tau1.size < tails.size:
+            return np.asarray(tails[self.panel_of(self.borders, tau1)])
+        ends = np.searchsorted(tau1, self.borders[1:-1])
+        return np.repeat(tails, np.diff(ends, prepend=0, append=tau1.size))
 
     def panel_of(self, borders: Array, values: Array) -> NDArray[np.intp]:
         """Return the panels in which values lie, borders being those of τ₁ or of the integral."""

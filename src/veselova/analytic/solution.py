@@ -14,6 +14,7 @@ from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
 from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
 from veselova.analytic.curve import Curve
+from veselova.analytic.filling import NODES
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.orbit import LinearFlow
@@ -25,10 +26,9 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
-from veselova.analytic.windows import NODES, Windows
+from veselova.analytic.windows import Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
-from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["METHODS", "Solution"]
@@ -38,8 +38,8 @@ Array = NDArray[np.float64]
 #: The two routes from phases to attitude.
 METHODS = ("theta", "angles")
 
-#: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.7, 3.6, 9 and 55
-#: against 6, 7, 14 and 25).
+#: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.4, 1.1, 4 and 24
+#: against 2.6, 3.6, 10 and 8).
 _THETA_GENUS = 4
 
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
@@ -105,10 +105,6 @@ class Solution:
         if (method or self.default_method()) == "angles" and not self.near_separatrix:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return np.asarray(1 / self._rate_of_position(self.quotients.position(z)))
-
-    def rate_along(self, attitude: Attitude) -> Array:
-        """Return dt/dτ₁ at points where the attitude is known."""
-        return np.asarray(1 / self._rate_of_position(attitude.q))
 
     @cached_property
     def _rate_of_position(self) -> Callable[[Array], Array]:
@@ -273,17 +269,16 @@ class Solution:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     def states(self, attitude: Attitude) -> tuple[Array, Array, Array]:
-        """Return (q̇, frame, λ) along the problem's principal axes."""
-        moving, n = self.moving, self.problem.n
+        """Return dτ₁/dt, q̇ and the frame along the problem's principal axes."""
+        rate, moving, n = self._rate_of_position(attitude.q), self.moving, self.problem.n
         frame = np.empty((attitude.q.shape[0], n, n))
         frame[:, :, 0] = attitude.q @ moving.directions.T
         frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
-        q_dot = (attitude.q_prime @ moving.directions.T) * self._rate_of_position(attitude.q)[:, None]
-        if attitude.spheroconic.size:
-            frozen = np.tile(1 / to_float(moving.frozen), (frame.shape[0], 1))
-            spheroconic = np.sort(np.concatenate([attitude.spheroconic / float(moving.unit), frozen], axis=1), axis=1)
-        else:
-            spheroconic = to_spheroconic(self.problem.A, frame[:, :, 0])
-        return q_dot, frame, spheroconic
+        return rate, (attitude.q_prime @ moving.directions.T) * rate[:, None], frame
+
+    def spheroconic(self, attitude: Attitude) -> Array:
+        """Return the λ's of all directions, from an attitude that has those of the moving ones."""
+        frozen = np.tile(1 / to_float(self.moving.frozen), (attitude.q.shape[0], 1))
+        return np.sort(np.concatenate([attitude.spheroconic / float(self.moving.unit), frozen], axis=1), axis=1)

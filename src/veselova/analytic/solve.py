@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from veselova.analytic.body_motion import BodyMotion
 from veselova.analytic.clock import Clock
 from veselova.analytic.error import estimated_error
+from veselova.analytic.filling import Along
 from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
 from veselova.analytic.solution import METHODS, Solution
-from veselova.analytic.windows import Along
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Series
@@ -73,7 +73,7 @@ def solve(
         motion = _TorusMotion(problem, method, clock)
         if solution is not None:  # no field of the motion: pickling leaves behind what can be computed again
             vars(motion)["_solution"] = solution
-        return motion(grid)
+        return motion.along(grid)
     if certified and method == "theta":
         raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
     if clock is not None:
@@ -93,7 +93,7 @@ def _separable_motion(
         if given not in allowed:
             required = {"method": "angles", "clock": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
             raise InvalidInput((field,), f"{required} for system {problem.system}", shown(given))
-    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem))(grid)
+    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)).along(grid)
 
 
 @dataclass(frozen=True)
@@ -140,17 +140,20 @@ class _TorusMotion(Motion[TorusProblem]):
 
 
 def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Along, Array]:
-    """Return the motion at the times, (q̇, frame, λ) its series, and its error.
+    """Return the motion at the times, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
 
-    Many times leave λ to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest does
-    not.
+    Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
+    does not.
     """
     windows = solution.windows(grid, clock.name)
-    count = 3 if windows.inversions == grid.size else 2
+    with_coordinates = route == "angles" and windows.inversions == grid.size
 
     def evaluation(z: Array) -> tuple[Array, tuple[Array, ...]]:
         attitude = solution.attitude(z, route)
-        return solution.rate_along(attitude), solution.states(attitude)[:count]
+        rate, *series = solution.states(attitude)
+        return 1 / rate, (*series, solution.spheroconic(attitude)) if with_coordinates else tuple(series)
 
     along = windows.along(clock, solution.in_tau1.rates, evaluation)
-    return along, estimated_error(solution, grid, along.tau1, clock, route) + along.error
+    error = estimated_error(solution, grid, along.tau1, clock, route)
+    error += along.error
+    return along, error

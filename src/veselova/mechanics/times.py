@@ -34,7 +34,7 @@ def validated_times(times: Any) -> Array:
         array = to_float(exact_vector(times, ("times",)))
     if array.size == 0:
         raise InvalidInput(("times",), "at least one time", "none")
-    falls = np.flatnonzero(np.diff(array) <= 0)
+    falls = np.flatnonzero(array[1:] <= array[:-1])
     if falls.size:
         i = int(falls[0]) + 1
         raise InvalidInput(

@@ -1,0 +1,132 @@
+"""Series along a window of Neumann time, as polynomials in physical time on its pieces.
+
+A window's Chebyshev series in τ₁ go over to each of a few equal pieces by constant matrices. There dt/dτ₁ varies little: t(τ₁) is
+inverted at Chebyshev points in t, and short series in t follow, as powers of x ∈ [−1, 1]. Their coefficients fall fast enough
+(by 5 and more from one to the next) that powers lose no digit, and a power costs one multiplication.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from veselova.analytic.increasing import increasing_root
+
+__all__ = ["ORDER", "Pieces", "chebyshev_points", "to_coefficients"]
+
+Array = NDArray[np.float64]
+
+#: Coefficients of a piece in time.
+ORDER = 20
+
+#: A Newton step of this size, in half pieces, leaves an error of its square.
+_SETTLED = 1e-9
+
+#: Times whose powers are formed at once: they stay in the cache.
+_TIMES = 4096
+
+
+def chebyshev_points(count: int) -> Array:
+    """Return the Chebyshev points of [−1, 1], from 1 downwards."""
+    return np.asarray(np.cos(np.pi * (np.arange(count) + 0.5) / count))
+
+
+def to_coefficients(count: int) -> Array:
+    """Return the matrix from values at the points to Chebyshev coefficients; whole numbers are reduced before they meet π."""
+    angles = np.outer(np.arange(count), 2 * np.arange(count) + 1) % (4 * count)
+    result = np.cos(angles * (np.pi / (2 * count))) * (2 / count)
+    result[0] /= 2
+    return np.asarray(result)
+
+
+_X, _TO_COEFFICIENTS = chebyshev_points(ORDER), to_coefficients(ORDER)
+#: From Chebyshev coefficients to those of powers.
+_TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
+
+
+@lru_cache(maxsize=16)
+def _restriction(nodes: int, count: int) -> Array:
+    """Return the matrix from Chebyshev coefficients on [0, 1] to those on each of ``count`` pieces, (count, ORDER, nodes)."""
+    places = (np.arange(count)[:, None] + (_X + 1) / 2) / count
+    return np.asarray(_TO_COEFFICIENTS @ np.moveaxis(_polynomials(2 * places - 1, nodes), 0, -1))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """The pieces of W windows.
+
+    borders (W, count+1) in time since the window's start · tables (W, count, ORDER, C) of powers; the first column is the part of
+    the window's Neumann time that has passed · tails (W,) the largest of the last Chebyshev coefficients
+    """
+
+    borders: Array
+    tables: Array
+    tails: Array
+
+    @classmethod
+    def of(cls, rates: Array, series: Array, stretch: float, count: int) -> Pieces:
+        """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns)."""
+        windows, nodes = rates.shape
+        restriction, half = _restriction(nodes, count), stretch / (2 * count)
+        slope = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
+        elapsed = chebyshev.chebint(slope, lbnd=-1)
+        durations = np.sum(elapsed, axis=0)
+        # Axes: the pieces of all windows, the points in time, the columns.
+        target = durations[:, None] * ((_X + 1) / 2)
+
+        def excess(x: Array) -> tuple[Array, Array]:
+            value, rise = (chebyshev.chebval(x, c[:, :, None], tensor=False) for c in (elapsed, slope))
+            return np.asarray(value - target), np.asarray(rise)
+
+        one = np.ones_like(target)
+        x = increasing_root(excess, np.broadcast_to(_X, target.shape), -one, one, _SETTLED)
+        in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
+        at_times = np.moveaxis(_polynomials(x, ORDER), 0, -1) @ in_tau1
+        passed = (np.tile(np.arange(count), windows)[:, None] + (x + 1) / 2) / count
+        coefficients = _TO_COEFFICIENTS @ np.concatenate([passed[:, :, None], at_times], axis=2)
+        borders = np.zeros((windows, count + 1))
+        np.cumsum(durations.reshape(windows, count), axis=1, out=borders[:, 1:])
+        tails = np.max(np.abs(coefficients[:, -3:]).reshape(windows, -1), axis=1)
+        return cls(borders, (_TO_POWERS @ coefficients).reshape(windows, count, ORDER, -1), tails)
+
+    def fill(self, window: int, since: Array, out: Array) -> None:
+        """Fill ``out`` (N, C) with the series at increasing times since the start of a window."""
+        borders, scale = self.borders[window], 2 / np.diff(self.borders[window])
+        for first in range(0, since.size, _TIMES):
+            block = since[first : first + _TIMES]
+            ends = [0, *np.searchsorted(block, borders[1:-1]).tolist(), block.size]
+            counts = np.diff(ends)
+            powers = _powers((block - np.repeat(borders[:-1], counts)) * np.repeat(scale, counts) - 1)
+            for table, begin, end in zip(self.tables[window], ends[:-1], ends[1:], strict=True):
+                if begin < end:
+                    np.matmul(powers[:, begin:end].T, table, out=out[first + begin : first + end])
+
+
+def _powers(x: Array) -> Array:
+    """Return x^0 … x^{ORDER−1}, the order first."""
+    result = np.empty((ORDER, x.size))
+    result[0], result[1] = 1.0, x
+    for k in range(2, ORDER):
+        np.multiply(result[k - 1], x, out=result[k])
+    return result
+
+
+def _polynomials(x: Array, count: int) -> Array:
+    """Return T_0 … T_{count−1} at points of [−1, 1], the order first.
+
+    Near 1 differences T_k − T_{k−1} keep the digits that the recurrence loses there (Reinsch); T_k is even or odd.
+    """
+    result = np.empty((count, *x.shape))
+    size = np.abs(x)
+    difference = size - 1
+    twice = 2 * difference
+    result[0], result[1] = 1.0, size
+    for k in range(1, count - 1):
+        difference = difference + twice * result[k]
+        result[k + 1] = result[k] + difference
+    result[1::2] *= np.sign(x)
+    return result
