@@ -48,7 +48,7 @@ def main() -> None:
 
         solution = Solution(problem)
         unguarded = solution.attitude(solution._fourier(False).tau1(times)[1], "angles")
-        difference = np.max(np.abs(solution.states(unguarded)[1] - trajectory.frame))
+        difference = np.max(np.abs(solution.states(unguarded)[2] - trajectory.frame))
         floor = problem.conditioning_floor(times)[0]
         size = trajectory.provenance.details["clock_size"]
         print(
