@@ -1,0 +1,106 @@
+"""Starts at which branch points coincide, with many digits and with certified errors: they are moved, by how much is bounded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import Decimal
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from truth import true_motion
+from veselova.analytic.balls import balls
+from veselova.analytic.drift import Drift, expected_growth
+from veselova.analytic.reduction import moving_part
+from veselova.analytic.spectrum import resolved
+
+SYMMETRIC = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
+FRAMED = vs.Veselova(
+    [3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]], normalize=True
+)
+SPHERE = vs.Veselova([2, 2, 2], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
+FOUR = vs.Veselova([3, 3, 2, 1], [1, 2, 1, 1], [2, -1, 3, 1], normalize=True)
+ALIGNED = vs.Veselova([3, 3, 2, 1], [1, 0, 1, 1], [2, -1, 3, 1], normalize=True)
+TINY = vs.Veselova([3, 2, 1], ["1e-150", "0.6", "0.8"], ["1e-150", "0.8", "-0.6"], normalize=True)
+SCALED = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4e140", "0.7e140", "-0.3e140"], normalize=True)
+
+SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
+
+
+@pytest.mark.parametrize(
+    ("problem", "times"),
+    [
+        (SYMMETRIC, [-3, "0.5", 10]),
+        (FRAMED, [-3, "0.5", 10]),
+        (SPHERE, [-3, "0.5", 30]),
+        (FOUR, ["0.5", 2]),
+        (TINY, [-1, 4]),
+        (SCALED, ["1e-141", "3e-140"]),
+    ],
+    ids=["symmetric", "framed", "sphere", "four", "tiny", "scaled"],
+)
+def test_certified_motions_of_coincidences_hold_more_digits(problem: vs.Veselova, times: list[str]) -> None:
+    proven, finer = vs.solve(problem, times, certified=True).decimals, vs.solve(problem, times, digits=45).decimals
+    assert proven.certified
+    assert max(proven.error) < Decimal("1e-18")
+    for name in SERIES:
+        difference = np.abs(proven.midpoints[name] - finer.midpoints[name])
+        assert np.all(difference <= proven.radii[name] + finer.radii[name]), name
+
+
+@pytest.mark.parametrize("problem", [SYMMETRIC, SPHERE, FOUR], ids=["symmetric", "sphere", "four"])
+def test_certified_motions_of_equal_A_hold_the_integrated_ones(problem: vs.Veselova) -> None:
+    times = np.array([-1.0, 0.5, 2.0])
+    proven, (frame, _, tau1) = vs.solve(problem, times, certified=True), true_motion(problem, times)
+    assert np.max(np.abs(proven.frame - frame)) < 1e-15
+    assert np.max(np.abs(proven.tau1 - tau1)) < 1e-14
+
+
+@pytest.mark.parametrize("problem", [SYMMETRIC, FRAMED, ALIGNED], ids=["symmetric", "framed", "four"])
+@pytest.mark.parametrize("digits", [3, 6])
+def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(problem: vs.Veselova, digits: int) -> None:
+    """Equal A's drawn apart by 10^(−2·digits−10): the motions of the two bodies are at most so far from each other."""
+    times, given = [-1, 1, 3], moving_part(problem)
+    moved = resolved(given, digits).moving
+    A = list(problem.exact.A)
+    for a, vector in zip(moved.A, moved.vectors, strict=True):
+        (axis,) = [i for i, component in vector.items() if component]
+        A[axis] = a * moved.unit
+    other = vs.Veselova(A, problem.exact.q, problem.exact.tangent, problem.exact.frame, normalize=True)
+    one, two = (vs.solve(p, times, digits=40).decimals for p in (problem, other))
+    with balls(40) as xp:
+        drift = replace(Drift.of(given, moved, xp), frames=xp.number(0))
+        late, velocity, turned, _ = drift.bounds(xp.array(one.midpoints["tau1"].astype(float)), xp)
+        found = {name: np.abs(one.midpoints[name] - two.midpoints[name]) for name in ("tau1", "q_dot", "q")}
+        for name, bound in (("tau1", late), ("q_dot", velocity), ("q", turned)):
+            largest = np.max(found[name].reshape(len(times), -1), axis=1)
+            assert all(0 < float(x) <= float(b.upper()) for x, b in zip(largest, bound, strict=True)), name
+            assert float(np.max(largest)) > 1e-5 * 10.0 ** (-2 * digits - 10)
+
+
+def test_growth_is_expected_as_it_is_bounded() -> None:
+    found = resolved(moving_part(FOUR), 20)
+    with balls(40) as xp:
+        drift = Drift.of(moving_part(FOUR), found.moving, xp)
+    assert expected_growth(found.spectrum, 30.0) == pytest.approx(drift.growth * 30 / np.log(10), abs=1)
+
+
+def test_a_separatrix_is_not_certified() -> None:
+    """F_1 = v_1² + Σ (q_1v_j−q_jv_1)²/(I_1−I_j) vanishes at q = (0, 1, 1)/√2 with 1/A = 2, 1, 3, whatever the velocity."""
+    problem = vs.Veselova(["1/2", 1, "1/3"], [0, 1, 1], [1, "0.5", "-0.5"], normalize=True)
+    assert resolved(moving_part(problem), 20).separatrices == (1,)
+    with pytest.raises(vs.Unsolved, match="separatrix") as caught:
+        vs.solve(problem, [1], certified=True)
+    assert caught.value.outcome == "not-enclosed"
+
+
+@pytest.mark.parametrize("digits", [62, 150, 210])
+def test_coincidences_keep_to_the_digits_asked_for(digits: int) -> None:
+    """Equal A's, a separatrix, and a coordinate of 1e-150, which is no zero from there on."""
+    for problem in (SYMMETRIC, TINY):
+        found, fewer = (vs.solve(problem, [2], digits=d).decimals for d in (digits, 40))
+        assert max(found.error) < Decimal(10) ** -digits
+        assert np.max(np.abs(found.midpoints["frame"] - fewer.midpoints["frame"])) < Decimal("1e-40")
+    smallest = vs.solve(TINY, [2], digits=max(digits, 155)).decimals.midpoints["q"][0, 0]
+    assert Decimal("1e-151") < abs(smallest) < Decimal("1e-148")
