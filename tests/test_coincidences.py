@@ -86,6 +86,12 @@ def test_growth_is_expected_as_it_is_bounded() -> None:
     assert expected_growth(found.spectrum, 30.0) == pytest.approx(drift.growth * 30 / np.log(10), abs=1)
 
 
+def test_equal_A_are_not_certified_for_ever() -> None:
+    with pytest.raises(vs.Unsolved, match="drift") as caught:
+        vs.solve(SYMMETRIC, [1e5], certified=True)
+    assert caught.value.outcome == "not-enclosed"
+
+
 def test_a_separatrix_is_not_certified() -> None:
     """F_1 = v_1² + Σ (q_1v_j−q_jv_1)²/(I_1−I_j) vanishes at q = (0, 1, 1)/√2 with 1/A = 2, 1, 3, whatever the velocity."""
     problem = vs.Veselova(["1/2", 1, "1/3"], [0, 1, 1], [1, "0.5", "-0.5"], normalize=True)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.clock import Clock
-from veselova.analytic.drift import expected_growth
 from veselova.analytic.enclosed_rest import resting_series
 from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.precision import Values
@@ -128,14 +127,13 @@ class EnclosedMotion:
         self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock
     ) -> tuple[Decimals, Any]:
         farthest = np.max(np.abs(clock.tau1(np.array([float(exact[0]), float(exact[-1])]))[0]))
-        beyond = expected_growth(coarse.spectrum, float(farthest)) if self.certified else 0
-        solution = EnclosedSolution(coarse, working, self.certified, method, beyond=beyond)
+        solution = EnclosedSolution(coarse, working, self.certified, method, float(farthest))
         with solution.arithmetic as xp:
             series, details = solution.series(xp.array(exact), clock)
             if (
                 solution.separatrices and not self.certified
             ):  # the start was moved; what another move would change stands for what this one did
-                neighbour = EnclosedSolution(coarse, working, self.certified, method, -solution.distance)
+                neighbour = EnclosedSolution(coarse, working, self.certified, method, distance=-solution.distance)
                 other, _ = neighbour.series(xp.array(exact), clock)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
             return self._decimals(series, xp), details

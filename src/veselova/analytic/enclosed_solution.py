@@ -17,7 +17,7 @@ from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import Clock, ClockRate, clock_rate
 from veselova.analytic.curve import Curve
-from veselova.analytic.drift import Drift
+from veselova.analytic.drift import Drift, expected_growth
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
 from veselova.analytic.enclosed_theta import EnclosedTheta
@@ -43,6 +43,9 @@ _NEARLY_NATURAL = 1e-9
 #: Least distance of two branch points in doubles, whose squares of roots are to be doubles too.
 _LEAST_WIDTH = 1e-290
 
+#: Digits by which motions may part before a start that was moved is given up.
+_MOST_GROWTH = 1000
+
 #: What a mode of the Fourier clock costs in nodes of panels, at once and with every time.
 _NODES_PER_MODE, _TIMES_PER_NODE = 5, 100
 
@@ -51,17 +54,22 @@ class EnclosedSolution:
     """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
 
     ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only angles can be); else estimated.
-    ``method``: ``theta`` or ``angles``. ``distance`` as in Solution, ``beyond`` as in analytic.spectrum. Raises Unsolved
-    (``not-enclosed``) where a bound cannot be closed.
+    ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the largest I is 1. ``distance``: as
+    in Solution. Raises Unsolved (``not-enclosed``) where a bound cannot be closed.
     """
 
     def __init__(
-        self, coarse: Solution, digits: int, certified: bool, method: str, distance: Fraction | None = None, beyond: int = 0
+        self, coarse: Solution, digits: int, certified: bool, method: str, reach: float = 0.0, distance: Fraction | None = None
     ) -> None:
-        problem = coarse.problem
+        problem, given = coarse.problem, moving_part(coarse.problem)
         #: How far a start on a separatrix is moved.
-        self.distance = Fraction(1, 10 ** (2 * digits + 10 + beyond)) if distance is None else distance
-        found = resolved(moving_part(problem), digits, self.distance, beyond)
+        self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
+        found = resolved(given, digits, self.distance)
+        if certified and found.moving != given:
+            growth = expected_growth(found.spectrum, reach)
+            if growth > _MOST_GROWTH:
+                raise Unsolved("not-enclosed", "the start had to be moved, and no bound of its drift holds for as long as that")
+            found = resolved(given, digits, beyond=growth)
         if certified and found.separatrices:
             raise Unsolved(
                 "not-enclosed", "a separatrix: phases say little of the body there, and theta functions are not bounded"
