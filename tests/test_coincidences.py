@@ -110,3 +110,34 @@ def test_coincidences_keep_to_the_digits_asked_for(digits: int) -> None:
         assert np.max(np.abs(found.midpoints["frame"] - fewer.midpoints["frame"])) < Decimal("1e-40")
     smallest = vs.solve(TINY, [2], digits=max(digits, 155)).decimals.midpoints["q"][0, 0]
     assert Decimal("1e-151") < abs(smallest) < Decimal("1e-148")
+
+
+def test_a_direction_that_hardly_moves_across_a_plane_that_is_not_stable_costs_digits_with_time() -> None:
+    """q_2 of 1e-150 grows like e^(t/4) there; doubles do not follow it, and say so like those of a start on the plane's edge."""
+    problem = vs.Veselova([3, 2, 1], ["0.6", "1e-150", "0.8"], ["0.8", "1e-150", "-0.6"])
+    early = vs.solve(problem, [10])
+    assert early.provenance.details["regime"] == "separatrix"
+    assert 1e-14 < early.error[0] < 1e-10
+    few, many = (vs.solve(problem, [10], digits=digits).decimals for digits in (20, 30))
+    assert np.max(np.abs(few.midpoints["frame"] - many.midpoints["frame"])) < Decimal("1e-20")
+    with pytest.raises(vs.Unsolved) as caught:
+        vs.solve(problem, [400])
+    assert caught.value.outcome == "no-digit-left"
+
+
+def test_the_natural_frame_of_a_direction_that_hardly_moves_has_all_digits() -> None:
+    start = [4, 3, 2, 1], ["1e-150", "0.5", "0.6", "0.62"], ["1e-150", "0.7", "-0.3", "0.2"]
+    problem = vs.Veselova(*start, normalize=True)
+    finer = vs.solve(problem, [0], digits=60).decimals
+    for found in (vs.solve(problem, [0], digits=20, certified=True).decimals, vs.solve(problem, [0], digits=30).decimals):
+        difference = np.abs(found.midpoints["frame"] - finer.midpoints["frame"])
+        assert np.all(difference <= found.radii["frame"] + finer.radii["frame"])
+        assert max(found.error) < Decimal("1e-20")
+
+
+@pytest.mark.parametrize("problem", [FRAMED, ALIGNED], ids=["symmetric", "four"])
+def test_a_time_below_the_range_of_doubles_is_no_zero(problem: vs.Veselova) -> None:
+    one, two = (vs.solve(problem, [time], digits=430).decimals.midpoints["tau1"][0] for time in ("1e-400", "2e-400"))
+    assert one > Decimal("1e-401")
+    assert abs(two / one - 2) < Decimal("1e-25")
+    assert max(vs.solve(problem, ["-1e-400"], certified=True).decimals.error) < Decimal("1e-18")

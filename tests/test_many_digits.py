@@ -17,7 +17,7 @@ from veselova.analytic.balls import balls
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosed_windows import EnclosedWindows
 from veselova.analytic.enclosure import spheroconic
-from veselova.analytic.precision import Decimals
+from veselova.analytic.precision import Arithmetic, Decimals, extended
 from veselova.analytic.secular import zeros_between_poles
 from veselova.mechanics.veselova import Veselova
 
@@ -132,3 +132,26 @@ def test_decimals_cover_their_balls() -> None:
             loose = exactly(ball.rad()) + Fraction(1, 10**52) * max(abs(exactly(ball)), exactly(ball.rad()))
             assert Fraction(radii[0]) <= loose * Fraction(100_002, 100_000)
             assert len(midpoints[0].as_tuple().digits) <= 54
+
+
+def test_balls_take_numbers_of_other_arithmetics_with_their_signs() -> None:
+    with balls(30) as xp:
+        for value in (-2.5, 2.5, Fraction(-1, 3), extended(40).number(-2.5), extended(40).number(0), extended(40).number(7)):
+            assert xp.number(value).contains(flint.arb(flint.fmpq(*Fraction(str(value)).as_integer_ratio()))), value
+
+
+@pytest.mark.parametrize("count", [301, 640])
+def test_series_of_many_nodes_are_the_sums_that_define_them(count: int, rng: np.random.Generator) -> None:
+    with balls(30) as xp:
+        values = xp.array(rng.normal(size=(2, count))) / 3
+        direct = Arithmetic.cosine_series(xp, values)
+        for one, other in zip(xp.cosine_series(values).ravel(), direct.ravel(), strict=True):
+            assert one.overlaps(other)
+            assert float(one.rad()) < 1e-34
+
+
+def test_many_digits_near_a_separatrix_fit_into_memory() -> None:
+    """A relative gap of 1e-251: series of thousands of terms, whose sums node by node took gigabytes."""
+    problem = Veselova([3, 2, 1], ["0.6", "1e-125", "0.8"], ["0.8", "1e-125", "-0.6"])
+    found, finer = (vs.solve(problem, [1], digits=digits).decimals for digits in (20, 30))
+    assert np.max(np.abs(found.midpoints["frame"] - finer.midpoints["frame"])) < 1e-20

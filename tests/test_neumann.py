@@ -109,3 +109,15 @@ def test_bad_neumann_starts_are_refused_by_field(fields: dict[str, Any], path: s
     with pytest.raises(InvalidInput) as caught:
         NeumannSystem(**{"A": [2, 1], "q": [1, 0], "q_prime": [0, 1], **fields})
     assert caught.value.field == path
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_a_far_time_beside_it_does_not_change_a_near_one(n: int) -> None:
+    """Beyond 200 cycles frequencies have guard digits; c_1 may be negative here, and had lost its sign on the way to them."""
+    rng = np.random.default_rng(n)
+    for _ in range(4):
+        problem = NeumannSystem(rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n), normalize=True)
+        far, near = solve(problem, [10.0, 1e4]), solve(problem, [10.0])
+        assert np.max(np.abs(far.q[0] - near.q[0])) <= 2 * (far.error[0] + near.error[0])
+        integrated = solve(problem, [10.0], engine="numeric")
+        assert np.max(np.abs(far.q[0] - integrated.q[0])) <= 2 * (far.error[0] + integrated.error[0])

@@ -29,6 +29,9 @@ _GUARD = 6
 _COARSE_DIGITS = 20
 _EXTRA_TERMS = 6
 
+#: Nodes from which series are formed by products of polynomials.
+_MANY_NODES = 300
+
 #: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
 
@@ -86,8 +89,8 @@ class Balls(Arithmetic):
         if isinstance(value, np.generic):
             value = value.item()
         if hasattr(value, "man_exp") and not isinstance(value, flint.arb):  # an mpf
-            mantissa, exponent = value.man_exp
-            return flint.arb((mantissa, exponent))
+            mantissa, exponent = value.man_exp  # of the absolute value
+            return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
     #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
@@ -129,6 +132,10 @@ class Balls(Arithmetic):
         """Return exact upper bounds of |values|."""
         return np.asarray(_upper(values))
 
+    def at_least(self, values: Values) -> Values:
+        """Return exact lower bounds of positive values."""
+        return np.asarray(_lower(values))
+
     def inside(self, inner: Values, outer: Values) -> bool:
         """Return whether every ball lies in the interior of its partner."""
         return all(b.contains_interior(a) for a, b in zip(inner.ravel(), outer.ravel(), strict=True))
@@ -157,6 +164,26 @@ class Balls(Arithmetic):
         """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g)."""
         series = _Series(self, coefficients)
         return lambda psi: series(psi, "real")
+
+    def cosine_series(self, values: Values) -> Values:
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values.
+
+        Many nodes take one product of polynomials a row (Bluestein): w^{m(2j+1)} = w^{m²+m} w^{j²} w^{−(m−j)²}, w = e^{iπ/2N}.
+        """
+        count = values.shape[-1]
+        if count < _MANY_NODES:
+            return super().cosine_series(values)
+        order = np.arange(count)
+        roots = self.turns(self.array(list(range(4 * count))) / (4 * count))
+        chirp, ends = roots[order**2 % (4 * count)], roots[(order**2 + order) % (4 * count)]
+        kernel = flint.acb_poly(_conjugate(chirp)[np.abs(np.arange(1 - count, count))].tolist())
+        result = np.empty((values.size // count, count), dtype=object)
+        for row, out in zip(values.reshape(-1, count), result, strict=True):
+            product = flint.acb_poly((row * chirp).tolist()) * kernel
+            out[:] = _real(np.array([product[m + count - 1] for m in order], dtype=object) * ends)
+        result = result * 2 / count
+        result[:, 0] = result[:, 0] / 2
+        return np.asarray(result.reshape(values.shape))
 
     def turns(self, z: Values) -> Values:
         """Return e^{2πiz}, complex balls."""
@@ -217,6 +244,7 @@ class _Series:
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 
+_lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
 _upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
 _turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
 _conjugate = np.frompyfunc(lambda w: w.conjugate(), 1, 1)

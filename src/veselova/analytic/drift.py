@@ -38,7 +38,7 @@ class Drift:
     apart: |u(0)| + |w(0)|/μ + f/M · matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
     frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| · bend: one of |q''|
     clocks: |k₀−k₁| max√(q,Aq) + k δ((q,Aq)), per unit of τ₁ · clock_slope: k max A, by which |u| enters |ρ₀−ρ₁|
-    slowest: the least dt/dτ₁ · inverses: δ
+    slowest: the least dt/dτ₁ · inverses: δ · highest: max a
     """
 
     apart: Any
@@ -51,6 +51,7 @@ class Drift:
     clock_slope: float
     slowest: float
     inverses: Any
+    highest: float
 
     @classmethod
     def of(cls, given: Moving, moved: Moving, arithmetic: Any) -> Drift:
@@ -84,7 +85,7 @@ class Drift:
                 "inverses": inverses,
             }
             small = {name: xp.at_most(value).item() for name, value in bounds.items()}
-        coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": slow / least_root / _UP}
+        coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": slow / least_root / _UP, "highest": high}
         return cls(frames=arithmetic.number(0), clock_slope=fast * least_root / low * _UP, **coarse, **small)
 
     def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
@@ -96,7 +97,7 @@ class Drift:
         turned = self.frames + 2 * (1 + self.speed / self.growth) * apart + self.speed * late
         slope = (self.clocks + self.clock_slope * turned) / self.slowest / self.slowest
         velocity = (self.growth * apart + self.bend * late) / self.slowest + self.speed * slope
-        return late, velocity, turned, 4 * turned + self.inverses
+        return late, velocity, turned, 4 * self.highest * turned + self.inverses
 
 
 def expected_growth(spectrum: Spectrum, tau1: float) -> int:

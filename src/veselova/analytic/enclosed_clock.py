@@ -109,6 +109,8 @@ class EnclosedClock:
 
     def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
+        if self._orbit.coarse_rates is None:
+            return math.ceil(_NODES_PER_DIGIT * float(self._xp.digits))
         half = reach / (2 * count)
         theta = DOUBLE.nodes(_SAMPLE)
         panels = np.unique(np.linspace(0, count - 1, _SAMPLED_PANELS).astype(np.int64))
@@ -212,7 +214,7 @@ class _Panels:
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
         value, rate = clock(x, xp.digits)
         reach = xp.around_zero((value - times) / (_SLOPE * rate))
-        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * rate)):
+        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * xp.at_least(rate))):
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
         # The root is x less the residual over a slope between the two.
         return np.asarray(x - (value - times) / xp.widened(rate, reach * self._steepness[p]))

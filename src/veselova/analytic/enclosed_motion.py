@@ -73,6 +73,8 @@ class EnclosedMotion:
         clock = solution.clock(grid)
         method = self.method or self._cheaper(solution)
         working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
+        if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
+            working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
                 decimals, details = self._attempt(solution, method, working, exact, clock)
@@ -90,7 +92,7 @@ class EnclosedMotion:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix at any n, but not bounded."""
         size = moving_part(self.problem).size  # beside a direction that doubles do not see sums cancel
         harmless = size == coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta"
-        short = coarse.near_separatrix or harmless
+        short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
         return "theta" if short and not self.certified else "angles"
 
     def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:

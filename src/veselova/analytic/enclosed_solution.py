@@ -40,6 +40,15 @@ __all__ = ["EnclosedSolution", "frame_around", "series_of"]
 #: the problem, in double precision, is taken for a given one.
 _NEARLY_NATURAL = 1e-9
 
+#: Relative gap below which no inversion in doubles begins one in balls.
+_NARROWEST = 1e-20
+
+#: Digits of a share in |q|² and |q̇|² that doubles see.
+_SMALL_SHARE = 200
+
+#: The smallest movement along a direction that is followed, beside those along others.
+_LEAST_DIGITS = 500
+
 #: Least distance of two branch points in doubles, whose squares of roots are to be doubles too.
 _LEAST_WIDTH = 1e-290
 
@@ -64,15 +73,18 @@ class EnclosedSolution:
         problem, given = coarse.problem, moving_part(coarse.problem)
         #: How far a start on a separatrix is moved.
         self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
-        found = resolved(given, digits, self.distance)
+        beyond = _digits_of_least(given, digits)
+        found = resolved(given, digits, self.distance, beyond)
+        if certified and found.moving.size < given.size:
+            raise Unsolved("not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others")
         if certified and found.moving != given:
             growth = expected_growth(found.spectrum, reach)
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed", "the start had to be moved, and no bound of its drift holds for as long as that")
-            found = resolved(given, digits, beyond=growth)
-        if certified and found.separatrices:
+            found = resolved(given, digits, beyond=max(growth, beyond))
+        if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
             raise Unsolved(
-                "not-enclosed", "a separatrix: phases say little of the body there, and theta functions are not bounded"
+                "not-enclosed", "on and near a separatrix phases say little of the body, and theta functions are not bounded"
             )
         self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
         self.arithmetic: Any = balls(digits, certified)
@@ -81,8 +93,7 @@ class EnclosedSolution:
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
-            doubles = AbelJacobi(Periods(_in_doubles(found.spectrum)))
-            inversion = AbelJacobi(Periods(curve), doubles)
+            inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
             begin = start(found.spectrum, curve, self.spectrum)
             self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
             rate = ClockRate.of(self.spectrum, inversion, "t")
@@ -92,13 +103,8 @@ class EnclosedSolution:
                 theta = EnclosedTheta(inversion.periods.riemann_matrix, self.arithmetic)
                 self._quotients = ThetaQuotients(theta, self.frame)
             position = None if self._quotients is None else self._quotients.position
-            rate_in_doubles = ClockRate.of(found.spectrum, doubles, "t")
-
-            def coarse_rate(z: NDArray[np.float64]) -> NDArray[np.float64]:
-                if coarse.moving.size == self.moving.size:
-                    return coarse.rate_at(z)
-                return rate_in_doubles.at(doubles.invert(z))  # a direction moves that doubles do not see
-
+            # Doubles do not see every direction that moves.
+            coarse_rate = coarse.rate_at if coarse.moving.size == self.moving.size else None
             self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse_rate)
         self._coarse = coarse
 
@@ -152,6 +158,9 @@ class EnclosedSolution:
 
     def _evaluated(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
         approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(self._coarse.moving.unit / self.moving.unit)
+        # A time below the range of doubles is no zero.
+        signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
+        approximate = np.where(approximate == 0, signs * np.finfo(float).tiny, approximate)
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         z = self.orbit.phases(tau1)
@@ -229,6 +238,13 @@ class EnclosedSolution:
         if not self.moving.frozen:
             return 0
         return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
+
+
+def _digits_of_least(given: Moving, digits: int) -> int:
+    """Return the digits beyond which branch points are to coincide, so that the direction that moves least is kept."""
+    share = given.least_share
+    wanted = (share.denominator.bit_length() - share.numerator.bit_length()) * 3 // 10
+    return max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits) if wanted > _SMALL_SHARE else 0
 
 
 def _in_doubles(spectrum: Spectrum) -> Curve:

@@ -26,6 +26,9 @@ __all__ = ["Periods"]
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
+#: Nodes of an interval in balls: a minute.
+_MOST_NODES = 100_000
+
 
 @dataclass(frozen=True)
 class Periods(AngleSeries):
@@ -80,7 +83,13 @@ class Periods(AngleSeries):
 
     def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
-        psi = self.arithmetic.nodes(self.node_count(interval))
+        count = self.node_count(interval)
+        if self.arithmetic.has_radii and count > _MOST_NODES:
+            wanted = (
+                f"{self.arithmetic.digits} digits take series of {count} terms beside a relative gap of {self.narrowest_gap:.2g}"
+            )
+            raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
+        psi = self.arithmetic.nodes(count)
         coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
         if self.arithmetic.certified:
             coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))

@@ -68,6 +68,8 @@ class Moving:
         for i in range(1, len(A)):
             if A[i] == A[i - 1]:
                 A[i] *= 1 - distance
+                if i + 1 < len(A):  # and the next one stays below
+                    A[i] = max(A[i], (A[i - 1] + A[i + 1]) / 2)
         unit = A[-1]
         return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
 
@@ -75,6 +77,19 @@ class Moving:
         """Return whether q_i and q̇_i are both below √share of |q| and |q̇|."""
         q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
+
+    @property
+    def least_share(self) -> Fraction:
+        """Return the least part that a direction has in |q|² or |q̇|², whichever is larger."""
+        q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
+        return min(max(q / q_total, v / v_total) for q, v in zip(self.q_squared, self.v_squared, strict=True))
+
+    def displaced(self, axis: int, distance: Fraction) -> Moving:
+        """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much for a negative distance."""
+        q_squared, qv = list(self.q_squared), list(self.qv)
+        q_squared[axis], qv[axis] = max(distance, -2 * distance) ** 2 * sum(q_squared, Fraction()), Fraction()
+        v_squared = [v if i != axis else Fraction() for i, v in enumerate(self.v_squared)]
+        return replace(self, q_squared=tuple(q_squared), v_squared=tuple(v_squared), qv=tuple(qv))
 
     def without(self, axis: int) -> Moving:
         """Return the part without a direction that moves less than any digit shows."""

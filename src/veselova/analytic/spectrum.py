@@ -90,25 +90,28 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
     """Return the spectrum in which every interval is open and known to twice ``digits``.
 
     Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by ``distance`` where that is
-    given; where I_i = c_k is an end of a closed cut, or moves less than the root of 1e-290 of the rest, or of 10^−10 times
-    that move squared, the direction is frozen.
+    given. Where I_i = c_k is an end of a closed cut, or of a gap and less than the root of 1e-290 of the rest moves along its
+    direction, or of 10^−20 times the opening squared, the direction is frozen; at a gap that is a separatrix to all digits.
     """
     exponent = 2 * digits + 10 + beyond
     opening, coinciding = Fraction(1, 10**exponent), max(_COINCIDE, 2 * exponent + 20)
     moving = moving.opened(opening)
-    separatrices: set[int] = set()
+    separatrices, hidden = set[int](), set[int]()
     while True:
         found = spectrum(moving, digits, coinciding)
         threshold = found.arithmetic.number(10) ** -coinciding
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
-            return Resolved(moving, found, tuple(sorted(separatrices)))
+            return Resolved(moving, found, tuple(sorted(separatrices | hidden)))
         j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.moved(0, opening)
-        elif j % 2 == 1 or moving.hardly_moves(axis, Fraction(1, 10**coinciding)):
+        elif j % 2 == 1:
             moving = moving.without(axis)
+        elif moving.hardly_moves(axis, Fraction(1, 10**coinciding)):  # across it the motion is not stable
+            hidden.add(moving.axes[axis])
+            moving = moving.without(axis) if distance is None else moving.displaced(axis, distance)
         elif axis in separatrices:
             raise InternalContradiction("a closed gap did not open")
         else:

@@ -34,7 +34,8 @@ _LARGEST_TURN = 0.4142
 class Orbit:
     """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls.
 
-    position: q at phases, by theta functions, where angles are not to be asked · coarse_rates: dt/dτ₁ at phases in doubles
+    position: q at phases, by theta functions, where angles are not to be asked · coarse_rates: dt/dτ₁ at phases in doubles,
+    where these can give it
     """
 
     spectrum: Spectrum
@@ -42,7 +43,7 @@ class Orbit:
     start: Values
     frequencies: Values
     position: Callable[[Values], Values] | None
-    coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
     def phases(self, tau1: Values) -> Values:
         """Return z at Neumann times (N,), shape (N, g)."""
