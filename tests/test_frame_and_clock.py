@@ -8,8 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from draws import random_problem
+from draws import adversarial_start, random_problem
 from problems import near_separatrix, tagged
+from veselova import solve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
@@ -157,3 +158,14 @@ def test_inversion_of_an_increasing_function_needs_no_good_guess() -> None:
     assert np.allclose(roots, 0.3, atol=1e-15)
     with pytest.raises(InternalContradiction):
         increasing_root(lambda x: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)
+
+
+def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
+    """A's over seven orders: dt/dτ₁ is thirty times smaller at one of the times than its mean, and τ₁ as much less certain."""
+    name, problem = adversarial_start(np.random.default_rng([510, 275]), 4)
+    assert name == "wide A's"
+    times = np.array([-10, -3, 0.1, 1, 4, 10]) * 0.3 / np.max(np.abs(problem.q_dot))
+    found, finer = solve(problem, times), solve(problem, times, digits=25)
+    error = np.max(np.abs(found.frame - finer.frame), axis=(1, 2))
+    assert np.all(error <= 2 * found.error)
+    assert np.max(found.error) < 1e-11

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,8 +29,11 @@ _RATE = 4.0
 #: The same where they carry guard digits: 30 digits in the leading and the following double.
 _GUARDED_RATE = 1e-30
 
-#: Times at which the steepness of the attitude is looked at besides, near a separatrix.
+#: Times at which the steepness of the attitude is looked at besides, near a separatrix and for wide A's.
 _ON_ORBIT = 24
+
+#: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of them.
+_WIDE, _MANY = 10.0, 10_000
 
 #: Rounding of the principal axes and of the data along them, in units of the conditioning floor.
 _AXES_ROUNDING = 8.0
@@ -37,7 +42,7 @@ _AXES_ROUNDING = 8.0
 def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock, method: str) -> Array:
     """Return a bound on every component of q and frame at each time, shape (N,)."""
     steepness = solution.steepness
-    if solution.near_separatrix:  # the frame turns within a hundredth of the torus, which a sample of it may miss
+    if solution.near_separatrix or not solution.is_even:  # the frame turns within a hundredth of the torus, which samples miss
         rows = np.linspace(0, times.size - 1, min(times.size, _ON_ORBIT)).astype(int)
         steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
     frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
@@ -51,8 +56,24 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     error = clock.error(tau1)  # in place from here on: fresh memory costs more than sums
     error *= steepness.along_flow
     elapsed *= with_time
+    if (slowness := _slowness(solution, tau1)) is not None:
+        error *= slowness
+        elapsed *= slowness
     error += elapsed
     error += evaluation * _EPSILON + at_once
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
         error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
     return np.asarray(error)
+
+
+def _slowness(solution: Solution, tau1: Array) -> Array | None:
+    """Return F_0 over dt/dτ₁, where that is more than one, for A's by which the rate varies much; None for others.
+
+    An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the mean.
+    """
+    if solution.moving.A[0] < {"t": _WIDE**2, "s": _WIDE, "tau1": math.inf}[solution.moving.time]:
+        return None
+    rows = slice(None) if tau1.size <= _MANY else np.linspace(0, tau1.size - 1, _MANY).astype(int)
+    rates = solution.rate_at(solution.in_tau1.phases(tau1[rows]))
+    slowness = np.maximum(1.0, solution.mean_rate / rates)
+    return slowness if tau1.size <= _MANY else np.asarray(np.max(slowness))

@@ -225,8 +225,11 @@ class Solution:
         return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
 
     def steepness_at(self, z: Array) -> Steepness:
-        """Return the same at phases z (N, g), doubled too, near a separatrix."""
-        return Steepness.of(2 * self.quotients.slopes(z), self.in_tau1.rates)
+        """Return the same at phases z (N, g), doubled too."""
+        if self.near_separatrix:
+            return Steepness.of(2 * self.quotients.slopes(z), self.in_tau1.rates)
+        psi = self.inversion.invert(z)
+        return Steepness.of(2 * self.frame.slopes(psi, np.linalg.inv(self.inversion.jacobian(psi))), self.in_tau1.rates)
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
@@ -238,12 +241,18 @@ class Solution:
         """Return max |T_ij|; it grows like log(1/width) of a narrow cut."""
         return float(np.max(np.abs(self.periods.riemann_matrix)))
 
+    @cached_property
+    def is_even(self) -> bool:
+        """Return whether neither narrow cuts nor wide A's give the phases very different weights; not asked beyond _FEW."""
+        if self.curve.genus > _FEW:
+            return True
+        return bool(self.largest_period < _LARGE_PERIOD and np.max(self.periods.cancellation) < _LARGE_CANCELLATION)
+
     def default_method(self) -> str:
         """Return theta near a separatrix, angles for a narrow cut or wide A's, and otherwise the cheaper route."""
         if self.near_separatrix:
             return "theta"
-        harmless = self.largest_period < _LARGE_PERIOD and np.max(self.periods.cancellation) < _LARGE_CANCELLATION
-        return "theta" if self.curve.genus <= _THETA_GENUS and harmless else "angles"
+        return "theta" if self.curve.genus <= _THETA_GENUS and self.is_even else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""
