@@ -17,6 +17,9 @@ __all__ = ["ChunkFailed", "answers"]
 #: Seconds between two looks at a worker that has not heard yet that work was cancelled.
 _LOOK_AGAIN_S = 0.02
 
+#: Seconds after which workers that held cancelled work are restarted, whatever they say of it.
+_PATIENCE_S = 10
+
 
 class ChunkFailed(Exception):
     """A worker could not give the answers to some problems, for a reason of its machine: no room on its disk, say."""
@@ -57,7 +60,12 @@ async def _stop(client: Any, future: Any) -> None:
         return
     held = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
     await future.cancel(force=True)
-    if running := await _at_work(client, future.key, held):
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            running = await _at_work(client, future.key, held)
+    except TimeoutError:  # some worker does not say how far it is
+        running = held
+    if running:
         await client.restart_workers(running, raise_for_error=False)
 
 
