@@ -71,9 +71,7 @@ class Drift:
             low, high = _range([*a0, *a1])
             least, most = _range(energies)
             slow, fast = _range(clocks)
-            speed = math.sqrt(most - low) * _UP
-            bend = max(2 * high - least - low, most - 2 * low + high) * _UP
-            level = (bend + 2 * (high - low)) * _UP
+            speed, (bend, level) = math.sqrt(most - low) * _UP, _bend_and_level(low, high, least, most)
             growth = math.sqrt(level) * _UP
             force = 3 * inverses + abs(energies[0] - energies[1])
             # √(q,Aq) lies between 1/√max a and 1/√min a, and (q,Aq) is moved by |A₀−A₁| + 2 max A |u|.
@@ -104,8 +102,14 @@ def expected_growth(spectrum: Spectrum, tau1: float) -> int:
     """Return the digits by which two motions part until a Neumann time, by the bound above."""
     inverse, q, p = (x.astype(float) for x in (spectrum.inverse, spectrum.q, spectrum.q_prime))
     low, energy = float(inverse[0]), float(np.sum(p * p) + np.sum(inverse * q * q))
-    level = max(2 - energy - low, energy - 2 * low + 1) + 2 * (1 - low)
+    _, level = _bend_and_level(low, 1.0, energy, energy)
     return math.ceil(math.sqrt(level) * abs(tau1) / math.log(10))
+
+
+def _bend_and_level(low: float, high: float, least: float, most: float) -> tuple[float, float]:
+    """Return max |β−a_i| and M, for a within [low, high] and E within [least, most]: 2 low − E ≤ β ≤ 2 high − E."""
+    bend = max(2 * high - least - low, most - 2 * low + high) * _UP
+    return bend, (bend + 2 * (high - low)) * _UP
 
 
 def _matched(given: Moving, moved: Moving) -> tuple[list[int], Values]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.enclosed_windows import expected_terms
+from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -31,15 +31,8 @@ _NODES_PER_DIGIT = 2.6
 #: Nodes that a clock is willing to evaluate: minutes.
 _MOST_NODES = 100_000
 
-#: Nodes per panel in double precision that show how fast series fall.
-_SAMPLE = 64
-
-#: Panels looked at for that.
+#: Panels looked at to see how fast series fall.
 _SAMPLED_PANELS = 200
-
-#: How much larger than the precision the last coefficients of a series may be (they are rounding there), and how many more
-#: nodes are taken where they are larger.
-_NEARLY, _MORE = 1e3, 1.25
 
 #: Newton's steps double the digits from those of a double, but for what they lose.
 _FIRST_DIGITS, _LOST_DIGITS = 12, 2
@@ -102,21 +95,21 @@ class EnclosedClock:
             panels = self._evaluated(reach, direction, count, nodes)
             last = panels.rates[:, -LAST_COEFFICIENTS:]
             middle = self._xp.midpoints(last)
-            size, noise = (np.sum(self._xp.at_most(x), axis=1) for x in (middle, last - middle))
-            if np.all(size <= _NEARLY * (noise + self._xp.epsilon * panels.rates[:, 0])):
+            noise = np.sum(self._xp.at_most(last - middle), axis=1)
+            if are_resolved(middle, noise, panels.rates[:, 0], self._xp):
                 return replace(panels, truncation=self._xp.estimated_tail(panels.rates))
-            nodes = math.ceil(_MORE * nodes)
+            nodes = math.ceil(MORE * nodes)
 
     def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
         if self._orbit.coarse_rates is None:
             return math.ceil(_NODES_PER_DIGIT * float(self._xp.digits))
         half = reach / (2 * count)
-        theta = DOUBLE.nodes(_SAMPLE)
+        theta = DOUBLE.nodes(SAMPLE)
         panels = np.unique(np.linspace(0, count - 1, _SAMPLED_PANELS).astype(np.int64))
         tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
-        values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), _SAMPLE)
+        values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), SAMPLE)
         return expected_terms(values / values[:, :1], self._xp.digits)
 
     def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:

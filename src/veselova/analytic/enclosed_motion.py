@@ -71,13 +71,14 @@ class EnclosedMotion:
             return self._resting(grid, began)
         solution = Solution(self.problem)
         clock = solution.clock(grid)
+        reach = float(np.max(np.abs(clock.tau1(grid[[0, -1]])[0])))
         method = self.method or self._cheaper(solution)
         working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
         if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
             working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
-                decimals, details = self._attempt(solution, method, working, exact, clock)
+                decimals, details = self._attempt(solution, method, working, exact, clock, reach)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
                 continue
@@ -126,15 +127,12 @@ class EnclosedMotion:
         return self.digits + largest.adjusted() + 1 if largest else 0
 
     def _attempt(
-        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock, reach: float
     ) -> tuple[Decimals, Any]:
-        farthest = np.max(np.abs(clock.tau1(np.array([float(exact[0]), float(exact[-1])]))[0]))
-        solution = EnclosedSolution(coarse, working, self.certified, method, float(farthest))
+        solution = EnclosedSolution(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
             series, details = solution.series(xp.array(exact), clock)
-            if (
-                solution.separatrices and not self.certified
-            ):  # the start was moved; what another move would change stands for what this one did
+            if solution.separatrices:  # the start was moved; what another move would change stands for what this one did
                 neighbour = EnclosedSolution(coarse, working, self.certified, method, distance=-solution.distance)
                 other, _ = neighbour.series(xp.array(exact), clock)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}

@@ -70,22 +70,22 @@ class EnclosedSolution:
     def __init__(
         self, coarse: Solution, digits: int, certified: bool, method: str, reach: float = 0.0, distance: Fraction | None = None
     ) -> None:
-        problem, given = coarse.problem, moving_part(coarse.problem)
+        problem, self._coarse = coarse.problem, coarse
+        given = self._given = moving_part(problem)
+        if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
+            reason = "on and near a separatrix phases say little of the body, and theta functions are not bounded"
+            raise Unsolved("not-enclosed", reason)
         #: How far a start on a separatrix is moved.
         self.distance = Fraction(1, 10 ** (2 * digits + 10)) if distance is None else distance
         beyond = _digits_of_least(given, digits)
         found = resolved(given, digits, self.distance, beyond)
-        if certified and found.moving.size < given.size:
+        if certified and (found.separatrices or found.moving.size < given.size):
             raise Unsolved("not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others")
         if certified and found.moving != given:
             growth = expected_growth(found.spectrum, reach)
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed", "the start had to be moved, and no bound of its drift holds for as long as that")
             found = resolved(given, digits, beyond=max(growth, beyond))
-        if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
-            raise Unsolved(
-                "not-enclosed", "on and near a separatrix phases say little of the body, and theta functions are not bounded"
-            )
         self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
         self.arithmetic: Any = balls(digits, certified)
         self.spectrum = enclosed(found)
@@ -106,7 +106,6 @@ class EnclosedSolution:
             # Doubles do not see every direction that moves.
             coarse_rate = coarse.rate_at if coarse.moving.size == self.moving.size else None
             self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse_rate)
-        self._coarse = coarse
 
     def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took.
@@ -218,7 +217,7 @@ class EnclosedSolution:
     @cached_property
     def _drift(self) -> Drift | None:
         """Return how far the start that was moved may get from the given one, where that has to be bounded."""
-        xp, given = self.arithmetic, moving_part(self.problem)
+        xp, given = self.arithmetic, self._given
         if not xp.certified or self.moving == given:
             return None
         drift = Drift.of(given, self.moving, xp)

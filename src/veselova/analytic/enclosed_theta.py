@@ -6,8 +6,7 @@ Gaussians and waves share one product of matrices: ε_G only gives signs to clas
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -82,7 +81,7 @@ class EnclosedTheta:
         """
         xp, F, G = self._xp, self._F, self._G
         result, z = np.empty((len(z), len(characteristics)), dtype=object), self._coordinates.points(z)
-        for delta_G, families in self._families(characteristics).items():
+        for delta_G, families in self._coordinates.families(characteristics).items():
             bells, r, nearest = self._bells(z, delta_G)
             turns = xp.turns((z[:, F] - (r @ self._parts[1].T if F and G else 0)) / 2)
             for epsilon, members in families.items():
@@ -112,17 +111,6 @@ class EnclosedTheta:
         count, quarters = len(x), x @ delta_F
         real, imaginary = (waves[(quarters + turn) % 4, np.arange(count)] for turn in (0, 3))
         return np.asarray(np.sum(real * weighted[:count] - imaginary * weighted[count:], axis=0))
-
-    def _families(
-        self, characteristics: Sequence[Characteristic]
-    ) -> Mapping[tuple[int, ...], Mapping[tuple[int, ...], list[tuple[int, Characteristic, int]]]]:
-        """Return the places, characteristics in these coordinates and signs, by δ_G and then by ε_F."""
-        families: dict[Any, dict[Any, list[tuple[int, Characteristic, int]]]] = defaultdict(lambda: defaultdict(list))
-        for place, given in enumerate(characteristics):
-            local, sign = self._coordinates.characteristic(given)
-            delta_G, epsilon_F = tuple(local.delta[i] for i in self._G), tuple(local.epsilon[i] for i in self._F)
-            families[delta_G][epsilon_F].append((place, local, sign))
-        return families
 
     @cached_property
     def _classes(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:

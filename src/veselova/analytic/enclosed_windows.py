@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
+from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
+from veselova.analytic.precision import DOUBLE, Values
 
-__all__ = ["EnclosedWindows", "expected_terms"]
+__all__ = ["EnclosedWindows"]
 
 Array = NDArray[np.float64]
-
-#: Nodes of a series in double precision that shows how fast one falls, and the digits down to which it does.
-_SAMPLE, _SAMPLE_DIGITS = 64, 11
 
 #: Windows looked at for that, and times below which none is.
 _SAMPLED, _FEW_TIMES = 40, 300
@@ -31,9 +29,8 @@ _SAMPLED, _FEW_TIMES = 40, 300
 #: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n = 3 to 6, 30 to 100 digits.
 _NODE, _TERM = 1.2, 1 / 600
 
-#: How much larger than the precision the last coefficients of a series may be (they are rounding there), the nodes taken over
-#: those expected, for windows that were not looked at, and how many more are taken where coefficients are larger.
-_NEARLY, _SPARE, _MORE = 1e3, 1.08, 1.25
+#: Nodes taken over those expected, for windows that were not looked at.
+_SPARE = 1.08
 
 #: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
 _RECURRENCE_DIGITS = 6
@@ -74,7 +71,7 @@ class EnclosedWindows:
 
     def finer(self) -> EnclosedWindows:
         """Return the windows with more nodes."""
-        return EnclosedWindows(self.arithmetic, self.first, self.half, self.count, math.ceil(_MORE * self.nodes))
+        return replace(self, nodes=math.ceil(MORE * self.nodes))
 
     @cached_property
     def _centres(self) -> Values:
@@ -94,9 +91,7 @@ class EnclosedWindows:
         middle = xp.midpoints(table)
         open_ = np.max(xp.at_most(table - middle), axis=1)
         series = xp.cosine_series(middle)
-        size = np.max(xp.at_most(middle), axis=1)
-        last = np.sum(xp.at_most(series[:, -LAST_COEFFICIENTS:]), axis=1)
-        if not np.all(last <= _NEARLY * (open_ + xp.epsilon * size)):
+        if not are_resolved(series, open_, np.max(xp.at_most(middle), axis=1), xp):
             return None
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
         slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
@@ -128,21 +123,8 @@ class EnclosedWindows:
 
 
 def _samples(first: float, last: float, count: int, sampled: Callable[[Array], Array]) -> Array:
-    """Return values (…, _SAMPLE) of a motion at the nodes of some of the windows."""
+    """Return values (…, SAMPLE) of a motion at the nodes of some of the windows."""
     half = (last - first) / (2 * count)
     chosen = np.unique(np.linspace(0, count - 1, _SAMPLED).astype(np.int64))
-    times = first + half * (2 * chosen[:, None] + 1) - half * np.cos(DOUBLE.nodes(_SAMPLE))
-    return np.moveaxis(sampled(times.ravel()).reshape(len(chosen), _SAMPLE, -1), 1, 2)
-
-
-def expected_terms(values: Array, digits: int) -> int:
-    """Return the terms of Chebyshev series of so many digits, from values (…, S) at S nodes in double precision.
-
-    A falling bound, the largest coefficient from each on, is read off where it is still above rounding.
-    """
-    count = values.shape[-1]
-    series = np.abs(DOUBLE.cosine_series(values.reshape(-1, count))) / np.max(np.abs(values))
-    falling = np.maximum.accumulate(np.max(series, axis=0)[::-1])[::-1]
-    seen = int(np.count_nonzero(falling > 10.0**-_SAMPLE_DIGITS))
-    per_digit = seen / max(1.0, -math.log10(falling[min(seen, count - 1)]))
-    return math.ceil(per_digit * digits) + LAST_COEFFICIENTS
+    times = first + half * (2 * chosen[:, None] + 1) - half * np.cos(DOUBLE.nodes(SAMPLE))
+    return np.moveaxis(sampled(times.ravel()).reshape(len(chosen), SAMPLE, -1), 1, 2)

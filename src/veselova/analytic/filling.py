@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
-from veselova.analytic.pieces import Pieces, chebyshev_points, to_coefficients
+from veselova.analytic.pieces import Pieces
+from veselova.analytic.precision import DOUBLE
 
 __all__ = ["NODES", "Along", "Cells", "Evaluation", "Filling"]
 
@@ -32,7 +33,8 @@ _TIMES = 32768
 #: What a sum of polynomials rounds to.
 _SUM_ROUNDING = 4 * float(np.finfo(float).eps)
 
-_OFFSETS, _TO_COEFFICIENTS = (chebyshev_points(NODES) + 1) / 2, to_coefficients(NODES)
+#: Chebyshev points of [0, 1], and the matrix from values there to coefficients.
+_OFFSETS, _TO_COEFFICIENTS = (np.cos(DOUBLE.nodes(NODES)) + 1) / 2, DOUBLE.cosine_series(np.eye(NODES)).T
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ one Gaussian serves. Reduction is in pairs: b_i is shortened by multiples of b_j
 from __future__ import annotations
 
 import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,10 @@ __all__ = ["RADIUS", "Coordinates", "centred_points", "half_of", "lattice_points
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+#: Some entries of a characteristic, in halves.
+Halves: TypeAlias = tuple[int, ...]
+Families: TypeAlias = Mapping[Halves, Mapping[Halves, list[tuple[int, Characteristic, int]]]]
 
 #: Radius, in the norm of T or T⁻¹, of the terms above e^(−39) = 1e-17 of the largest; the others are left out.
 RADIUS = math.sqrt(39.0 / math.pi)
@@ -91,6 +97,16 @@ class Coordinates:
         delta = np.mod(halves, 2)
         sign = 1 - 2 * int(epsilon @ ((halves - delta) // 2) % 2)
         return Characteristic(tuple(map(int, epsilon)), tuple(map(int, delta))), sign
+
+    def families(self, characteristics: Sequence[Characteristic]) -> Families:
+        """Return the place, the characteristic in these coordinates and its sign, of each, by δ_G and then by ε_F: those together
+        that have the same Gaussians, and the same waves."""
+        families: dict[Halves, dict[Halves, list[tuple[int, Characteristic, int]]]] = defaultdict(lambda: defaultdict(list))
+        for place, given in enumerate(characteristics):
+            local, sign = self.characteristic(given)
+            delta_G, epsilon_F = tuple(local.delta[i] for i in self.gaussians), tuple(local.epsilon[i] for i in self.waves)
+            families[delta_G][epsilon_F].append((place, local, sign))
+        return families
 
     @cached_property
     def _dual(self) -> Integers:

@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.precision import DOUBLE
 from veselova.mechanics.errors import InternalContradiction
 
 __all__ = ["PanelIntegral"]
 
 Array = NDArray[np.float64]
 
-#: Points per panel.
+#: Points per panel: the Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
 _PANEL_NODES = 24
+_POINTS, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(_PANEL_NODES)), DOUBLE.cosine_series(np.eye(_PANEL_NODES))
 
 #: A panel is resolved when its last coefficients fall below this fraction of the first …
 _PANEL_TAIL = 4e-15
@@ -43,10 +45,6 @@ class PanelIntegral:
         self, integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: float, high: float, floor: float = 0.0
     ) -> None:
         self._integrand, self._in_tau1, self._floor = integrand, in_tau1, floor
-        points = np.cos(np.pi * (np.arange(_PANEL_NODES) + 0.5) / _PANEL_NODES)
-        self._points = points
-        self._transform = np.cos(np.outer(np.arange(_PANEL_NODES), np.arccos(points))) * (2 / _PANEL_NODES)
-        self._transform[0] /= 2
         fastest = float(np.max(np.abs(in_tau1.rates)))
         # Borders are whole multiples of a power of two, so that their products with it are exact.
         self._length = float(2.0 ** np.floor(np.log2(0.5 / fastest)))
@@ -117,10 +115,10 @@ class PanelIntegral:
     def _coefficients(self, lefts: Array, length: float) -> Array:
         """Return the Chebyshev coefficients of the integrand on panels; node phases are those of the border plus a short way."""
         start = self._in_tau1.phases(lefts)
-        offsets = (self._points + 1)[:, None] * (length / 2) * self._in_tau1.rates
+        offsets = (_POINTS + 1)[:, None] * (length / 2) * self._in_tau1.rates
         z = (start[:, None, :] + offsets).reshape(-1, start.shape[1])
         values = [self._integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
-        return np.asarray(np.concatenate(values).reshape(lefts.size, -1) @ self._transform.T)
+        return np.asarray(np.concatenate(values).reshape(lefts.size, -1) @ _TO_COEFFICIENTS)
 
     def _size(self, coefficients: Array) -> Array:
         return np.maximum(np.abs(coefficients[:, 0]), self._floor)

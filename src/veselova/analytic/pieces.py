@@ -15,8 +15,9 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from veselova.analytic.increasing import increasing_root
+from veselova.analytic.precision import DOUBLE
 
-__all__ = ["ORDER", "Pieces", "chebyshev_points", "to_coefficients"]
+__all__ = ["ORDER", "Pieces"]
 
 Array = NDArray[np.float64]
 
@@ -30,20 +31,8 @@ _SETTLED = 1e-9
 _TIMES = 4096
 
 
-def chebyshev_points(count: int) -> Array:
-    """Return the Chebyshev points of [−1, 1], from 1 downwards."""
-    return np.asarray(np.cos(np.pi * (np.arange(count) + 0.5) / count))
-
-
-def to_coefficients(count: int) -> Array:
-    """Return the matrix from values at the points to Chebyshev coefficients; whole numbers are reduced before they meet π."""
-    angles = np.outer(np.arange(count), 2 * np.arange(count) + 1) % (4 * count)
-    result = np.cos(angles * (np.pi / (2 * count))) * (2 / count)
-    result[0] /= 2
-    return np.asarray(result)
-
-
-_X, _TO_COEFFICIENTS = chebyshev_points(ORDER), to_coefficients(ORDER)
+#: Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
+_X, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(ORDER)), DOUBLE.cosine_series(np.eye(ORDER)).T
 #: From Chebyshev coefficients to those of powers.
 _TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
 

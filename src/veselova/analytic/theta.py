@@ -14,7 +14,6 @@ which the sum is short (analytic.lattice).
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -165,30 +164,21 @@ class Theta:
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
         if characteristics not in self._grouped:
-            F, G = self._split
-            local = [self._coordinates.characteristic(c) for c in characteristics]
-            places: dict[tuple[int, ...], dict[tuple[int, ...], list[int]]] = defaultdict(lambda: defaultdict(list))
-            for place, (c, _) in enumerate(local):
-                places[tuple(c.delta[i] for i in G)][tuple(c.epsilon[i] for i in F)].append(place)
-            self._grouped[characteristics] = [
-                self._group(
-                    delta_G, [[local[i] for i in of] for of in members.values()], [i for of in members.values() for i in of]
-                )
-                for delta_G, members in places.items()
-            ]
+            families = self._coordinates.families(characteristics)
+            self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families.items()]
         return self._grouped[characteristics]
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
         return {}
 
-    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[Characteristic, int]]], places: list[int]) -> _Group:
-        flat = [given for of in members for given in of]
-        parities = self._parities([c for c, _ in flat])
-        families = [self._family([c for c, _ in of]) for of in members]
-        return _Group(np.array(delta_G) / 2, families, places, parities, self._parts[3] * np.array([sign for _, sign in flat]))
+    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[int, Characteristic, int]]]) -> _Group:
+        places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
+        families = [self._family([c for _, c, _ in of]) for of in members]
+        parities = self._parities(characteristics)
+        return _Group(np.array(delta_G) / 2, families, list(places), parities, self._parts[3] * np.array(signs))
 
-    def _parities(self, members: list[Characteristic]) -> Array:
+    def _parities(self, members: Sequence[Characteristic]) -> Array:
         G = self._split[1]
         return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
 
