@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs"]
+__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs", "expected_modes"]
 
 #: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
 GUARDED_FROM = 200.0
@@ -44,22 +44,22 @@ _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
 _HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 
 #: An inversion on panels, and the cycles that these reach beyond the times.
-_PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 2.0
+_PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 1.0
+
+
+def expected_modes(genus: int, log_determinant: float) -> float:
+    """Return about how many modes the Fourier clock has, for the Riemann matrix iT with log det T."""
+    exponent = genus * math.log(_EXPONENT / math.pi) - log_determinant
+    return _BODY.get(genus, _HIGH_BODY) * math.exp(exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT)
 
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of an orbit with Riemann matrix iT, ``log_determinant`` = log det T, over so many cycles of its fastest phase."""
+    """The costs of an orbit over so many cycles of its fastest phase; ``modes`` is about how many the Fourier clock has."""
 
     genus: int
-    log_determinant: float
+    modes: float
     cycles: float
-
-    @property
-    def modes(self) -> float:
-        """Return about how many modes the Fourier clock has."""
-        exponent = self.genus * math.log(_EXPONENT / math.pi) - self.log_determinant
-        return _BODY.get(self.genus, _HIGH_BODY) * math.exp(exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT)
 
     def fewest_in_window(self, nodes: int, clock: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""

@@ -30,7 +30,7 @@ class Layout:
     places (m,) their indices j · own_cut (m,) the cut (from 0) that each ends, −1 for b_0, which ends none
     is_own (g, m) whether b_k ends cut s · mate (m,) the number of the cut's other end, −1 where that is of the other kind
     beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k (m where there is none)
-    sides (g, m) the sign of λ_s − b_k
+    ends the k that end a cut · sides (g, m) the sign of λ_s − b_k
     """
 
     places: NDArray[np.intp]
@@ -38,6 +38,7 @@ class Layout:
     is_own: NDArray[np.bool_]
     mate: NDArray[np.intp]
     beyond: NDArray[np.intp]
+    ends: NDArray[np.intp]
     sides: NDArray[np.intp]
 
 
@@ -88,7 +89,21 @@ class Curve:
         others = [self.origins[j + 1 if j % 2 == 1 else j - 1] if j > 0 else None for j in places]
         mate = np.array([other.index if other is not None and other.kind == kind else -1 for other in others])
         beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
-        return Layout(places, own_cut, cuts == own_cut, mate, beyond, np.where(places <= 2 * cuts + 1, 1, -1))
+        ends, sides = np.flatnonzero(own_cut >= 0), np.where(places <= 2 * cuts + 1, 1, -1)
+        return Layout(places, own_cut, cuts == own_cut, mate, beyond, ends, sides)
+
+    def stretches(self, kind: Literal["I", "c"]) -> Values:
+        """Return the distances of the branch points of one kind from those beyond each cut, (g, m); one where there is none."""
+        return self._stretches[kind]
+
+    @cached_property
+    def _stretches(self) -> dict[Literal["I", "c"], Values]:
+        result: dict[Literal["I", "c"], Values] = {}
+        for kind, layout in self._layouts.items():
+            inside = layout.beyond < layout.places.size
+            distances = abs(self.differences[layout.places, layout.places[np.where(inside, layout.beyond, 0)]])
+            result[kind] = np.where(inside, distances, self.arithmetic.number(1))
+        return result
 
     def width(self, j: int) -> Any:
         """Return b_{j+1} − b_j; of many curves with an axis for angles, (N, 1)."""

@@ -83,15 +83,19 @@ class Jacobi:
         decay = math.pi if self._stacked else -float(self._log_nome)
         return int(np.ceil(0.5 + np.sqrt(0.25 + self.arithmetic.nats / decay)))
 
+    @cached_property
+    def _powers(self) -> list[tuple[int, Any, Any]]:
+        """Return m, q^{m²+m} and q^{m²} for the nome q, m = 1…_terms."""
+        exp, q = self.arithmetic.exp, self._log_nome
+        return [(m, exp(q * (m * m + m)), exp(q * (m * m))) for m in range(1, self._terms + 1)]
+
+    @cached_property
     def _constants(self) -> tuple[Any, Any, Any]:
         """Return θ_2/q^{1/4}, θ_3, θ_4 at zero."""
-        xp = self.arithmetic
-        one = xp.number(1)
+        one = self.arithmetic.number(1)
         t2, t3, t4 = 2 * one, one, one
-        for m in range(1, self._terms + 1):
-            power = xp.exp(self._log_nome * m * m)
-            t2 = t2 + 2 * xp.exp(self._log_nome * (m * m + m))
-            t3, t4 = t3 + 2 * power, t4 + 2 * (-1) ** m * power
+        for m, odd, even in self._powers:
+            t2, t3, t4 = t2 + 2 * odd, t3 + 2 * even, t4 + 2 * (-1) ** m * even
         return self._truncated(t2, t3, t4)
 
     def _truncated(self, *sums: Any) -> tuple[Any, ...]:
@@ -99,8 +103,11 @@ class Jacobi:
 
         Omitted terms are at most 4 nome^(m²+m/2), all that y ≤ ¼|log nome| adds included, so together below nome^(M²−M).
         """
-        bound = self.arithmetic.exp(self._log_nome * (self._terms**2 - self._terms))
-        return tuple(self.arithmetic.widened(value, bound) for value in sums)
+        xp = self.arithmetic
+        if not xp.has_radii:
+            return sums
+        bound = xp.exp(self._log_nome * (self._terms**2 - self._terms))
+        return tuple(xp.widened(value, bound) for value in sums)
 
     def _trigonometric(self, psi: Values) -> tuple[Values, Values, Values]:
         """sn = (θ3/θ2) θ1(z)/θ4(z), cn = (θ4/θ2) θ2(z)/θ4(z), dn = (θ4/θ3) θ3(z)/θ4(z), z = πv/2K = ψ/2."""
@@ -109,12 +116,11 @@ class Jacobi:
         sine, cosine = xp.sin(z), xp.cos(z)
         if not self._stacked and self.k_squared == 0:
             return sine, cosine, 0 * psi + 1
-        t2, t3, t4 = self._constants()
+        t2, t3, t4 = self._constants
         z1, z2, z3, z4 = 2 * sine, 2 * cosine, 0 * psi + 1, 0 * psi + 1
-        for m in range(1, self._terms + 1):
-            odd, even = xp.exp(self._log_nome * (m * m + m)), 2 * xp.exp(self._log_nome * m * m)
+        for m, odd, even in self._powers:
             z1, z2 = z1 + 2 * (-1) ** m * odd * xp.sin((2 * m + 1) * z), z2 + 2 * odd * xp.cos((2 * m + 1) * z)
-            wave = even * xp.cos(2 * m * z)
+            wave = 2 * even * xp.cos(2 * m * z)
             z3, z4 = z3 + wave, z4 + (-1) ** m * wave
         z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
         return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
@@ -127,7 +133,7 @@ class Jacobi:
         xp = self.arithmetic
         y = psi / 2 * (self.quarter / self.conjugate_quarter)
         q = self._log_nome
-        t2, t3, t4 = self._constants()
+        t2, t3, t4 = self._constants
         z1, z2, z3, z4 = -xp.expm1(-2 * y), 1 + xp.exp(-2 * y), xp.exp(-y), xp.exp(-y)
         for m in range(1, self._terms + 1):
             growth = xp.exp(q * (m * m + m) + 2 * m * y)

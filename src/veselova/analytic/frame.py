@@ -147,32 +147,30 @@ def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) ->
     curve, xp, g = point.curve, point.curve.arithmetic, point.curve.genus
     layout = curve.layout(kind)
     to_own_kind = point.to_points[:, :, layout.places]
-    columns = _columns(to_own_kind, layout, curve)
+    columns = _columns(to_own_kind, layout.is_own, curve.stretches(kind), xp)
     if signs is not None:
         columns = columns * signs
     rows = _rows(to_own_kind, point.between, layout, g, xp)
-    ends = np.flatnonzero(layout.own_cut >= 0)
     own = np.ones_like(columns)
-    own[:, ends] = point.own_roots[:, layout.places[ends] - 1]
+    own[:, layout.ends] = point.own_roots[:, layout.places[layout.ends] - 1]
     whole_rows = rows.copy()
-    for k in ends:
+    for k in layout.ends:
         whole_rows[:, layout.own_cut[k]] = whole_rows[:, layout.own_cut[k]] * own[:, k]
     near = xp.sqrt(np.where(layout.is_own, xp.number(1), to_own_kind))
     matrix = layout.sides * ((columns * own)[:, None, :] / near) * (whole_rows[:, :, None] / near)
-    for k in ends:  # the root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays
+    for (
+        k
+    ) in layout.ends:  # the root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays
         s, mate = layout.own_cut[k], layout.mate[k]
         entry = layout.sides[s, k] * columns[:, k] * rows[:, s]
         matrix[:, s, k] = entry if mate < 0 else entry * own[:, mate]
     return columns * own, matrix
 
 
-def _columns(to_own_kind: Values, layout: Layout, curve: Curve) -> Values:
+def _columns(to_own_kind: Values, is_own: Values, stretches: Values, xp: Arithmetic) -> Values:
     """Return √(|U(b)/Φ'(b)|) without the factor of b's own cut, (N, m): ratios to the b of the same kind beyond each λ_s."""
-    one, inside = curve.arithmetic.number(1), layout.beyond < layout.places.size
-    partners = layout.places[np.where(inside, layout.beyond, 0)]
-    stretches = np.where(inside, abs(curve.differences[layout.places, partners]), one)
-    distances = np.where(layout.is_own, one, to_own_kind)
-    return np.asarray(np.prod(curve.arithmetic.sqrt(distances / stretches), axis=1))
+    distances = np.where(is_own, xp.number(1), to_own_kind)
+    return np.asarray(np.prod(xp.sqrt(distances / stretches), axis=1))
 
 
 def _rows(to_own_kind: Values, between: Values, layout: Layout, g: int, xp: Arithmetic) -> Values:

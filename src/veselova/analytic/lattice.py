@@ -90,20 +90,20 @@ class Coordinates:
         """Return Uz for z of shape (N, g)."""
         return z @ self.U.T
 
-    def characteristic(self, given: Characteristic) -> tuple[Characteristic, int]:
-        """Return a characteristic in these coordinates, and the sign of its reduction modulo one."""
-        epsilon = np.mod(self._dual @ np.array(given.epsilon, dtype=np.int64), 2)
-        halves = self.U @ np.array(given.delta, dtype=np.int64)
+    def characteristics(self, given: Sequence[Characteristic]) -> list[tuple[Characteristic, int]]:
+        """Return characteristics in these coordinates, each with the sign of its reduction modulo one."""
+        halves = np.array([c.delta for c in given], dtype=np.int64) @ self.U.T
+        epsilon = np.mod(np.array([c.epsilon for c in given], dtype=np.int64) @ self._dual.T, 2)
         delta = np.mod(halves, 2)
-        sign = 1 - 2 * int(epsilon @ ((halves - delta) // 2) % 2)
-        return Characteristic(tuple(map(int, epsilon)), tuple(map(int, delta))), sign
+        signs = 1 - 2 * np.mod(np.sum(epsilon * ((halves - delta) // 2), axis=1), 2)
+        rows = zip(epsilon.tolist(), delta.tolist(), signs.tolist(), strict=True)
+        return [(Characteristic(tuple(e), tuple(d)), sign) for e, d, sign in rows]
 
     def families(self, characteristics: Sequence[Characteristic]) -> Families:
         """Return the place, the characteristic in these coordinates and its sign, of each, by δ_G and then by ε_F: those together
         that have the same Gaussians, and the same waves."""
         families: dict[Halves, dict[Halves, list[tuple[int, Characteristic, int]]]] = defaultdict(lambda: defaultdict(list))
-        for place, given in enumerate(characteristics):
-            local, sign = self.characteristic(given)
+        for place, (local, sign) in enumerate(self.characteristics(characteristics)):
             delta_G, epsilon_F = tuple(local.delta[i] for i in self.gaussians), tuple(local.epsilon[i] for i in self.waves)
             families[delta_G][epsilon_F].append((place, local, sign))
         return families

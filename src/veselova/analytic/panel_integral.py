@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 _PANEL_NODES = 24
 _POINTS, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(_PANEL_NODES)), DOUBLE.cosine_series(np.eye(_PANEL_NODES))
 
+#: Panels beyond an end, each of at most half a cycle of the fastest phase: ends come from means.
+_MARGIN = 2
+
 #: A panel is resolved when its last coefficients fall below this fraction of the first …
 _PANEL_TAIL = 4e-15
 
@@ -37,8 +40,9 @@ _BLOCK = 4096
 class PanelIntegral:
     """τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁, over a stretch of the orbit that starts as [low, high] and can be extended.
 
-    ``integrand`` gives f at phases z of shape (N, g); a panel is resolved to rounding of its mean, or of ``floor`` where that is
-    larger: an integrand that changes sign has means near zero.
+    low ≤ 0 ≤ high; ends other than zero, where the integral is known, get a margin. ``integrand`` gives f at phases z of shape
+    (N, g); a panel is resolved to rounding of its mean, or of ``floor`` where that is larger: an integrand that changes sign has
+    means near zero.
     """
 
     def __init__(
@@ -48,8 +52,8 @@ class PanelIntegral:
         fastest = float(np.max(np.abs(in_tau1.rates)))
         # Borders are whole multiples of a power of two, so that their products with it are exact.
         self._length = float(2.0 ** np.floor(np.log2(0.5 / fastest)))
-        # One cycle of the fastest phase on each side.
-        self._low, self._high = int(np.floor(low / self._length)) - 2, int(np.ceil(high / self._length)) + 2
+        self._low = int(np.floor(low / self._length)) - _MARGIN if low < 0 else 0
+        self._high = int(np.ceil(high / self._length)) + _MARGIN if high > 0 or self._low == 0 else 0
         self._tabulate(np.arange(self._low, self._high) * self._length, self._length)
 
     def extend(self) -> None:

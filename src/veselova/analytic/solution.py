@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
-from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
+from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs, expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.filling import NODES
 from veselova.analytic.fourier_clock import FourierClock
@@ -182,12 +182,12 @@ class Solution:
 
     def costs(self, times: Array) -> Costs:
         """Return what the clocks cost for given times."""
-        return Costs(self.curve.genus, self._log_determinant, self.cycles(times))
+        return Costs(self.curve.genus, self._modes, self.cycles(times))
 
     @cached_property
-    def _log_determinant(self) -> float:
+    def _modes(self) -> float:
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
-        return float(logarithm) if sign > 0 else -np.inf
+        return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
     def clock_estimates(self, times: Array) -> dict[str, float]:
         """Return the seconds that either clock was thought to take, those out of the question left out."""

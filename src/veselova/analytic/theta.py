@@ -124,7 +124,7 @@ class Theta:
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        return int(self._gaussian_lattice.shape[0] * self._wave_lattice((0,) * self.genus).shape[0])
+        return int(self._gaussian_lattice.shape[0] * self._crossing((0,) * self.genus)[0].shape[0])
 
     def _wave_lattice(self, epsilon: tuple[int, ...]) -> Array:
         """Return one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all of them small."""

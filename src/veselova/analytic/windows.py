@@ -8,6 +8,7 @@ in it are sums of these, whatever the genus and the route.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -59,8 +60,8 @@ class Windows:
 
     def __init__(self, times: Array, fastest: float, fewest: int) -> None:
         self._times, self._fewest = times, fewest
-        mantissa, exponent = np.frexp(_CYCLES / fastest)
-        self._length = float(np.ldexp(np.floor(8 * mantissa) / 8, exponent))
+        mantissa, exponent = math.frexp(_CYCLES / fastest)
+        self._length = math.ldexp(math.floor(8 * mantissa) / 8, exponent)
 
     @cached_property
     def _stretches(self) -> _Stretches:
@@ -125,5 +126,5 @@ class Windows:
 
 def _shorter(length: float) -> float:
     """Return the next length of three bits."""
-    mantissa, exponent = np.frexp(length)
-    return float(np.ldexp(mantissa - 0.125, exponent) if mantissa > 0.5 else np.ldexp(0.875, exponent - 1))
+    mantissa, exponent = math.frexp(length)
+    return math.ldexp(mantissa - 0.125, exponent) if mantissa > 0.5 else math.ldexp(0.875, exponent - 1)
