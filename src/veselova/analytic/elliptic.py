@@ -110,36 +110,51 @@ class Jacobi:
         return tuple(xp.widened(value, bound) for value in sums)
 
     def _trigonometric(self, psi: Values) -> tuple[Values, Values, Values]:
-        """sn = (θ3/θ2) θ1(z)/θ4(z), cn = (θ4/θ2) θ2(z)/θ4(z), dn = (θ4/θ3) θ3(z)/θ4(z), z = πv/2K = ψ/2."""
+        """sn = (θ3/θ2) θ1(z)/θ4(z), cn = (θ4/θ2) θ2(z)/θ4(z), dn = (θ4/θ3) θ3(z)/θ4(z), z = πv/2K = ψ/2.
+
+        With C_j = cos 2jz from the recurrence, sin (2m+1)z = (1 + 2 Σ_{j≤m} C_j) sin z keeps its accuracy relative to itself, and
+        cos (2m+1)z = (−1)^m (1 + 2 Σ_{j≤m} (−1)^j C_j) cos z.
+        """
         xp = self.arithmetic
-        z = psi / 2
-        sine, cosine = xp.sin(z), xp.cos(z)
+        sine, cosine = xp.sin(psi / 2), xp.cos(psi / 2)
         if not self._stacked and self.k_squared == 0:
             return sine, cosine, 0 * psi + 1
         t2, t3, t4 = self._constants
-        z1, z2, z3, z4 = 2 * sine, 2 * cosine, 0 * psi + 1, 0 * psi + 1
+        before, wave = 0 * psi + 1, 1 - 2 * sine * sine
+        twice, sum_, alternating = 2 * wave, before, before
+        z1, z2, z3, z4 = 2 * before, 2 * before, before, before
         for m, odd, even in self._powers:
-            z1, z2 = z1 + 2 * (-1) ** m * odd * xp.sin((2 * m + 1) * z), z2 + 2 * odd * xp.cos((2 * m + 1) * z)
-            wave = 2 * even * xp.cos(2 * m * z)
-            z3, z4 = z3 + wave, z4 + (-1) ** m * wave
-        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
+            sign = (-1) ** m
+            sum_, alternating = sum_ + 2 * wave, alternating + 2 * sign * wave
+            z1, z2 = z1 + 2 * sign * odd * sum_, z2 + 2 * sign * odd * alternating
+            z3, z4 = z3 + 2 * even * wave, z4 + 2 * sign * even * wave
+            before, wave = wave, twice * wave - before
+        z1, z2, z3, z4 = self._truncated(z1 * sine, z2 * cosine, z3, z4)
         return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
 
     def _hyperbolic(self, psi: Values) -> tuple[Values, Values, Values]:
         """Jacobi's imaginary transformation: sn = (θ3/θ4) (θ1/i)/θ2, cn = (θ2/θ4) θ4/θ2, dn = (θ2/θ3) θ3/θ2 at iy, y = πv/2K'.
 
-        All four sums are divided by e^y, and exponents are joined before exp: nothing overflows, whatever K/K'.
+        All four sums are divided by e^y. With the nome q and D = e^{−2y} their terms are q^{m²+m} e^{2my} (1 ∓ D^{2m+1}) and
+        q^{m²} e^{(2m−1)y} (1 + D^{2m}). Each follows from the one before by factors below one, as y ≤ |log q|/4: whatever K/K',
+        nothing overflows. 1 − D^{2m+1} = (1 − D)(1 + D + … + D^{2m}) keeps its accuracy relative to itself.
         """
         xp = self.arithmetic
         y = psi / 2 * (self.quarter / self.conjugate_quarter)
-        q = self._log_nome
         t2, t3, t4 = self._constants
-        z1, z2, z3, z4 = -xp.expm1(-2 * y), 1 + xp.exp(-2 * y), xp.exp(-y), xp.exp(-y)
+        rise, D = -xp.expm1(-2 * y), xp.exp(-2 * y)
+        nome, step = xp.exp(self._log_nome), xp.exp(self._log_nome + 2 * y)
+        growth = power = 0 * y + 1
+        wave = even = xp.exp(-y)
+        z1, z2, z3, z4, sum_, factor = growth, 1 + D, even, even, growth, growth
         for m in range(1, self._terms + 1):
-            growth = xp.exp(q * (m * m + m) + 2 * m * y)
-            z1 = z1 - (-1) ** m * growth * xp.expm1(-(4 * m + 2) * y)
-            z2 = z2 + growth * (1 + xp.exp(-(4 * m + 2) * y))
-            wave = xp.exp(q * m * m + (2 * m - 1) * y) * (1 + xp.exp(-4 * m * y))
-            z3, z4 = z3 + wave, z4 + (-1) ** m * wave
-        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
+            sign, wave = (-1) ** m, wave * (factor * step)
+            growth, factor = growth * (factor * nome * step), factor * nome * nome
+            square = power * D
+            power = square * D
+            sum_ = sum_ + square + power
+            z1, z2 = z1 + sign * growth * sum_, z2 + growth * (1 + power * D)
+            even = wave * (1 + power)
+            z3, z4 = z3 + even, z4 + sign * even
+        z1, z2, z3, z4 = self._truncated(z1 * rise, z2, z3, z4)
         return (t3 / t4) * z1 / z2, (t2 / t4) * z4 / z2, (t2 / t3) * z3 / z2

@@ -40,8 +40,8 @@ _FIRST_DIGITS, _LOST_DIGITS = 12, 2
 #: Part of the slope at the approximate root that is certain next to it.
 _SLOPE = 0.5
 
-#: Panels end a little beyond the last time.
-_BEYOND = 1 + 1e-9
+#: Panels end a little beyond the last time, and are not so short that their length over others leaves the range of doubles.
+_BEYOND, _SHORTEST = 1 + 1e-9, 1e-100
 
 
 class EnclosedClock:
@@ -76,7 +76,7 @@ class EnclosedClock:
     def _panels(self, reach: float, direction: int) -> _Panels | None:
         if reach == 0:
             return None
-        reach *= _BEYOND
+        reach = max(reach * _BEYOND, _SHORTEST)
         if self._certified:
             width, largest = self._orbit.strip
             count = math.ceil(reach / (2 * _PANEL_IN_STRIPS * width))
