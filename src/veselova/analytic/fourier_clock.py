@@ -170,16 +170,17 @@ def grown(
     reaches far. Raises Unsolved where more than ``most`` have been looked at.
     """
     steps = np.concatenate([np.eye(genus, dtype=np.int64), -np.eye(genus, dtype=np.int64)])
-    seen: set[bytes] = {np.zeros(genus, dtype=np.int64).tobytes()}
-    frontier = np.zeros((1, genus), dtype=np.int64)
+    before, layer, looked_at = np.empty((0, genus), dtype=np.int64), np.zeros((1, genus), dtype=np.int64), 1
     kept_modes, kept_values = [], []
-    while frontier.size:
-        values, large = coefficients(frontier)
-        kept_modes.append(frontier[large])
+    while layer.size:
+        values, large = coefficients(layer)
+        kept_modes.append(layer[large])
         kept_values.append(values[large])
-        neighbours = (frontier[large][:, None, :] + steps).reshape(-1, genus)
-        frontier = _unseen(_half_space(neighbours), seen)
-        if len(seen) > most:
+        neighbours = _half_space((layer[large][:, None, :] + steps).reshape(-1, genus))
+        # A mode that counts has no neighbours but in its own layer, the one before and the next.
+        before, layer = layer, _others(neighbours, np.concatenate([before, layer]))
+        looked_at += len(layer)
+        if looked_at > most:
             raise Unsolved("too-far", f"the clock has more than {most} Fourier modes, and the time is too far for panels")
     modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
     moving = np.any(modes != 0, axis=1)
@@ -187,12 +188,15 @@ def grown(
 
 
 def _half_space(modes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the distinct modes, each replaced by its negative where its first nonzero entry is negative."""
+    """Return the modes, each replaced by its negative where its first nonzero entry is negative."""
     first = modes[np.arange(modes.shape[0]), np.argmax(modes != 0, axis=1)]
-    return np.unique(np.where(first[:, None] < 0, -modes, modes), axis=0)
+    return np.asarray(np.where(first[:, None] < 0, -modes, modes))
 
 
-def _unseen(modes: NDArray[np.int64], seen: set[bytes]) -> NDArray[np.int64]:
-    fresh = [row for row in modes if row.tobytes() not in seen]
-    seen.update(row.tobytes() for row in fresh)
-    return np.array(fresh, dtype=np.int64).reshape(-1, modes.shape[1])
+def _others(modes: NDArray[np.int64], known: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the distinct ones among modes (M, g) that are not among the known, in lexicographic order."""
+    rows = np.concatenate([known, modes])
+    order = np.lexsort(rows.T[::-1])  # stable: of equal rows known ones come first
+    rows = rows[order]
+    fresh = np.any(rows != np.roll(rows, 1, axis=0), axis=1) & (order >= len(known))
+    return np.asarray(rows[fresh])
