@@ -105,3 +105,17 @@ def test_panels_are_the_cheaper_clock_of_any_high_dimension() -> None:
     assert costs.cheaper_clock(inversions=10) == "panels"
     assert costs.fewest_in_window(32, "fourier") >= 4
     assert costs.fewest_in_window(32, "panels") >= 4
+
+
+@pytest.mark.parametrize("span", [(-3, 4), (0, 30), (-20, 0)])
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_windows_that_adjoin_tell_the_time_themselves(n: int, span: tuple[float, float]) -> None:
+    """With these A's the mean clock is far off at the ends of some spans."""
+    problem = random_problem(np.random.default_rng(6), n, 100.0)
+    times, chosen = np.linspace(*span, 3000) / problem.turning, np.arange(0, 3000, 37)
+    many = solve_analytic(problem, times, clock="panels")
+    assert many.provenance.details["clock_size"] <= many.provenance.details["evaluations"] < times.size
+    for clock in ("panels", "fourier"):
+        assert_one_motion(many, solve_analytic(problem, times[chosen], clock=clock), chosen)
+    at_zero = np.argmin(np.abs(times))
+    assert many.error[at_zero] <= 2 * solve_analytic(problem, times[[at_zero]], clock="panels").error[0]

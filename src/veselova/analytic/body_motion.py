@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.motion import Motion
-from veselova.analytic.panel_integral import PanelIntegral
+from veselova.analytic.panel_integral import integrated
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart
 from veselova.mechanics.errors import Unsolved
@@ -76,7 +76,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         tau, z = clock.tau1(grid)
         largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
         low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
-        panels = PanelIntegral(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
+        panels = integrated(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
         at, velocity = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))

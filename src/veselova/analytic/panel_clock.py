@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from veselova.analytic.clock import Clock
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panel_integral import PanelIntegral
+from veselova.analytic.panel_integral import integrated
+from veselova.analytic.panels import Panels
 
 __all__ = ["PanelClock"]
 
@@ -33,16 +35,24 @@ class PanelClock(Clock):
     name: ClassVar[str] = "panels"
 
     def __init__(self, rate: Callable[[Array], Array], mean: float, in_tau1: LinearFlow, earliest: float, latest: float) -> None:
-        self._in_tau1, self._mean = in_tau1, mean
+        self._rate, self._mean, self.in_tau1 = rate, mean, in_tau1
+        self._earliest, self._latest = min(earliest, 0.0), max(latest, 0.0)
+
+    @cached_property
+    def panels(self) -> Panels:
+        """Return the panels; whoever has them already may set them."""
+        low, high = self._earliest / self._mean, self._latest / self._mean
+        panels = integrated(self._rate, self.in_tau1, low, high)
         # The mean clock's estimate; extended where that was short.
-        self._panels = PanelIntegral(rate, in_tau1, min(earliest, 0.0) / mean, max(latest, 0.0) / mean)
-        while self._panels.values[0] > min(earliest, 0.0) or self._panels.values[-1] < max(latest, 0.0):
-            self._panels.extend()
+        while panels.values[0] > self._earliest or panels.values[-1] < self._latest:
+            low, high = (border and 1.5 * border for border in panels.borders[[0, -1]].tolist())
+            panels = integrated(self._rate, self.in_tau1, low, high)
+        return panels
 
     @property
     def size(self) -> int:
         """Return the number of nodes."""
-        return self._panels.size
+        return self.panels.size
 
     @property
     def mean(self) -> float:
@@ -52,22 +62,24 @@ class PanelClock(Clock):
     def ahead(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u within the panels, or near."""
         tau1 = means / self._mean
-        while tau1[0] < self._panels.borders[0] or tau1[-1] > self._panels.borders[-1]:
-            self._panels.extend()
-        return self.time(tau1) - means, self._in_tau1.phases(tau1)
+        low, high = self.panels.borders[[0, -1]].tolist()
+        if tau1[0] < low or tau1[-1] > high:
+            low, high = (1.5 * float(tau1[0]) if tau1[0] < low else low), (1.5 * float(tau1[-1]) if tau1[-1] > high else high)
+            self.panels = integrated(self._rate, self.in_tau1, low, high)
+        return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
     def error(self, tau1: Array) -> Array:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share."""
         # The tails are those of t; divided by the mean rate they are those of τ₁.
-        return np.asarray(self._panels.error(tau1) / self._panels.mean_size + _SHARED_ROUNDING * np.abs(tau1))
+        return np.asarray(self.panels.error(tau1) / self.panels.mean_size + _SHARED_ROUNDING * np.abs(tau1))
 
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times within the panels."""
-        return self._panels.at(tau1)
+        return self.panels.at(tau1)
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's polynomial."""
-        panels = self._panels
+        panels = self.panels
         panel = panels.panel_of(panels.values, times)
         target = times - panels.values[panel]
         x = 2 * target / (panels.values[panel + 1] - panels.values[panel]) - 1
@@ -78,5 +90,5 @@ class PanelClock(Clock):
 
         x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _SETTLED)
         offset = (x + 1) * (panels.lengths[panel] / 2)
-        z = self._in_tau1.phases(panels.borders[panel]) + offset[:, None] * self._in_tau1.rates
+        z = self.in_tau1.phases(panels.borders[panel]) + offset[:, None] * self.in_tau1.rates
         return panels.borders[panel] + offset, z

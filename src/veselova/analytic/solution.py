@@ -14,7 +14,6 @@ from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
 from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs, expected_modes
 from veselova.analytic.curve import Curve
-from veselova.analytic.filling import NODES
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.orbit import LinearFlow
@@ -26,6 +25,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
+from veselova.analytic.trial import NODES
 from veselova.analytic.windows import Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float

@@ -4,11 +4,14 @@ Windows are of mean time u = F_0τ₁. They begin at multiples of their length, 
 exact however far out, and no window hands its error to the next. A window takes one sum of the clock, at its start, and one
 evaluation of the motion at each of its nodes; on its pieces the series become polynomials in t (analytic.pieces). All times
 in it are sums of these, whatever the genus and the route.
+
+A clock by panels is asked nothing where windows adjoin from t = 0 on: they have dt/dτ₁ themselves (analytic.track).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
-from veselova.analytic.filling import Along, Cells, Evaluation, Filling
+from veselova.analytic.filling import Along, Filling
+from veselova.analytic.panel_clock import PanelClock
+from veselova.analytic.pieces import ORDER
+from veselova.analytic.track import Track
+from veselova.analytic.trial import Cells, Evaluation, Trial
 
 __all__ = ["Windows"]
 
@@ -37,6 +44,10 @@ _FARTHEST = 2.0**32
 
 #: Windows tried before all of the same length, and made at once.
 _FIRST_WINDOWS, _WINDOWS = 8, 64
+
+#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them, and how many
+#: numbers are kept for that: 128 MB.
+_COVERED, _MOST_KEPT = 0.7, 2**24
 
 
 @dataclass(frozen=True)
@@ -60,8 +71,7 @@ class Windows:
 
     def __init__(self, times: Array, fastest: float, fewest: int) -> None:
         self._times, self._fewest = times, fewest
-        mantissa, exponent = math.frexp(_CYCLES / fastest)
-        self._length = math.ldexp(math.floor(8 * mantissa) / 8, exponent)
+        self._length = _few_bits(_CYCLES / fastest)
 
     @cached_property
     def _stretches(self) -> _Stretches:
@@ -96,7 +106,7 @@ class Windows:
     def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         filling = Filling(self._times, self._fewest, clock, rates, evaluation)
-        if self._stretches.windows:
+        if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, rates, evaluation)):
             cells, count = self._resolving(filling, clock)
             for _ in range(_MOST_LENGTHS):
                 parts = [filling.by_windows(cells[k : k + _WINDOWS], count) for k in range(0, len(cells), _WINDOWS)]
@@ -107,21 +117,70 @@ class Windows:
 
     def _resolving(self, filling: Filling, clock: Clock) -> tuple[Cells, int]:
         """Return windows of a length at which most are resolved, and in how many pieces."""
-        stretches, length, tail, count = self._stretches, self._length, np.inf, _PIECES[-1]
-        dense = self._times[np.stack([stretches.first, stretches.last])]
+        dense = self._times[np.stack([self._stretches.first, self._stretches.last])]
         ends = clock.tau1(dense.ravel())[0].reshape(dense.shape) * clock.mean
-        for k in range(_MOST_LENGTHS):
+
+        def over(length: float, tail: float) -> Cells:
             pairs = np.floor(ends / length) + np.array([[0.0], [1.0]])
             starts = np.unique(np.concatenate([np.arange(*pair) for pair in pairs.T])) * length
-            cells = Cells(length, starts, np.full(starts.size, tail))
-            trial = filling.trial(cells[np.unique(np.linspace(0, len(cells) - 1, _FIRST_WINDOWS).astype(int))])
-            enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
-            if np.mean(trial.settled(trial.tails)) >= enough:
-                for count in _PIECES:
-                    if np.mean(trial.settled(trial.in_pieces(count)[1])) >= enough:
-                        return cells, count
-            tail, length = float(np.max(trial.tails)), _shorter(length) if k < _CLOSE_LENGTHS else length / 2
-        return cells, count
+            return Cells(length, starts, np.full(starts.size, tail))
+
+        return _resolving(over, filling.trial, self._length)
+
+    def _tracked(self, filling: Filling, clock: PanelClock, rates: Array, evaluation: Evaluation) -> bool:
+        """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether that could be done."""
+        ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
+        whole, columns = float(np.ptp(ends)) / self._length, (rates.size + 1) * (rates.size + 2) + 1
+
+        def too_many(windows: float, pieces: int) -> bool:
+            return windows * pieces * ORDER * columns > _MOST_KEPT
+
+        if self._stretches.windows < _COVERED * whole or too_many(whole, _PIECES[0]):
+            return False
+        low, high = ends / clock.mean
+
+        def over(length: float, tail: float) -> Cells:
+            return Cells.untried(length, math.floor(low / length), math.ceil(high / length), tail)
+
+        probe = Track(filling, evaluation, clock.in_tau1, _PIECES[-1])
+        cells, count = _resolving(over, probe.trial, _few_bits(self._length / clock.mean))
+        if too_many(len(cells), count):
+            return False
+        track = Track(filling, evaluation, clock.in_tau1, count)
+        while len(cells):
+            if not track.extend(cells):
+                return False
+            panels = track.panels()
+            length, (first, last) = cells.length, np.rint(panels.borders[[0, -1]] / cells.length).astype(int).tolist()
+            more = max(1, (last - first) // 8)  # the ends were those of the mean clock
+            before = Cells.untried(length, first - more, first) if panels.values[0] > self._times[0] else cells[:0]
+            after = Cells.untried(length, last, last + more) if panels.values[-1] < self._times[-1] else cells[:0]
+            cells = Cells.joined([before, after])
+        clock.panels = panels
+        track.fill(self._times, panels)
+        return True
+
+
+def _resolving(over: Callable[[float, float], Cells], trial: Callable[[Cells], Trial], length: float) -> tuple[Cells, int]:
+    """Return the windows ``over`` all times of a length, the first tried or below, at which most are resolved, and in how many
+    pieces; ``over`` takes the length, and the tail of the ones before."""
+    tail, count = np.inf, _PIECES[-1]
+    for k in range(_MOST_LENGTHS):
+        cells = over(length, tail)
+        tried = trial(cells[np.unique(np.linspace(0, len(cells) - 1, _FIRST_WINDOWS).astype(int))])
+        enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
+        if np.mean(tried.settled(tried.tails)) >= enough:
+            for count in _PIECES:
+                if np.mean(tried.settled(tried.in_pieces(count)[1])) >= enough:
+                    return cells, count
+        tail, length = float(np.max(tried.tails)), _shorter(length) if k < _CLOSE_LENGTHS else length / 2
+    return cells, count
+
+
+def _few_bits(length: float) -> float:
+    """Return the next smaller number of three bits."""
+    mantissa, exponent = math.frexp(length)
+    return math.ldexp(math.floor(8 * mantissa) / 8, exponent)
 
 
 def _shorter(length: float) -> float:

@@ -1,0 +1,89 @@
+"""Integrals along an orbit, as Chebyshev series on adjoining panels of Neumann time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PANEL_TAIL", "Panels"]
+
+Array = NDArray[np.float64]
+
+#: A series whose last coefficients fall below this part of the first is resolved; what it leaves out counts as no less.
+PANEL_TAIL = 4e-15
+
+
+@dataclass(frozen=True)
+class Panels:
+    """τ₁ ↦ ∫_0^{τ₁} f(z) along an orbit, on P panels.
+
+    borders (P+1,) in τ₁, zero among them · lengths (P,) · integrals (P, N+1), coefficients of the integral from the left border
+    values (P+1,) of the integral at the borders · tails (P+1,), what series leave out of them · mean_size of f
+    """
+
+    borders: Array
+    lengths: Array
+    integrals: Array
+    values: Array
+    tails: Array
+    mean_size: float
+
+    @classmethod
+    def of(cls, lefts: Array, lengths: Array, coefficients: Array, tails: Array, sizes: Array) -> Panels:
+        """Return the integral from the coefficients (P, N) of f on panels in any order; tails (P,) are relative to sizes (P,)."""
+        order = np.argsort(lefts)
+        left, lengths, sizes = lefts[order], lengths[order], sizes[order]
+        borders = np.append(left, left[-1] + lengths[-1])
+        zero = np.searchsorted(borders, 0.0)
+        integrals = _integrated(coefficients[order]) * (lengths / 2)[:, None]
+        over_panels = np.sum(integrals, axis=1)  # at x = 1 every Chebyshev polynomial is one
+        left_out = np.maximum(tails[order], PANEL_TAIL) * sizes * lengths
+        values, tails = (np.concatenate([[0.0], np.cumsum(summands)]) for summands in (over_panels, left_out))
+        return cls(borders, lengths, integrals, values - values[zero], tails - tails[zero], float(np.mean(sizes)))
+
+    @property
+    def size(self) -> int:
+        """Return the number of nodes."""
+        return int(self.integrals.shape[0] * (self.integrals.shape[1] - 1))
+
+    def at(self, tau1: Array) -> Array:
+        """Return the integrals from zero to Neumann times within the panels."""
+        panel = self.panel_of(self.borders, tau1)
+        x = 2 * (tau1 - self.borders[panel]) / self.lengths[panel] - 1
+        return np.asarray(self.values[panel] + self.within(panel, x)[0])
+
+    def error(self, tau1: Array) -> Array:
+        """Return the tails of the panels between zero and increasing Neumann times, twice."""
+        if tau1.size < self.lengths.size:
+            return 2 * np.abs(np.interp(tau1, self.borders, self.tails))
+        # Of whole panels, which is faster, but next to zero.
+        ends, zero = np.searchsorted(tau1, self.borders), int(np.searchsorted(self.borders, 0.0))
+        tails = 2 * np.maximum(np.abs(self.tails[1:]), np.abs(self.tails[:-1]))
+        result = np.repeat(tails, np.diff(ends[1:-1], prepend=0, append=tau1.size))
+        near = slice(ends[max(0, zero - 1)], ends[min(zero + 1, tails.size)])
+        result[near] = 2 * np.abs(np.interp(tau1[near], self.borders, self.tails))
+        return result
+
+    def panel_of(self, borders: Array, values: Array) -> NDArray[np.intp]:
+        """Return the panels in which values lie, borders being those of τ₁ or of the integral."""
+        return np.clip(np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1)
+
+    def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
+        """Return the integral from the panel's left border to x, and its derivative in x."""
+        orders = np.arange(self.integrals.shape[1])
+        angle = np.arccos(np.clip(x, -1.0, 1.0))
+        table = self.integrals[panel]
+        value = np.sum(table * np.cos(orders * angle[:, None]), axis=1)
+        sine = np.sin(angle)
+        inside = sine > 1e-8
+        slopes = np.where(inside[:, None], np.sin(orders * angle[:, None]) / np.where(inside, sine, 1.0)[:, None], orders)
+        # At x = −1 the limit of sin(kα)/sin α is (−1)^{k+1} k.
+        slopes = np.where((~inside & (x < 0))[:, None], -((-1.0) ** orders) * orders, slopes)
+        return value, np.sum(table * orders * slopes, axis=1)
+
+
+def _integrated(coefficients: Array) -> Array:
+    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1)."""
+    return np.asarray(np.polynomial.chebyshev.chebint(coefficients, lbnd=-1, axis=1), dtype=np.float64)

@@ -1,0 +1,88 @@
+"""Windows that adjoin from τ₁ = 0 on: dt/dτ₁ at their nodes tells the time, and no clock needs nodes of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.filling import Filling
+from veselova.analytic.orbit import LinearFlow
+from veselova.analytic.panels import Panels
+from veselova.analytic.pieces import Pieces
+from veselova.analytic.trial import Cells, Evaluation, Trial
+
+__all__ = ["Track"]
+
+Array = NDArray[np.float64]
+
+#: Windows evaluated at once, and halvings before giving up.
+_WINDOWS, _MOST_HALVINGS = 64, 16
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Windows of one trial that are resolved: their places in it, and the pieces of all."""
+
+    trial: Trial
+    places: NDArray[np.intp]
+    pieces: Pieces
+    tails: Array
+
+
+class Track:
+    """A motion on windows that adjoin, each resolved in ``count`` pieces or halved."""
+
+    def __init__(self, filling: Filling, evaluation: Evaluation, in_tau1: LinearFlow, count: int) -> None:
+        self._filling, self._evaluation, self._in_tau1, self._count = filling, evaluation, in_tau1, count
+        self._parts: list[_Part] = []
+
+    def trial(self, cells: Cells) -> Trial:
+        """Return windows of Neumann time."""
+        z, rates = self._in_tau1.phases(cells.starts), self._in_tau1.rates
+        return self._filling.noted(Trial.of(self._evaluation, cells.starts, z, cells.length, rates, cells.tails))
+
+    def extend(self, cells: Cells) -> bool:
+        """Add windows; return whether all could be resolved."""
+        for _ in range(_MOST_HALVINGS):
+            cells = Cells.joined([self._unresolved(cells[k : k + _WINDOWS]) for k in range(0, len(cells), _WINDOWS)])
+            if not len(cells):
+                return True
+            cells = cells.halved()
+        return False
+
+    def _unresolved(self, cells: Cells) -> Cells:
+        trial = self.trial(cells)
+        pieces, tails = trial.in_pieces(self._count)
+        settled = trial.settled(tails)
+        self._parts.append(_Part(trial, np.flatnonzero(settled), pieces, tails))
+        return Cells(cells.length, cells.starts, tails)[~settled]
+
+    def panels(self) -> Panels:
+        """Return t(τ₁) on the windows."""
+        columns = []
+        for part in self._parts:
+            trial, chosen = part.trial, part.places
+            lengths = np.full(chosen.size, trial.stretch)
+            rates = trial.rates[chosen]
+            columns.append((trial.starts[chosen], lengths, rates, trial.rate_tails[chosen], rates[:, 0]))
+        return Panels.of(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
+
+    def fill(self, times: Array, panels: Panels) -> None:
+        """Fill the answer at increasing times within the windows."""
+        for part, w, left in self._windows():
+            k = int(np.searchsorted(panels.borders, left))
+            low, high = panels.values[k : k + 2]
+            first, last = np.searchsorted(times, [low, high])
+            if high == panels.values[-1]:
+                last = times.size
+            if first < last:
+                rows = slice(int(first), int(last))
+                self._filling.fill(rows, part.pieces, w, times[rows] - low, part.tails[w])
+
+    def _windows(self) -> Iterator[tuple[_Part, int, float]]:
+        for part in self._parts:
+            for w in part.places.tolist():
+                yield part, w, float(part.trial.starts[w])
