@@ -43,6 +43,9 @@ _PANEL_CYCLE = {1: 1.6e-5, 2: 4e-5, 3: 6e-5, 4: 1.6e-4}
 _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
 _HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 
+#: Cycles from which panels are longer ones of more nodes: what finding them takes in such cycles, and what one costs then.
+_LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 30.0, 0.4
+
 #: An inversion on panels, and the cycles that these reach beyond the times.
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 1.0
 
@@ -74,7 +77,8 @@ class Costs:
             return _MODES + of_modes + inversions * _INVERSION if self.modes <= _MOST_MODES else math.inf
         if self.cycles > PANEL_CYCLES:
             return math.inf
-        of_panels = (self.cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
+        cycles = self.cycles if self.cycles < _LONG_STRETCH else _PROBES + _LONGER_PANELS * self.cycles
+        of_panels = (cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
         return of_panels + inversions * _PANEL_INVERSION
 
     def cheaper_clock(self, inversions: int) -> Literal["fourier", "panels"]:

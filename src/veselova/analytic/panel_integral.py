@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +19,14 @@ __all__ = ["integrated"]
 
 Array = NDArray[np.float64]
 
-#: Points per panel: the Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
-_PANEL_NODES = 24
-_POINTS, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(_PANEL_NODES)), DOUBLE.cosine_series(np.eye(_PANEL_NODES))
+#: Points per panel, of a short stretch and of a long one.
+_FEW_NODES, _NODES = 24, 48
 
-#: Panels beyond an end, each of at most half a cycle of the fastest phase: ends come from means.
+#: Panels beyond an end: ends come from means.
 _MARGIN = 2
+
+#: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and how many are looked at.
+_MANY_PANELS, _LONGER, _PROBED = 200, (7, 6, 5, 4, 3.5, 3, 2.5), 8
 
 #: Last coefficients below this part of the first that have not fallen to a quarter in the last halving: then they are rounding
 #: of the phases.
@@ -42,18 +47,14 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
     larger: an integrand that changes sign has means near zero. Panels that are not are halved, each for itself. An end at zero,
     where the integral is known, has no margin.
     """
-    fastest = float(np.max(np.abs(in_tau1.rates)))
-    # Borders are whole multiples of a power of two, so that their products with it are exact.
-    length = float(2.0 ** np.floor(np.log2(0.5 / fastest)))
-    first = int(np.floor(low / length)) - _MARGIN if low < 0 else 0
-    last = int(np.ceil(high / length)) + _MARGIN if high > 0 or first == 0 else 0
-    lefts = np.arange(first, last, dtype=float) * length
+    panels = _Panels(integrand, in_tau1, floor, _FEW_NODES, 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))))
+    if (high - low) / panels.length >= _MANY_PANELS:
+        panels = panels.longer(low, high)
+    lefts, length = panels.lefts(low, high), panels.length
     before = np.full(lefts.size, np.inf)
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
-        coefficients = _coefficients(integrand, in_tau1, lefts, length)
-        sizes = np.maximum(np.abs(coefficients[:, 0]), floor)
-        tails = np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+        coefficients, sizes, tails = panels.series(lefts, length)
         settled = (tails <= PANEL_TAIL) | ((tails <= _NOISE_TAIL) & (tails > _STALLED * before))
         lengths = np.full(lefts.size, length)
         done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
@@ -65,10 +66,49 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
     raise InternalContradiction("a panel along the orbit was not resolved")
 
 
-def _coefficients(integrand: Callable[[Array], Array], in_tau1: LinearFlow, lefts: Array, length: float) -> Array:
-    """Return the Chebyshev coefficients of the integrand on panels; node phases are those of the border plus a short way."""
-    start = in_tau1.phases(lefts)
-    offsets = (_POINTS + 1)[:, None] * (length / 2) * in_tau1.rates
-    z = (start[:, None, :] + offsets).reshape(-1, start.shape[1])
-    values = [integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
-    return np.asarray(np.concatenate(values).reshape(lefts.size, -1) @ _TO_COEFFICIENTS)
+@dataclass(frozen=True)
+class _Panels:
+    """Panels of so many nodes, at first of a length of few bits: borders are exact multiples of it."""
+
+    integrand: Callable[[Array], Array]
+    in_tau1: LinearFlow
+    floor: float
+    nodes: int
+    length: float
+
+    @cached_property
+    def _points(self) -> Array:
+        """Return the Chebyshev points of [0, 1], from 1 downwards."""
+        return np.asarray((np.cos(DOUBLE.nodes(self.nodes)) + 1) / 2)
+
+    @cached_property
+    def _to_coefficients(self) -> Array:
+        return np.asarray(DOUBLE.cosine_series(np.eye(self.nodes)))
+
+    def lefts(self, low: float, high: float) -> Array:
+        """Return where the panels over a stretch start."""
+        first = math.floor(low / self.length) - _MARGIN if low < 0 else 0
+        last = math.ceil(high / self.length) + _MARGIN if high > 0 or first == 0 else 0
+        return np.arange(first, last, dtype=float) * self.length
+
+    def series(self, lefts: Array, length: float) -> tuple[Array, Array, Array]:
+        """Return the Chebyshev coefficients (P, nodes), their sizes and relative tails, (P,).
+
+        Phases of nodes are those of the border plus a short way.
+        """
+        z = self.in_tau1.phases(lefts)[:, None, :] + (self._points * length)[:, None] * self.in_tau1.rates
+        z = z.reshape(-1, z.shape[2])
+        values = [self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
+        coefficients = np.concatenate(values).reshape(lefts.size, -1) @ self._to_coefficients
+        sizes = np.maximum(np.abs(coefficients[:, 0]), self.floor)
+        return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+
+    def longer(self, low: float, high: float) -> _Panels:
+        """Return longer panels of more nodes where such resolve the integrand, and otherwise these."""
+        for factor in _LONGER:
+            panels = replace(self, nodes=_NODES, length=factor * self.length)
+            lefts = panels.lefts(low, high)
+            probed = lefts[np.linspace(0, lefts.size - 1, _PROBED).astype(int)]
+            if np.max(panels.series(probed, panels.length)[2]) <= PANEL_TAIL:
+                return panels
+        return self
