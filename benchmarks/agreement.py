@@ -9,8 +9,11 @@ Nothing is dropped: a draw that an engine refuses is listed.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

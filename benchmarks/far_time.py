@@ -9,8 +9,11 @@ reported error, the difference to the same closed form without guard digits, and
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

@@ -11,9 +11,12 @@ the manifold every ten radians and dense output at all times, without any error 
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

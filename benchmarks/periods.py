@@ -10,9 +10,12 @@ the entries of T, over the largest, to FLINT at 128 bits. The last lines have A'
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from flint import acb, arb, arb_mat, ctx

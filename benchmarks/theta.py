@@ -12,9 +12,12 @@ evaluation can better.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from flint import acb, acb_mat, arb, ctx

@@ -9,9 +9,12 @@ any number relative to itself (for phases: of a cycle).
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from dataclasses import fields
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
