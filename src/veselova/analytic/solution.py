@@ -265,11 +265,15 @@ class Solution:
         For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of that.
         """
         normals = self.frame.at(self.start.angles[None, :]).normals[0]
-        raw = normals.T @ self.moving.directions.T @ self.problem.frame[:, 1:]
-        if not self.problem.exact.natural or raw.shape[0] != raw.shape[1]:
-            return np.asarray(raw)
-        signs = np.rint(raw)
-        return np.asarray(signs if np.max(np.abs(raw - signs)) <= _SIGN_ROUNDING * self.problem.n else raw)
+        along = normals.T @ self.moving.directions.T
+        if self.problem.exact.natural and along.shape[0] == self.problem.n - 1:
+            # The last bits of the frame are asked for only where those of a double leave a doubt.
+            for name in ("near_frame", "frame"):
+                raw = along @ getattr(self.problem, name)[:, 1:]
+                signs = np.rint(raw)
+                if np.max(np.abs(raw - signs)) <= _SIGN_ROUNDING * self.problem.n:
+                    return np.asarray(signs)
+        return np.asarray(along @ self.problem.frame[:, 1:])
 
     @cached_property
     def _frozen_part(self) -> Array:

@@ -46,7 +46,7 @@ class EllipsoidGeodesic(TorusProblem):
     A: Array
     X: Array
     X_dot: Array
-    frame: Array
+    near_frame: Array
     exact: ExactState
     given: Mapping[str, Any]
 
@@ -85,7 +85,7 @@ class EllipsoidGeodesic(TorusProblem):
         frame = orthonormalized(refined(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent))
         if frame[:, -1] @ velocity < 0:  # n = 2, where γ has no partner whose sign makes the determinant positive
             frame[:, -1] = -frame[:, -1]
-        self._set(A=A_float, X=position(A_float, normal), X_dot=frame[:, -1], frame=frame, exact=exact)
+        self._set(A=A_float, X=position(A_float, normal), X_dot=frame[:, -1], near_frame=frame, exact=exact)
         self._set(given=stated(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
@@ -96,6 +96,11 @@ class EllipsoidGeodesic(TorusProblem):
     def title(self) -> str:
         """Return the system and its dimension."""
         return f"{self.system}, n = {self.n}, J {self.joachimsthal:.12g}"
+
+    @property
+    def frame(self) -> Array:
+        """Return the frame at s = 0, (n, n), to the last bit."""
+        return self.near_frame
 
     @property
     def energy(self) -> float:

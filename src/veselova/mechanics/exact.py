@@ -25,6 +25,7 @@ __all__ = [
     "exact_number",
     "exact_vector",
     "is_matrix",
+    "over_common_denominator",
     "plain",
     "read_only",
     "require_truth_value",
@@ -176,6 +177,12 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
     if not all(math.isfinite(x) for x in array.flat):
         raise OverflowError("a validated number left the float range")
     return read_only(array)
+
+
+def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]:
+    """Return a vector as integers and their denominator: sums and products of them need no further divisors."""
+    common = math.lcm(*(x.denominator for x in vector))
+    return [x.numerator * (common // x.denominator) for x in vector], common
 
 
 def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.exact import over_common_denominator
 from veselova.mechanics.integrals import neumann_velocity, tangent_basis
 
 __all__ = ["moser_frame", "natural_frame", "orthonormalized", "refined"]
@@ -104,7 +105,7 @@ def refined(
 
 
 def _weighted(A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
-    (a, over_a), (b, over_b), (c, over_c) = _whole(A), _whole(x), _whole(y)
+    (a, over_a), (b, over_b), (c, over_c) = map(over_common_denominator, (A, x, y))
     return Fraction(sum(map(math.prod, zip(a, b, c, strict=True))), over_a * over_b * over_c)
 
 
@@ -117,15 +118,9 @@ def _shifted(numerator: int, denominator: int) -> int:
     return (numerator << _BITS) // denominator
 
 
-def _whole(vector: Sequence[Fraction]) -> tuple[list[int], int]:
-    """Return a vector as integers over their common denominator: sums and products of them need no further divisors."""
-    common = math.lcm(*(x.denominator for x in vector))
-    return [x.numerator * (common // x.denominator) for x in vector], common
-
-
 def _fixed_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
     """Return scale·vvᵀ as integers of _BITS bits after the point."""
-    whole, common = _whole(vector)
+    whole, common = over_common_denominator(vector)
     times, over = scale.numerator, scale.denominator * common**2
     return np.array([[_shifted(x * y * times, over) for y in whole] for x in whole], dtype=object)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_number, require_truth_value, stated, to_float
+from veselova.mechanics.exact import exact_number, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.integrals import energy as veselova_energy
 from veselova.mechanics.integrals import moser_eigenvalues, norm, uhlenbeck_integrals
 from veselova.mechanics.natural_frame import moser_frame, refined
@@ -47,7 +48,7 @@ class NeumannSystem(TorusProblem):
     A: Array
     q: Array
     q_prime: Array
-    frame: Array
+    near_frame: Array
     exact: ExactState
     given: Mapping[str, Any]
 
@@ -70,8 +71,8 @@ class NeumannSystem(TorusProblem):
         exact, position = point_on_sphere(diagonal, q, q_prime, normalize, "q_prime")
         self._set(A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact)
         _require_representable(self.A, self.q_prime)
-        frame = refined(moser_frame(self.A, self.q, self.q_prime), exact.A, exact.q, exact.tangent, Fraction(1))
-        self._set(frame=frame, given=stated(A=A, q=q, q_prime=q_prime, normalize=normalize))
+        near_frame = moser_frame(self.A, self.q, self.q_prime)
+        self._set(near_frame=near_frame, given=stated(A=A, q=q, q_prime=q_prime, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_prime"))
@@ -81,6 +82,11 @@ class NeumannSystem(TorusProblem):
     def title(self) -> str:
         """Return the system, its dimension and its energy."""
         return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+
+    @cached_property
+    def frame(self) -> Array:
+        """Return the frame at τ₁ = 0, (n, n), to the last bit."""
+        return read_only(refined(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent, Fraction(1)))
 
     @property
     def energy(self) -> float:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from operator import mul
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput
-from veselova.mechanics.exact import exact_vector, to_float
+from veselova.mechanics.exact import exact_vector, over_common_denominator, to_float
 
 __all__ = ["INPUT_TOLERANCE", "ExactState", "over_largest", "point_on_sphere", "unit"]
 
@@ -41,8 +42,10 @@ class ExactState:
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:
         """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
-        along = sum((a * b for a, b in zip(self.q, self.q_dot)), Fraction()) / sum((a * a for a in self.q), Fraction())
-        return tuple(b - along * a for a, b in zip(self.q, self.q_dot))
+        # In integers over common denominators, of which that of q cancels: one division for each entry.
+        (q, _), (q_dot, over) = over_common_denominator(self.q), over_common_denominator(self.q_dot)
+        qq, qv = sum(map(mul, q, q)), sum(map(mul, q, q_dot))
+        return tuple(Fraction(b * qq - qv * a, over * qq) for a, b in zip(q, q_dot, strict=True))
 
 
 def unit(vector: Array) -> Array:

@@ -46,7 +46,7 @@ class Veselova(TorusProblem):
     A: Array
     q: Array
     q_dot: Array
-    frame: Array
+    near_frame: Array
     axes: Array | None
     exact: ExactState
     given: Mapping[str, Any]
@@ -83,11 +83,11 @@ class Veselova(TorusProblem):
         A_float = to_float(diagonal)
         _require_representable_energy(A_float, position, velocity)
         if given_frame is None:
-            start_frame = refined(natural_frame(A_float, position, velocity), exact.A, exact.q, exact.tangent)
+            near_frame = natural_frame(A_float, position, velocity)
         else:
-            start_frame = admissible_frame(given_frame, position)
+            near_frame = admissible_frame(given_frame, position)
         given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
-        self._set(A=A_float, q=position, q_dot=velocity, frame=start_frame, axes=axes, exact=exact, given=given)
+        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, axes=axes, exact=exact, given=given)
 
     @classmethod
     def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
@@ -122,6 +122,13 @@ class Veselova(TorusProblem):
     def moves(self) -> bool:
         """Return whether the body moves at all (q̇ ≠ 0)."""
         return bool(np.any(self.q_dot))
+
+    @cached_property
+    def frame(self) -> Array:
+        """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the last bit."""
+        if not self.exact.natural:
+            return self.near_frame
+        return read_only(refined(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
 
     @cached_property
     def energy(self) -> float:
