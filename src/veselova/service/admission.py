@@ -62,7 +62,7 @@ def decoded(text: bytes) -> Any:
     them, and the validation that follows refuses every number that is not finite. Of two fields of one name neither is taken.
     """
     try:
-        return json.loads(text.decode("utf-8"), object_pairs_hook=_once, parse_int=_integer)
+        return _DECODER.decode(text.decode("utf-8"))
     except InvalidInput:
         raise
     except (ValueError, RecursionError) as error:
@@ -83,6 +83,9 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _integer(text: str) -> int | str:
     """Return an integer; one of more digits than Python reads stays a text, which its field then refuses."""
     return int(text) if len(text) < _LONGEST_INTEGER else text
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_once, parse_int=_integer)
 
 
 def admit(request: TorusRequest, settings: Settings) -> None:

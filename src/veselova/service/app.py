@@ -79,7 +79,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     )
     routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(limits, jobs))
     for part in routers:
-        app.include_router(part)
+        app.router.routes.extend(part.routes)
     add_documentation(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
         app.add_exception_handler(kind, partial(_answer_problem, metrics, [route for part in routers for route in part.routes]))

@@ -18,8 +18,8 @@ _LOG = logging.getLogger("veselova.service")
 #: which takes time in proportion to the entries. Servers that share it may exceed its size by as much each.
 _KEPT, _UNSEEN = 0.9, 0.1
 
-#: The end of the name of an entry on its way into the cache, and the nanoseconds after which it will not arrive any more.
-_PART, _ARRIVAL_NS = ".part", 600 * 10**9
+#: The end of the name of an entry, and of one on its way into the cache; the nanoseconds after which it will not arrive any more.
+_WHOLE, _PART, _ARRIVAL_NS = ".kept", ".part", 600 * 10**9
 
 
 class Cache:
@@ -52,7 +52,7 @@ class Cache:
         """Return where an entry is, or is to be, kept; None where nothing is kept."""
         if not self._size:
             return None
-        return Entry(str(self._path(name)), str(self._folder / f".{uuid.uuid4().hex}{_PART}"), self._size)
+        return Entry(f"{self._folder}/{name}{_WHOLE}", f"{self._folder}/.{uuid.uuid4().hex}{_PART}", self._size)
 
     def is_full(self, size: int) -> bool:
         """Count an entry of so many bytes, which was made; return whether room has to be made."""
@@ -77,7 +77,7 @@ class Cache:
             self._report(error)
 
     def _path(self, name: str) -> Path:
-        return self._folder / f"{name}.kept"
+        return self._folder / f"{name}{_WHOLE}"
 
     def _searched(self) -> int:
         """Remove entries until the others fit, and return how many bytes may be added before the next search.

@@ -41,10 +41,11 @@ def matches(if_none_match: str | None, tag: str, exists: bool) -> bool:
 
 def _canonical(value: Any) -> Any:
     """Return a JSON value with 3 and 3.0 written alike. A string is a number taken exactly, and stays what it is."""
-    if isinstance(value, dict):
-        return {key: _canonical(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
+    kind = type(value)
+    if kind is int:
+        return float(value) if abs(value) <= 2**53 else value
+    if kind is list or kind is tuple:
         return [_canonical(item) for item in value]
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
-        return float(value)
+    if kind is dict:
+        return {key: _canonical(item) for key, item in value.items()}
     return value

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import orjson
 from fastapi import APIRouter, Request
+from fastapi.routing import APIRoute
 from starlette.responses import Response
 
 from veselova.service.answers import Answers
@@ -49,7 +50,8 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
         answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
-        routes.add_api_route(path, answer, methods=["POST"], summary=summary, name=kind, tags=["motions"])
+        described: dict[str, Any] = {"summary": summary, "name": kind, "tags": ["motions"]}
+        routes.add_api_route(path, answer, methods=["POST"], route_class_override=_Direct, **described)
 
     async def kept(request: Request) -> Response:
         return await answers.named(request.path_params["name"], request)
@@ -72,6 +74,15 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
         return _json({"status": "ready"})
 
     return routes
+
+
+class _Direct(APIRoute):
+    """A route whose endpoint reads the request itself: the framework looks for no parameters, which takes as long as the rest."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the endpoint."""
+        endpoint: Callable[[Request], Coroutine[Any, Any, Response]] = self.endpoint
+        return endpoint
 
 
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:
