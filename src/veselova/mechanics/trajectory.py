@@ -118,7 +118,7 @@ class Trajectory:
             self.problem.integrals({name: values[rows] for name, values in self.arrays.items()})
             for rows in row_blocks(self.times.size, width)
         ]
-        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        return blocks[0] if len(blocks) == 1 else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
     @property
     def drift(self) -> dict[str, float]:
@@ -203,6 +203,6 @@ class Trajectory:
 
 def _drift(values: Array, vanishes: bool) -> float:
     """Return the largest change against the largest component at the first time; against 1 for what vanishes, or is at rest."""
-    scale = float(np.max(np.abs(values[:1]), initial=0.0))
-    change = float(np.max(np.abs(values - values[:1]), initial=0.0))
+    scale = float(np.abs(values[:1]).max(initial=0.0))
+    change = float(np.abs(values - values[:1]).max(initial=0.0))
     return change if vanishes or scale == 0 else change / scale

@@ -6,6 +6,7 @@ import ipaddress
 import math
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 
 from limits import RateLimitItem, parse
 from limits.aio.storage import MemoryStorage
@@ -84,6 +85,7 @@ def rate_of(text: str) -> Rate | None:
     return Rate(item)
 
 
+@lru_cache(_MOST_CALLERS)
 def network_of(host: str | None) -> str:
     """Return the network that an address is counted with: itself, or its /64 in IPv6."""
     try:
