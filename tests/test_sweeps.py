@@ -21,15 +21,17 @@ import pytest
 import sqlalchemy as sa
 import xarray
 import zarr
+from distributed import Nanny
 from pyarrow import parquet
 
 import veselova as vs
 from veselova.analytic.solution import Solution
 from veselova.mechanics.errors import InvalidRequest, Unsolved
+from veselova.service import dispatch
 from veselova.service import sweeps as running
 from veselova.service.cluster import open_cluster
 from veselova.service.dispatch import answers
-from veselova.service.jobs import Jobs
+from veselova.service.jobs import Job, Jobs
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.problem_details import Refused
 from veselova.service.results import Result
@@ -43,6 +45,9 @@ from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
 DRAWN = {"/A/0": [2, 3, 4], "/q_dot": {"normal": [0, 1]}}
+
+#: What makes every problem take longer than anybody waits.
+ENDLESS = {"times": {"start": 0, "stop": 1e6, "count": 2}, "engine": "numeric", "budget_s": 60}
 
 
 def request(**changes: Any) -> SweepRequest:
@@ -489,17 +494,7 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
 def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(tmp_path: Path) -> None:
     """One worker is at work for somebody else, and has cancelled work in its queue; then it is the cancelled work itself."""
     settings = local_settings(tmp_path, 1)
-    endless = {"times": {"start": 0, "stop": 1e6, "count": 2}, "engine": "numeric", "budget_s": 60}
-    job = Jobs(settings).submit(request(**endless))
-
-    async def cancelled_once(client: Any, stage: str) -> None:
-        """Ask for the first problems, and give up when the worker is so far with them."""
-        waiting = asyncio.create_task(answers(client, job, 0, 5, lambda: False))
-        while stage not in (await client.run(stages_of_chunks)).popitem()[1]:
-            assert not waiting.done()
-            await asyncio.sleep(0.01)
-        waiting.cancel()
-        await asyncio.gather(waiting, return_exceptions=True)
+    job = Jobs(settings).submit(request(**ENDLESS))
 
     async def run() -> None:
         async with open_cluster(settings) as client:
@@ -508,14 +503,47 @@ def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(t
             other = client.submit(wait_for_file, str(flag))
             while "wait_for_file" not in str(await client.processing()):
                 await asyncio.sleep(0.01)
-            await cancelled_once(client, "ready")
+            await cancelled_once(client, job, "ready")
             assert await client.run(os.getpid) == process
             flag.touch()
             assert await other == "undisturbed"
-            await cancelled_once(client, "executing")
+            await cancelled_once(client, job, "executing")
             assert set((await client.run(os.getpid)).values()) != set(process.values())
 
     asyncio.run(run())
+
+
+def test_a_worker_that_does_not_come_back_holds_up_no_cancellation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = local_settings(tmp_path, 1)
+    job = Jobs(settings).submit(request(**ENDLESS))
+    instantiate = Nanny.instantiate
+
+    async def run() -> None:
+        may_come_back = asyncio.Event()
+
+        async def late(nanny: Any) -> Any:
+            await may_come_back.wait()
+            return await instantiate(nanny)
+
+        async with open_cluster(settings) as client:
+            monkeypatch.setattr(Nanny, "instantiate", late)
+            monkeypatch.setattr(dispatch, "_PATIENCE_S", 1)
+            async with asyncio.timeout(60):
+                await cancelled_once(client, job, "executing")
+            may_come_back.set()
+            await client.wait_for_workers(1)
+
+    asyncio.run(run())
+
+
+async def cancelled_once(client: Any, job: Job, stage: str) -> None:
+    """Ask for the first problems, and give up when the one worker is so far with them."""
+    waiting = asyncio.create_task(answers(client, job, 0, 5, lambda: False))
+    while stage not in (await client.run(stages_of_chunks)).popitem()[1]:
+        assert not waiting.done()
+        await asyncio.sleep(0.01)
+    waiting.cancel()
+    await asyncio.gather(waiting, return_exceptions=True)
 
 
 def wait_for_file(path: str) -> str:

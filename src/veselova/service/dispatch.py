@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelled
+from contextlib import suppress
 from typing import Any
 
 from veselova.service.database import reason_of
@@ -17,7 +18,7 @@ __all__ = ["ChunkFailed", "answers"]
 #: Seconds between two looks at a worker that has not heard yet that work was cancelled.
 _LOOK_AGAIN_S = 0.02
 
-#: Seconds after which workers that held cancelled work are restarted, whatever they say of it.
+#: Seconds after which workers that held cancelled work are restarted, whatever they say of it, and then are waited for no more.
 _PATIENCE_S = 10
 
 
@@ -66,7 +67,9 @@ async def _stop(client: Any, future: Any) -> None:
     except TimeoutError:  # some worker does not say how far it is
         running = held
     if running:
-        await client.restart_workers(running, raise_for_error=False)
+        # Their successors are nobody's to wait for: Dask would do so for four times the time that a connection may take.
+        with suppress(KeyError):  # one of them has ended by itself
+            await client.restart_workers(running, timeout=_PATIENCE_S, raise_for_error=False)
 
 
 async def _at_work(client: Any, key: Any, workers: list[str]) -> list[str]:
