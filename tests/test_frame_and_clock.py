@@ -10,7 +10,7 @@ import pytest
 
 from draws import adversarial_start, random_problem
 from problems import near_separatrix, tagged
-from veselova import solve
+from veselova import Veselova, solve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
@@ -27,6 +27,16 @@ def test_the_closed_frame_is_orthonormal_everywhere_on_the_torus(n: int, rng: np
     at = solution.attitude(rng.uniform(-2, 2, (100, n - 1)), "angles")
     frame = np.concatenate([at.q[:, :, None], at.normals], axis=2)
     assert np.max(np.abs(np.swapaxes(frame, 1, 2) @ frame - np.eye(n))) < 1e-13
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_the_last_bits_of_a_natural_frame_change_no_number_of_a_motion(n: int, rng: np.random.Generator) -> None:
+    drawn, times = random_problem(rng, n), [0, 0.5, 7]
+    problem = Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True)
+    natural = solve(problem, times)  # before the last bits are asked for
+    given = solve(Veselova(drawn.A, drawn.q, drawn.q_dot, problem.frame, normalize=True), times)
+    assert np.max(np.abs(natural.frame[0] - problem.frame)) <= natural.error[0]
+    assert np.all(np.abs(natural.frame - given.frame) <= (natural.error + given.error)[:, None, None])
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
