@@ -24,10 +24,10 @@ _WINDOWS, _MOST_HALVINGS = 64, 16
 
 @dataclass(frozen=True)
 class _Part:
-    """Windows of one trial that are resolved: their places in it, and the pieces of all."""
+    """Windows of one trial that are resolved: their places in it, columns of their panels, and the pieces and tails of all."""
 
-    trial: Trial
     places: NDArray[np.intp]
+    panels: tuple[Array, ...]
     pieces: Pieces
     tails: Array
 
@@ -57,18 +57,14 @@ class Track:
         trial = self.trial(cells)
         pieces, tails = trial.in_pieces(self._count)
         settled = trial.settled(tails)
-        self._parts.append(_Part(trial, np.flatnonzero(settled), pieces, tails))
+        starts, rates = trial.starts[settled], trial.rates[settled]
+        panels = (starts, np.full(starts.size, trial.stretch), rates, trial.rate_tails[settled], rates[:, 0])
+        self._parts.append(_Part(np.flatnonzero(settled), panels, pieces, tails))
         return Cells(cells.length, cells.starts, tails)[~settled]
 
     def panels(self) -> Panels:
         """Return t(τ₁) on the windows."""
-        columns = []
-        for part in self._parts:
-            trial, chosen = part.trial, part.places
-            lengths = np.full(chosen.size, trial.stretch)
-            rates = trial.rates[chosen]
-            columns.append((trial.starts[chosen], lengths, rates, trial.rate_tails[chosen], rates[:, 0]))
-        return Panels.of(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
+        return Panels.of(*(np.concatenate(columns) for columns in zip(*(part.panels for part in self._parts), strict=True)))
 
     def fill(self, times: Array, panels: Panels) -> None:
         """Fill the answer at increasing times within the windows."""
@@ -84,5 +80,5 @@ class Track:
 
     def _windows(self) -> Iterator[tuple[_Part, int, float]]:
         for part in self._parts:
-            for w in part.places.tolist():
-                yield part, w, float(part.trial.starts[w])
+            for w, start in zip(part.places.tolist(), part.panels[0].tolist(), strict=True):
+                yield part, w, start
