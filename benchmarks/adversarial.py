@@ -2,8 +2,8 @@
 
     python benchmarks/adversarial.py [starts] [seed] [seconds for one truth]      default 1000, 1, 5
 
-Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-290, and exactly zero), equal A's, coordinate subspaces, A's
-over twelve orders of magnitude, speeds from 1e-140 to 1e140; one start in four to ten radians or twenty cycles of the fastest
+Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-300, and exactly zero), equal A's, coordinate subspaces, A's
+over twelve orders of magnitude, speeds from 1e-150 to 1e150; one start in four to ten radians or twenty cycles of the fastest
 phase, the others to three tenths of that. Truth has 20 digits, in balls, within so many seconds of processor time, or 34
 from Neumann's equations in binary128, within a few thousand steps, whichever is tried first (FIRST_INTEGRATED). Prints
 per class how many there were and how many could not be solved, the largest true error of the frame, the largest reported one,

@@ -36,7 +36,7 @@ def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
     name = str(rng.choice(CLASSES))
     A, q, v = (_fractions(rng, n, low) for low in (0.3, -1.0, -1.0))
     A = [a + Fraction(1, 5) for a in A]
-    power = Fraction(1, 10 ** int(rng.integers(1, 290)))
+    power = Fraction(1, 10 ** int(rng.integers(1, 301)))
     if name in ("equal A's", "equal and frozen"):
         values = A[: max(1, int(rng.integers(1, n)))]
         A = [values[int(k)] for k in rng.integers(0, len(values), n)]
@@ -57,8 +57,9 @@ def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
     if name == "wide A's":
         A = [Fraction(round(10 ** rng.uniform(0, 6), 3)) * Fraction(10) ** int(rng.integers(-3, 4)) for _ in range(n)]
     if name == "scaled":
-        scale, unit = (Fraction(10) ** int(rng.integers(-low, low)) for low in (141, 3))
-        v, A = [x * scale for x in v], [a * unit for a in A]
+        speed, unit = (int(rng.integers(-most, most + 1)) for most in (150, 2))
+        unit = unit if abs(speed) < 130 else 0  # energies have det A below them, and are to be floats
+        v, A = [x * Fraction(10) ** speed for x in v], [a * Fraction(10) ** unit for a in A]
     if name in ("separatrix", "near a separatrix") and n > 2:
         A, q = _umbilic(rng, n, q)
         q[0] = power if name == "near a separatrix" else Fraction()

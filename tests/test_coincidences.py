@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -141,3 +142,17 @@ def test_a_time_below_the_range_of_doubles_is_no_zero(problem: vs.Veselova) -> N
     assert one > Decimal("1e-401")
     assert abs(two / one - 2) < Decimal("1e-25")
     assert max(vs.solve(problem, ["-1e-400"], certified=True).decimals.error) < Decimal("1e-18")
+
+
+@pytest.mark.parametrize("exponent", [140, 146, 291, 300, 400])
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_of_nearly_equal_moments_no_direction_is_dropped(n: int, exponent: int) -> None:
+    """The cut between them closes with their difference, however much the body moves along either."""
+    A = [Fraction(2), 2 + Fraction(2, 10**exponent), 2 + Fraction(3, 10**exponent), Fraction(1), Fraction(3)][:n]
+    q, q_dot = (["0.3", "-0.5", "0.4", "0.6", "0.2"][:n], ["0.2", "0.1", "-0.7", "0.3", "0.5"][:n])
+    problem = vs.Veselova(A, q, q_dot, normalize=True)
+    times = np.array([-2.0, 0.5, 3.0])
+    found, truth = vs.solve(problem, times), true_motion(problem, times)[0]
+    assert np.all(np.max(np.abs(found.frame - truth), axis=(1, 2)) <= 2 * found.error)
+    assert np.max(found.error) < 1e-12
+    assert np.max(np.abs(vs.solve(problem, times, digits=30).frame - truth)) < 1e-15

@@ -62,14 +62,12 @@ class Moving:
         """Return m, the dimension of what moves: genus + 1."""
         return len(self.A)
 
-    def opened(self, distance: Fraction) -> Moving:
-        """Return the part with equal A's drawn apart by a relative ``distance``."""
+    def opened(self, distance: Fraction, closeness: Fraction) -> Moving:
+        """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by ``distance``."""
         A = list(self.A)
         for i in range(1, len(A)):
-            if A[i] == A[i - 1]:
-                A[i] *= 1 - distance
-                if i + 1 < len(A):  # and the next one stays below
-                    A[i] = max(A[i], (A[i - 1] + A[i + 1]) / 2)
+            if A[i] > A[i - 1] * (1 - closeness):  # or above it, where the one before has just moved
+                A[i] = A[i - 1] * (1 - distance)
         unit = A[-1]
         return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
 

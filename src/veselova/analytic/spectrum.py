@@ -95,7 +95,8 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
     """
     exponent = 2 * digits + 10 + beyond
     opening, coinciding = Fraction(1, 10**exponent), max(_COINCIDE, 2 * exponent + 20)
-    moving = moving.opened(opening)
+    # Between A's nearer than that, a cut that closes would not say that a direction hardly moves.
+    moving = moving.opened(opening, Fraction(1, 10 ** (coinciding // 2)))
     separatrices, hidden = set[int](), set[int]()
     while True:
         found = spectrum(moving, digits, coinciding)
