@@ -11,11 +11,12 @@ import pytest
 from draws import adversarial_start, random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova, solve
-from veselova.analytic.fourier_clock import FourierClock
+from veselova.analytic.fourier_clock import FourierClock, grown
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.solution import Solution
+from veselova.analytic.solve import solve as solve_analytic
 from veselova.mechanics.errors import InternalContradiction
 
 DIMENSIONS = range(2, 9)
@@ -179,3 +180,39 @@ def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
     error = np.max(np.abs(found.frame - finer.frame), axis=(1, 2))
     assert np.all(error <= 2 * found.error)
     assert np.max(found.error) < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("A", "q", "q_dot"),
+    [
+        (["250/513", "500/373", "50850250/375909129"], ["1/250942", "-451/1000", "114/125"], ["-461/1000", "36/125", "-189/200"]),
+        (
+            [14147.070577173487, 34.19169315663742, 29.082953358331732],
+            [-0.842449710659526, 0.10501640977494625, 0.5284411402300748],
+            [0.4135965941419627, 0.7546201635355326, 0.509397944734541],
+        ),
+    ],
+)
+def test_modes_that_are_met_again_are_not_taken_again(A: list[object], q: list[object], q_dot: list[object]) -> None:
+    """Next to the edge of the set a mode may be found large, or not, by the rounding of the nodes at hand."""
+    problem = Veselova(A, q, q_dot, normalize=True)
+    times = np.array([0.3, 1.0, 5.0]) / np.max(np.abs(Solution(problem).in_time.rates))
+    fourier, panels = (solve_analytic(problem, times, clock=clock) for clock in ("fourier", "panels"))
+    difference = np.max(np.abs(fourier.frame - panels.frame), axis=(1, 2))
+    assert np.all(difference <= fourier.error + panels.error)
+
+
+def test_no_mode_is_looked_at_twice() -> None:
+    """One that does not count is met again round a wall, in a batch in which it would."""
+    looked_at: list[tuple[int, ...]] = []
+    wall = {(2, 1), (2, -1), (2, 2), (2, -2)}
+
+    def coefficients(modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows = list(map(tuple, modes.tolist()))
+        large = [max(map(abs, m)) <= 6 and m not in wall and (m != (2, 0) or m in looked_at) for m in rows]
+        looked_at.extend(rows)
+        return np.ones(len(rows)), np.array(large)
+
+    modes, _ = grown(2, coefficients, most=2000)
+    assert len(set(looked_at)) == len(looked_at)
+    assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5

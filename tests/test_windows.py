@@ -10,7 +10,9 @@ import pytest
 from draws import random_problem
 from problems import TABLE, Case, tagged
 from veselova import NeumannSystem, solve
+from veselova.analytic import track
 from veselova.analytic.costs import Costs, expected_modes
+from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 
 #: The stated slack of every error estimate.
@@ -119,3 +121,21 @@ def test_windows_that_adjoin_tell_the_time_themselves(n: int, span: tuple[float,
         assert_one_motion(many, solve_analytic(problem, times[chosen], clock=clock), chosen)
     at_zero = np.argmin(np.abs(times))
     assert many.error[at_zero] <= 2 * solve_analytic(problem, times[[at_zero]], clock="panels").error[0]
+
+
+def test_windows_that_would_take_too_much_memory_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, times = random_problem(np.random.default_rng(6), 4), np.linspace(0, 30, 3000)
+    kept = solve_analytic(problem, times, clock="panels")
+    monkeypatch.setattr(track, "_MOST_KEPT", 10_000)
+    many = solve_analytic(problem, times, clock="panels")
+    assert many.provenance.details["clock_size"] != kept.provenance.details["clock_size"]
+    assert_one_motion(many, kept, np.arange(times.size))
+
+
+def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
+    problem = random_problem(np.random.default_rng(301), 3, 30.0)
+    cycle = 1 / np.max(np.abs(Solution(problem).in_time.rates))
+    near = np.linspace(-0.3 * cycle, 0, 40)
+    far, alone = (solve_analytic(problem, times, clock="panels") for times in (np.append(-7000 * cycle, near), near))
+    difference = np.max(np.abs(far.frame[1:] - alone.frame), axis=(1, 2))
+    assert np.all(difference <= SLACK * (far.error[1:] + alone.error))

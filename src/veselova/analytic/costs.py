@@ -44,7 +44,7 @@ _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
 _HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 
 #: Cycles from which panels are longer ones of more nodes: what finding them takes in such cycles, and what one costs then.
-_LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 30.0, 0.4
+_LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 48.0, 0.4
 
 #: An inversion on panels, and the cycles that these reach beyond the times.
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 1.0

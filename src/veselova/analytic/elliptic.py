@@ -101,7 +101,8 @@ class Jacobi:
     def _truncated(self, *sums: Any) -> tuple[Any, ...]:
         """Return sums over m ≤ M = _terms with what they leave out.
 
-        Omitted terms are at most 4 nome^(m²+m/2), all that y ≤ ¼|log nome| adds included, so together below nome^(M²−M).
+        Omitted terms are at most 4 nome^(m²+m/2), all that y ≤ ¼|log nome| adds included, and those over sine, cosine or 1 − D at
+        most (2m+1) times that, so together below nome^(M²−M).
         """
         xp = self.arithmetic
         if not xp.has_radii:
@@ -129,7 +130,8 @@ class Jacobi:
             z1, z2 = z1 + 2 * sign * odd * sum_, z2 + 2 * sign * odd * alternating
             z3, z4 = z3 + 2 * even * wave, z4 + 2 * sign * even * wave
             before, wave = wave, twice * wave - before
-        z1, z2, z3, z4 = self._truncated(z1 * sine, z2 * cosine, z3, z4)
+        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
+        z1, z2 = z1 * sine, z2 * cosine
         return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
 
     def _hyperbolic(self, psi: Values) -> tuple[Values, Values, Values]:
@@ -156,5 +158,6 @@ class Jacobi:
             z1, z2 = z1 + sign * growth * sum_, z2 + growth * (1 + power * D)
             even = wave * (1 + power)
             z3, z4 = z3 + even, z4 + sign * even
-        z1, z2, z3, z4 = self._truncated(z1 * rise, z2, z3, z4)
+        z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
+        z1 = z1 * rise
         return (t3 / t4) * z1 / z2, (t2 / t4) * z4 / z2, (t2 / t3) * z3 / z2

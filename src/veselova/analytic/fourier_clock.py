@@ -170,15 +170,17 @@ def grown(
     reaches far. Raises Unsolved where more than ``most`` have been looked at.
     """
     steps = np.concatenate([np.eye(genus, dtype=np.int64), -np.eye(genus, dtype=np.int64)])
-    before, layer, looked_at = np.empty((0, genus), dtype=np.int64), np.zeros((1, genus), dtype=np.int64), 1
-    kept_modes, kept_values = [], []
+    none, layer, looked_at = np.empty((0, genus), dtype=np.int64), np.zeros((1, genus), dtype=np.int64), 1
+    before, refused, kept_modes, kept_values = none, none, [], []
     while layer.size:
         values, large = coefficients(layer)
         kept_modes.append(layer[large])
         kept_values.append(values[large])
+        # Those that count have no neighbours that do but in their own layer, the one before and the next. Others may be met again
+        # much later, where rounding may take them for large: none is looked at twice.
+        refused = np.concatenate([refused, layer[~large]])
         neighbours = _half_space((layer[large][:, None, :] + steps).reshape(-1, genus))
-        # A mode that counts has no neighbours but in its own layer, the one before and the next.
-        before, layer = layer, _others(neighbours, np.concatenate([before, layer]))
+        before, layer = layer[large], _others(neighbours, np.concatenate([before, layer[large], refused]))
         looked_at += len(layer)
         if looked_at > most:
             raise Unsolved("too-far", f"the clock has more than {most} Fourier modes, and the time is too far for panels")

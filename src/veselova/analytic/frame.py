@@ -158,9 +158,8 @@ def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) ->
         whole_rows[:, layout.own_cut[k]] = whole_rows[:, layout.own_cut[k]] * own[:, k]
     near = xp.sqrt(np.where(layout.is_own, xp.number(1), to_own_kind))
     matrix = layout.sides * ((columns * own)[:, None, :] / near) * (whole_rows[:, :, None] / near)
-    for (
-        k
-    ) in layout.ends:  # the root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays
+    # The root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays.
+    for k in layout.ends:
         s, mate = layout.own_cut[k], layout.mate[k]
         entry = layout.sides[s, k] * columns[:, k] * rows[:, s]
         matrix[:, s, k] = entry if mate < 0 else entry * own[:, mate]

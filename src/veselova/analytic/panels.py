@@ -36,12 +36,12 @@ class Panels:
         order = np.argsort(lefts)
         left, lengths, sizes = lefts[order], lengths[order], sizes[order]
         borders = np.append(left, left[-1] + lengths[-1])
-        zero = np.searchsorted(borders, 0.0)
+        zero = int(np.searchsorted(borders, 0.0))
         integrals = _integrated(coefficients[order]) * (lengths / 2)[:, None]
         over_panels = np.sum(integrals, axis=1)  # at x = 1 every Chebyshev polynomial is one
         left_out = np.maximum(tails[order], PANEL_TAIL) * sizes * lengths
-        values, tails = (np.concatenate([[0.0], np.cumsum(summands)]) for summands in (over_panels, left_out))
-        return cls(borders, lengths, integrals, values - values[zero], tails - tails[zero], float(np.mean(sizes)))
+        values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
+        return cls(borders, lengths, integrals, values, tails_from_zero, float(np.mean(sizes)))
 
     @property
     def size(self) -> int:
@@ -60,6 +60,7 @@ class Panels:
             return 2 * np.abs(np.interp(tau1, self.borders, self.tails))
         # Of whole panels, which is faster, but next to zero.
         ends, zero = np.searchsorted(tau1, self.borders), int(np.searchsorted(self.borders, 0.0))
+        ends[-1] = tau1.size
         tails = 2 * np.maximum(np.abs(self.tails[1:]), np.abs(self.tails[:-1]))
         result = np.repeat(tails, np.diff(ends[1:-1], prepend=0, append=tau1.size))
         near = slice(ends[max(0, zero - 1)], ends[min(zero + 1, tails.size)])
@@ -82,6 +83,11 @@ class Panels:
         # At x = −1 the limit of sin(kα)/sin α is (−1)^{k+1} k.
         slopes = np.where((~inside & (x < 0))[:, None], -((-1.0) ** orders) * orders, slopes)
         return value, np.sum(table * orders * slopes, axis=1)
+
+
+def _summed(over_panels: Array, zero: int) -> Array:
+    """Return the sums at the borders, 0 at number ``zero``: outwards from it, so that far ones do not round near ones."""
+    return np.concatenate([-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])])
 
 
 def _integrated(coefficients: Array) -> Array:

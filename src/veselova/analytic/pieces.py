@@ -82,6 +82,9 @@ class Pieces:
         tails = np.max(np.abs(coefficients[:, -3:]).reshape(windows, -1), axis=1)
         return cls(borders, (_TO_POWERS @ coefficients).reshape(windows, count, ORDER, -1), tails)
 
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> Pieces:
+        return self if np.all(chosen) else Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
+
     def fill(self, window: int, since: Array, out: Array) -> None:
         """Fill ``out`` (N, C) with the series at increasing times since the start of a window."""
         borders, scale = self.borders[window], 2 / np.diff(self.borders[window])

@@ -11,55 +11,60 @@ from numpy.typing import NDArray
 from veselova.analytic.filling import Filling
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panels import Panels
-from veselova.analytic.pieces import Pieces
+from veselova.analytic.pieces import ORDER, Pieces
 from veselova.analytic.trial import Cells, Evaluation, Trial
 
 __all__ = ["Track"]
 
 Array = NDArray[np.float64]
 
-#: Windows evaluated at once, and halvings before giving up.
-_WINDOWS, _MOST_HALVINGS = 64, 16
+#: Windows evaluated at once, halvings before giving up, and numbers that are kept: 128 MB.
+_WINDOWS, _MOST_HALVINGS, _MOST_KEPT = 64, 16, 2**24
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Windows of one trial that are resolved: their places in it, columns of their panels, and the pieces and tails of all."""
+    """Windows of one trial that are resolved: columns of their panels, their pieces and tails."""
 
-    places: NDArray[np.intp]
     panels: tuple[Array, ...]
     pieces: Pieces
     tails: Array
 
 
 class Track:
-    """A motion on windows that adjoin, each resolved in ``count`` pieces or halved."""
+    """A motion on windows that adjoin, each resolved in so many pieces or halved."""
 
-    def __init__(self, filling: Filling, evaluation: Evaluation, in_tau1: LinearFlow, count: int) -> None:
-        self._filling, self._evaluation, self._in_tau1, self._count = filling, evaluation, in_tau1, count
+    def __init__(self, filling: Filling, evaluation: Evaluation, in_tau1: LinearFlow) -> None:
+        self._filling, self._evaluation, self._in_tau1 = filling, evaluation, in_tau1
         self._parts: list[_Part] = []
+        self._kept = self._columns = 0
 
     def trial(self, cells: Cells) -> Trial:
         """Return windows of Neumann time."""
         z, rates = self._in_tau1.phases(cells.starts), self._in_tau1.rates
-        return self._filling.noted(Trial.of(self._evaluation, cells.starts, z, cells.length, rates, cells.tails))
+        trial = self._filling.noted(Trial.of(self._evaluation, cells.starts, z, cells.length, rates, cells.tails))
+        self._columns = 1 + trial.series.shape[2]
+        return trial
 
-    def extend(self, cells: Cells) -> bool:
-        """Add windows; return whether all could be resolved."""
+    def extend(self, cells: Cells, count: int) -> bool:
+        """Add windows; return whether all could be resolved in so many pieces, and kept."""
         for _ in range(_MOST_HALVINGS):
-            cells = Cells.joined([self._unresolved(cells[k : k + _WINDOWS]) for k in range(0, len(cells), _WINDOWS)])
+            if self._kept + len(cells) * count * ORDER * self._columns > _MOST_KEPT:
+                return False
+            cells = Cells.joined([self._unresolved(cells[k : k + _WINDOWS], count) for k in range(0, len(cells), _WINDOWS)])
             if not len(cells):
                 return True
             cells = cells.halved()
         return False
 
-    def _unresolved(self, cells: Cells) -> Cells:
+    def _unresolved(self, cells: Cells, count: int) -> Cells:
         trial = self.trial(cells)
-        pieces, tails = trial.in_pieces(self._count)
+        pieces, tails = trial.in_pieces(count)
         settled = trial.settled(tails)
         starts, rates = trial.starts[settled], trial.rates[settled]
         panels = (starts, np.full(starts.size, trial.stretch), rates, trial.rate_tails[settled], rates[:, 0])
-        self._parts.append(_Part(np.flatnonzero(settled), panels, pieces, tails))
+        self._parts.append(_Part(panels, pieces[settled], tails[settled]))
+        self._kept += starts.size * count * ORDER * self._columns
         return Cells(cells.length, cells.starts, tails)[~settled]
 
     def panels(self) -> Panels:
@@ -80,5 +85,5 @@ class Track:
 
     def _windows(self) -> Iterator[tuple[_Part, int, float]]:
         for part in self._parts:
-            for w, start in zip(part.places.tolist(), part.panels[0].tolist(), strict=True):
+            for w, start in enumerate(part.panels[0].tolist()):
                 yield part, w, start

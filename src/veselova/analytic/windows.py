@@ -1,11 +1,12 @@
 """A motion at many times from few: Chebyshev windows of time along its orbit.
 
-Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t − u and the phases there are
-exact however far out, and no window hands its error to the next. A window takes one sum of the clock, at its start, and one
-evaluation of the motion at each of its nodes; on its pieces the series become polynomials in t (analytic.pieces). All times
-in it are sums of these, whatever the genus and the route.
+Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t − u and the phases there come
+from the clock, exact however far out, and no window hands its error to the next. A window takes one sum of the clock, at its
+start, and one evaluation of the motion at each of its nodes; on its pieces the series become polynomials in t (analytic.pieces).
+All times in it are sums of these, whatever the genus and the route.
 
-A clock by panels is asked nothing where windows adjoin from t = 0 on: they have dt/dτ₁ themselves (analytic.track).
+A clock by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time then, and t is the running sum of
+their dt/dτ₁ (analytic.track), as it is of panels.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from numpy.typing import NDArray
 from veselova.analytic.clock import Clock
 from veselova.analytic.filling import Along, Filling
 from veselova.analytic.panel_clock import PanelClock
-from veselova.analytic.pieces import ORDER
 from veselova.analytic.track import Track
 from veselova.analytic.trial import Cells, Evaluation, Trial
 
@@ -45,9 +45,8 @@ _FARTHEST = 2.0**32
 #: Windows tried before all of the same length, and made at once.
 _FIRST_WINDOWS, _WINDOWS = 8, 64
 
-#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them, and how many
-#: numbers are kept for that: 128 MB.
-_COVERED, _MOST_KEPT = 0.7, 2**24
+#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them.
+_COVERED = 0.7
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ class Windows:
     def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         filling = Filling(self._times, self._fewest, clock, rates, evaluation)
-        if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, rates, evaluation)):
+        if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
             cells, count = self._resolving(filling, clock)
             for _ in range(_MOST_LENGTHS):
                 parts = [filling.by_windows(cells[k : k + _WINDOWS], count) for k in range(0, len(cells), _WINDOWS)]
@@ -127,28 +126,20 @@ class Windows:
 
         return _resolving(over, filling.trial, self._length)
 
-    def _tracked(self, filling: Filling, clock: PanelClock, rates: Array, evaluation: Evaluation) -> bool:
+    def _tracked(self, filling: Filling, clock: PanelClock, evaluation: Evaluation) -> bool:
         """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether that could be done."""
         ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
-        whole, columns = float(np.ptp(ends)) / self._length, (rates.size + 1) * (rates.size + 2) + 1
-
-        def too_many(windows: float, pieces: int) -> bool:
-            return windows * pieces * ORDER * columns > _MOST_KEPT
-
-        if self._stretches.windows < _COVERED * whole or too_many(whole, _PIECES[0]):
+        if self._stretches.windows < _COVERED * float(np.ptp(ends)) / self._length:
             return False
         low, high = ends / clock.mean
 
         def over(length: float, tail: float) -> Cells:
             return Cells.untried(length, math.floor(low / length), math.ceil(high / length), tail)
 
-        probe = Track(filling, evaluation, clock.in_tau1, _PIECES[-1])
-        cells, count = _resolving(over, probe.trial, _few_bits(self._length / clock.mean))
-        if too_many(len(cells), count):
-            return False
-        track = Track(filling, evaluation, clock.in_tau1, count)
+        track = Track(filling, evaluation, clock.in_tau1)
+        cells, count = _resolving(over, track.trial, _few_bits(self._length / clock.mean))
         while len(cells):
-            if not track.extend(cells):
+            if not track.extend(cells, count):
                 return False
             panels = track.panels()
             length, (first, last) = cells.length, np.rint(panels.borders[[0, -1]] / cells.length).astype(int).tolist()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import TypeVar
 
 import anyio
@@ -33,6 +34,7 @@ async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) ->
 
 
 async def _cancel_when_gone(request: Request, scope: anyio.CancelScope) -> None:
-    while (await request.receive())["type"] != "http.disconnect":
-        pass
+    with suppress(Exception):  # a connection that cannot be read is gone as well
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
     scope.cancel()
