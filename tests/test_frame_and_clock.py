@@ -17,7 +17,7 @@ from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.errors import InternalContradiction, Unsolved
 
 DIMENSIONS = range(2, 9)
 
@@ -216,3 +216,19 @@ def test_no_mode_is_looked_at_twice() -> None:
     modes, _ = grown(2, coefficients, most=2000)
     assert len(set(looked_at)) == len(looked_at)
     assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5
+
+
+def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:
+    """Over twenty-five orders of A the least dt/dτ₁ is below the rounding of the mean, and sums over modes need not increase."""
+    problem = Veselova([1e25, 30.0, 2.0, 1.0], [0.3, 0.5, 0.4, 0.7], [0.2, -0.4, 0.6, 0.1], normalize=True)
+    with pytest.raises(Unsolved, match="beyond-floats: dt/dτ₁ may vary by"):
+        solve_analytic(problem, [0.1], clock="fourier")
+    found = solve(problem, [0.1, 1.0])
+    assert found.provenance.details["clock"] == "panels"
+    assert np.max(found.error) < 1e-9
+
+
+def test_a_clock_of_many_digits_that_would_take_too_long_is_refused_before_it_is_begun() -> None:
+    problem = Veselova([2.97e58, 1.76e-22], [-0.15, -0.99], [-0.042, 0.0064], normalize=True)
+    with pytest.raises(Unsolved, match="too-far: a clock of 34 digits would take"):
+        solve(problem, [2.0], digits=25)

@@ -90,6 +90,7 @@ class EnclosedClock:
         fastest = max(abs(float(f)) for f in self._orbit.frequencies)
         # Near a separatrix dt/dτ₁ varies much faster than any phase.
         count = math.ceil(reach / (2 * min(_PANEL_IN_CYCLES / fastest, _LONGEST_IN_STRIPS * self._orbit.strip[0])))
+        self._require_few(count)
         nodes = self._expected_nodes(reach, direction, count)
         while True:
             panels = self._evaluated(reach, direction, count, nodes)
@@ -112,9 +113,13 @@ class EnclosedClock:
         values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), SAMPLE)
         return expected_terms(values / values[:, :1], self._xp.digits)
 
+    def _require_few(self, nodes: int) -> None:
+        if nodes > _MOST_NODES:
+            wanted = f"a clock of {self._xp.digits} digits would take {nodes:.3g} evaluations or more at that time"
+            raise Unsolved("too-far", wanted)
+
     def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
-        if count * nodes > _MOST_NODES:
-            raise Unsolved("too-far", f"a clock of {self._xp.digits} digits would take {count * nodes} evaluations at that time")
+        self._require_few(count * nodes)
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])

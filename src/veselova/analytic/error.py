@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,7 +69,7 @@ def _slowness(solution: Solution, tau1: Array) -> Array | None:
 
     An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the mean.
     """
-    if solution.moving.A[0] < {"t": _WIDE**2, "s": _WIDE, "tau1": math.inf}[solution.moving.time]:
+    if solution.moving.rate_variation < _WIDE:
         return None
     rows = slice(None) if tau1.size <= _MANY else np.linspace(0, tau1.size - 1, _MANY).astype(int)
     rates = solution.rate_at(solution.in_tau1.phases(tau1[rows]))

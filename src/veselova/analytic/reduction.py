@@ -9,6 +9,7 @@ for has none, and its motion is the same to all of them (on a separatrix, for as
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -61,6 +62,12 @@ class Moving:
     def size(self) -> int:
         """Return m, the dimension of what moves: genus + 1."""
         return len(self.A)
+
+    @property
+    def rate_variation(self) -> float:
+        """Return by how much dt/dτ₁ may vary at most: it goes like the root of (q,Aq) for t, and like 1/(q,Aq) for s."""
+        power = {"t": 0.5, "s": 1.0, "tau1": 0.0}[self.time]
+        return math.exp(power * (math.log(self.A[0].numerator) - math.log(self.A[0].denominator)))
 
     def opened(self, distance: Fraction, closeness: Fraction) -> Moving:
         """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by ``distance``."""

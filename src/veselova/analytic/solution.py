@@ -48,22 +48,21 @@ _LARGE_PERIOD = 8.0
 #: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
 _LARGE_CANCELLATION = 10.0
 
-#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still give 1e-12.
-_NARROW_GAP_HIGH_GENUS = 1e-12
-
-#: Largest genus at which theta sums are taken there all the same.
-_SEPARATRIX_GENUS = 7
+#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still give 1e-12;
+#: and the largest genus at which theta sums are taken there.
+_NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
 
 #: Cycles from which guarded frequencies leave no digit of the phases.
 _MOST_CYCLES = 1e28
+
+#: By how much dt/dτ₁ may vary for a Fourier clock.
+_WIDEST_RATE = 1e10
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
 #: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
-_SAMPLES = 48
-_FEW = 16
-_FEW_SAMPLES = 4
+_SAMPLES, _FEW, _FEW_SAMPLES = 48, 16, 4
 
 
 class Solution:
@@ -151,22 +150,25 @@ class Solution:
         """
         cycles, guarded = self.cycles(times), self.is_guarded(times)
         if not cycles <= _MOST_CYCLES:
-            known = f"frequencies are known to {GUARD_DIGITS} digits"
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; {known}")
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {GUARD_DIGITS} digits")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
-        if name is None and self.near_separatrix:
+        if name is None and (self.near_separatrix or self.moving.rate_variation > _WIDEST_RATE):
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
         if (name or self.costs(times).cheaper_clock(self.windows(times, "fourier").inversions)) == "fourier":
             return self._fourier(guarded)
         if cycles > PANEL_CYCLES:
-            limit = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {limit}")
+            reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {reached}")
         earliest, latest = self.windows(times, "panels").span
         in_tau1, rate = self._guarded[0] if guarded else self.in_tau1, partial(self.rate_at, method=method)
         return PanelClock(rate, self.mean_rate, in_tau1, earliest, latest)
 
     def _fourier(self, guarded: bool) -> FourierClock:
+        if (variation := self.moving.rate_variation) > _WIDEST_RATE:
+            raise Unsolved(
+                "beyond-floats", f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 of its mean"
+            )
         if guarded not in self._fourier_clocks:
             flows = self._guarded if guarded else (self.in_tau1, self.in_time, self.mean_rate)
             self._fourier_clocks[guarded] = FourierClock(self.rate, *flows)
