@@ -157,9 +157,9 @@ class EnclosedSolution:
 
     def _evaluated(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
         approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(self._coarse.moving.unit / self.moving.unit)
-        # A time below the range of doubles is no zero.
+        # Zero is exactly that, and a time below the range of doubles, or below the rounding of a clock in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
-        approximate = np.where(approximate == 0, signs * np.finfo(float).tiny, approximate)
+        approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
         clock = self._clock(approximate)
         tau1 = clock.tau1(times, approximate)
         z = self.orbit.phases(tau1)
