@@ -156,3 +156,12 @@ def test_of_nearly_equal_moments_no_direction_is_dropped(n: int, exponent: int) 
     assert np.all(np.max(np.abs(found.frame - truth), axis=(1, 2)) <= 2 * found.error)
     assert np.max(found.error) < 1e-12
     assert np.max(np.abs(vs.solve(problem, times, digits=30).frame - truth)) < 1e-15
+
+
+def test_next_to_a_separatrix_the_rounding_of_the_periods_is_in_the_error() -> None:
+    """With A's within a percent the periods cancel, and the least eigenvalue of T is 1/300."""
+    A, q_dot = ["1000/1979", "500/983", "135424000/269310453"], ["-17/500", "-31/125", "94/125"]
+    problem = vs.Veselova(A, [Fraction(1, 10**204), "46/125", "317/1000"], q_dot, normalize=True)
+    times = np.array([-3.0, 0.0, 0.1, 2.0])
+    found, truth = vs.solve(problem, times), vs.solve(problem, times, digits=20)
+    assert np.all(np.max(np.abs(found.frame - truth.frame), axis=(1, 2)) <= found.error)

@@ -49,6 +49,7 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
     start = solution.start_rounding if method == "theta" else 0.0
     at_once = float(np.sum((_PHASE * _EPSILON + start) * steepness.by_phase))
+    at_once += solution.quotients.rounding if method == "theta" else 0.0
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
     evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
     error = clock.error(tau1)  # in place from here on: fresh memory costs more than sums

@@ -8,6 +8,7 @@ exact: for each function the half period at which it is largest against its deno
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.frame import Attitude, Frame, slopes
+from veselova.analytic.precision import DOUBLE
 from veselova.analytic.theta import Theta
 from veselova.mechanics.errors import Unsolved
 
@@ -83,6 +85,18 @@ class ThetaQuotients:
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
+
+    @cached_property
+    def rounding(self) -> float:
+        """Return what the rounding of T makes of the quotients, in double precision.
+
+        T is off by ε of its size for each unit by which its periods cancel. On a Gaussian e^{−πd²/μ}, μ the least eigenvalue,
+        that is at most 1/e = max x e^{−x} of its part in μ, which is small near a separatrix.
+        """
+        periods = self.frame.periods
+        T = np.asarray(periods.riemann_matrix, dtype=np.float64)
+        off = DOUBLE.epsilon * max(1.0, float(np.max(periods.cancellation))) * float(np.max(np.abs(T)))
+        return off / (math.e * float(np.linalg.eigvalsh(T)[0]))
 
     def position(self, z: Array) -> Array:
         """Return q along sorted axes at points z of shape (N, g), modulo 2."""
