@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panels import PANEL_TAIL, Panels
+from veselova.analytic.panels import Panels, are_settled
 from veselova.analytic.precision import DOUBLE
 from veselova.mechanics.errors import InternalContradiction
 
@@ -28,10 +28,8 @@ _MARGIN = 2
 #: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and how many are looked at.
 _MANY_PANELS, _LONGER, _PROBED = 200, (7, 6, 5, 4, 3.5, 3, 2.5), 8
 
-#: Last coefficients below this part of the first that have not fallen to a quarter in the last halving: then they are rounding
-#: of the phases.
+#: Last coefficients below this part of the first may be rounding of the phases.
 _NOISE_TAIL = 1e-11
-_STALLED = 0.25
 
 #: Halvings of a panel before giving up; near a separatrix integrands vary over a few hundredths of a cycle.
 _MOST_HALVINGS = 30
@@ -55,7 +53,7 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = panels.series(lefts, length)
-        settled = (tails <= PANEL_TAIL) | ((tails <= _NOISE_TAIL) & (tails > _STALLED * before))
+        settled = are_settled(tails, before, _NOISE_TAIL)
         lengths = np.full(lefts.size, length)
         done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
         if np.all(settled):
@@ -109,6 +107,6 @@ class _Panels:
             panels = replace(self, nodes=_NODES, length=factor * self.length)
             lefts = panels.lefts(low, high)
             probed = lefts[np.linspace(0, lefts.size - 1, _PROBED).astype(int)]
-            if np.max(panels.series(probed, panels.length)[2]) <= PANEL_TAIL:
+            if np.all(are_settled(panels.series(probed, panels.length)[2], np.inf, _NOISE_TAIL)):
                 return panels
         return self

@@ -12,14 +12,14 @@ from veselova.analytic.filling import Filling
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panels import Panels
 from veselova.analytic.pieces import ORDER, Pieces
-from veselova.analytic.trial import Cells, Evaluation, Trial
+from veselova.analytic.trial import MOST_HALVINGS, Cells, Evaluation, Trial
 
 __all__ = ["Track"]
 
 Array = NDArray[np.float64]
 
-#: Windows evaluated at once, halvings before giving up, and numbers that are kept: 128 MB.
-_WINDOWS, _MOST_HALVINGS, _MOST_KEPT = 64, 16, 2**24
+#: Numbers that are kept: 128 MB.
+_MOST_KEPT = 2**24
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class Track:
 
     def extend(self, cells: Cells, count: int) -> bool:
         """Add windows; return whether all could be resolved in so many pieces, and kept."""
-        for _ in range(_MOST_HALVINGS):
+        for _ in range(MOST_HALVINGS):
             if self._kept + len(cells) * count * ORDER * self._columns > _MOST_KEPT:
                 return False
-            cells = Cells.joined([self._unresolved(cells[k : k + _WINDOWS], count) for k in range(0, len(cells), _WINDOWS)])
+            cells = cells.left_by(lambda some: self._unresolved(some, count))
             if not len(cells):
                 return True
             cells = cells.halved()

@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.panels import are_settled
 from veselova.analytic.pieces import Pieces
 from veselova.analytic.precision import DOUBLE
 
-__all__ = ["NODES", "SUM_ROUNDING", "Cells", "Evaluation", "Trial"]
+__all__ = ["MOST_HALVINGS", "NODES", "SUM_ROUNDING", "Cells", "Evaluation", "Trial"]
 
 Array = NDArray[np.float64]
 
@@ -22,9 +23,11 @@ Evaluation = Callable[[Array], tuple[Array, tuple[Array, ...]]]
 #: Chebyshev points of a window.
 NODES = 48
 
-#: A window is resolved when its last coefficients fall below this part of the series' size; or below the second without having
-#: fallen to the third of what they were in longer ones: then they are rounding of the evaluation.
-_TAIL, _NOISE_TAIL, _STALLED = 4e-15, 1e-12, 0.25
+#: Windows evaluated at once, and how often those that are not resolved are halved.
+_AT_ONCE, MOST_HALVINGS = 64, 16
+
+#: Last coefficients of a window below this may be rounding of the evaluation.
+_NOISE_TAIL = 1e-12
 
 #: What a sum of polynomials rounds to.
 SUM_ROUNDING = 4 * float(np.finfo(float).eps)
@@ -56,6 +59,10 @@ class Cells:
     def joined(cls, parts: Sequence[Cells]) -> Cells:
         """Return all windows of the parts."""
         return cls(parts[0].length, *(np.concatenate([getattr(part, name) for part in parts]) for name in ("starts", "tails")))
+
+    def left_by(self, attempt: Callable[[Cells], Cells]) -> Cells:
+        """Return the windows that attempts at a few at once leave."""
+        return Cells.joined([attempt(self[first : first + _AT_ONCE]) for first in range(0, len(self), _AT_ONCE)])
 
     def halved(self) -> Cells:
         """Return the halves, in their order."""
@@ -102,7 +109,7 @@ class Trial:
 
     def settled(self, tails: Array) -> NDArray[np.bool_]:
         """Return which windows are resolved, by the tails of anything that was made of them."""
-        return (tails <= _TAIL) | ((tails <= _NOISE_TAIL) & (tails > _STALLED * self.before))
+        return are_settled(tails, self.before, _NOISE_TAIL)
 
     def in_pieces(self, count: int) -> tuple[Pieces, Array]:
         """Return the pieces in time, of τ₁ and the series as they are, and their tails or those of the windows, whichever are

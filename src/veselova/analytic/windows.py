@@ -23,7 +23,7 @@ from veselova.analytic.clock import Clock
 from veselova.analytic.filling import Along, Filling
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.track import Track
-from veselova.analytic.trial import Cells, Evaluation, Trial
+from veselova.analytic.trial import MOST_HALVINGS, Cells, Evaluation, Trial
 
 __all__ = ["Windows"]
 
@@ -42,8 +42,8 @@ _PIECES = (8, 16, 32)
 #: Lengths of a window from t = 0 at which times have too few bits left to lie densely in one.
 _FARTHEST = 2.0**32
 
-#: Windows tried before all of the same length, and made at once.
-_FIRST_WINDOWS, _WINDOWS = 8, 64
+#: Windows tried before all of the same length.
+_FIRST_WINDOWS = 8
 
 #: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them.
 _COVERED = 0.7
@@ -106,15 +106,14 @@ class Windows:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         filling = Filling(self._times, self._fewest, clock, rates, evaluation)
         if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
-            cells, count = self._resolving(filling, clock)
-            for _ in range(_MOST_LENGTHS):
-                parts = [filling.by_windows(cells[k : k + _WINDOWS], count) for k in range(0, len(cells), _WINDOWS)]
-                cells = Cells.joined(parts).halved()
+            cells, count = self._over_stretches(filling, clock)
+            for _ in range(MOST_HALVINGS):
+                cells = cells.left_by(lambda some: filling.by_windows(some, count)).halved()
                 if not len(cells):
                     break
         return filling.completed()
 
-    def _resolving(self, filling: Filling, clock: Clock) -> tuple[Cells, int]:
+    def _over_stretches(self, filling: Filling, clock: Clock) -> tuple[Cells, int]:
         """Return windows of a length at which most are resolved, and in how many pieces."""
         dense = self._times[np.stack([self._stretches.first, self._stretches.last])]
         ends = clock.tau1(dense.ravel())[0].reshape(dense.shape) * clock.mean
