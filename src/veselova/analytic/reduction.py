@@ -63,7 +63,7 @@ class Moving:
         """Return m, the dimension of what moves: genus + 1."""
         return len(self.A)
 
-    @property
+    @cached_property
     def rate_variation(self) -> float:
         """Return by how much dt/dτ₁ may vary at most: it goes like the root of (q,Aq) for t, and like 1/(q,Aq) for s."""
         power = {"t": 0.5, "s": 1.0, "tau1": 0.0}[self.time]

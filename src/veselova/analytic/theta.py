@@ -163,10 +163,11 @@ class Theta:
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
-        if characteristics not in self._grouped:
+        groups = self._grouped.get(characteristics)
+        if groups is None:
             families = self._coordinates.families(characteristics)
-            self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families.items()]
-        return self._grouped[characteristics]
+            groups = self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families.items()]
+        return groups
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
