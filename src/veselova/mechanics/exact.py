@@ -57,6 +57,8 @@ def exact_number(value: Any, path: Path) -> Fraction:
     Raises InvalidInput for booleans, NaN, infinities, anything that is not a number, and numbers beyond float range.
     """
     try:
+        if type(value) is float:
+            return Fraction(value)
         number = _parse(value)
         float(number)
     except (ValueError, OverflowError, ZeroDivisionError, InvalidOperation, TypeError):
@@ -65,6 +67,8 @@ def exact_number(value: Any, path: Path) -> Fraction:
 
 
 def _parse(value: Any) -> Fraction:
+    if type(value) is int:
+        return Fraction(value)
     if isinstance(value, (bool, np.bool_)):
         raise TypeError("a boolean is not a number")
     if isinstance(value, str):
@@ -145,13 +149,17 @@ def stated(**arguments: Any) -> dict[str, Any]:
 
 def plain(value: Any) -> Any:
     """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding: ratios become strings."""
+    if type(value) in (float, bool, str) or (type(value) is int and abs(value) < 2**63):
+        return value
+    if type(value) is list:
+        return [plain(item) for item in value]
     if isinstance(value, Mapping):
         return {name: plain(item) for name, item in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [plain(item) for item in value]
-    if isinstance(value, (Fraction, Decimal)) or (type(value) is int and abs(value) >= 2**63):
+    if isinstance(value, (Fraction, Decimal)) or type(value) is int:
         return str(value)
     return value.item() if isinstance(value, np.generic) else value
 
@@ -174,7 +182,7 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
         array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
     else:
         array = np.array([float(x) for x in values])  # type: ignore[arg-type]
-    if not all(math.isfinite(x) for x in array.flat):
+    if not np.isfinite(array).all():
         raise OverflowError("a validated number left the float range")
     return read_only(array)
 

@@ -38,7 +38,7 @@ _COINCIDENT = 1e-12
 
 def unit_scale(A: Array) -> tuple[Array, int]:
     """Return A/2^k with determinant near one, and k: det A itself leaves the float range for large n."""
-    k = int(np.rint(np.mean(np.log2(A))))
+    k = round(float(np.log2(A).sum()) / A.size)
     return np.ldexp(A, -k), k
 
 
@@ -48,16 +48,16 @@ def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     With it, (Aq̇,q̇)(Aq,q) − (Aq,q̇)² is a product of two sums of positive terms: nothing cancels.
     """
     Aq = A * q
-    ratio = np.sum(Aq * q_dot, axis=-1) / np.sum(Aq * q, axis=-1)
+    ratio = (Aq * q_dot).sum(axis=-1) / (Aq * q).sum(axis=-1)
     sliding: Array = q_dot - ratio[..., None] * q
     return sliding
 
 
 def norm(vectors: Array) -> Array:
     """Return the lengths of vectors whose squares may leave the float range."""
-    largest = np.max(np.abs(vectors), axis=-1, keepdims=True)
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
     unit = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
-    return np.asarray(largest[..., 0] * np.sqrt(np.sum(unit * unit, axis=-1)), dtype=np.float64)
+    return np.asarray(largest[..., 0] * np.sqrt((unit * unit).sum(axis=-1)), dtype=np.float64)
 
 
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
@@ -104,11 +104,12 @@ def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
     Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
     """
     inverse = 1 / A
-    P = q[..., :, None] * q_prime[..., None, :] - q[..., None, :] * q_prime[..., :, None]
+    product = q[..., :, None] * q_prime[..., None, :]
+    P = product - product.swapaxes(-1, -2)
     gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])  # I_i − I_j without cancellation
     same = np.abs(gap) <= _COINCIDENT * np.maximum(inverse[:, None], inverse[None, :])
-    F = q * q + np.sum(np.divide(P * P, gap, out=np.zeros_like(P), where=~same), axis=-1)
-    share = same / np.sum(same, axis=1, keepdims=True)
+    F = q * q + (np.where(same, 0.0, P * P) / np.where(same, 1.0, gap)).sum(axis=-1)
+    share = same / same.sum(axis=1, keepdims=True)
     return np.asarray(F @ share.T, dtype=np.float64)
 
 
@@ -141,7 +142,7 @@ def tangent_basis(q: Array) -> Array:
     n = q.shape[-1]
     u = np.array(q, dtype=np.float64)
     u[..., -1] += np.where(u[..., -1] >= 0, 1.0, -1.0)  # the sign that adds: no cancellation
-    norm = np.sum(u * u, axis=-1)[..., None, None]
+    norm = (u * u).sum(axis=-1)[..., None, None]
     return np.asarray(np.eye(n)[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm, dtype=np.float64)
 
 
@@ -161,7 +162,7 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
     """
     basis = tangent_basis(q)
     form = np.diag(1 / A) - q_prime[..., :, None] * q_prime[..., None, :]
-    return np.asarray(np.linalg.eigvalsh(np.swapaxes(basis, -1, -2) @ form @ basis), dtype=np.float64)
+    return np.asarray(np.linalg.eigvalsh(basis.swapaxes(-1, -2) @ form @ basis), dtype=np.float64)
 
 
 class StateIntegrals:
@@ -189,19 +190,19 @@ class StateIntegrals:
 
     @cached_property
     def _qAq(self) -> Array:
-        return np.asarray(np.sum(self._A * self._q * self._q, axis=-1), dtype=np.float64)
+        return np.asarray((self._A * self._q * self._q).sum(axis=-1), dtype=np.float64)
 
     @property
     def energy(self) -> Array:
         """Return h, shape (...)."""
         with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
-            h = self._rate * self._rate * (self._qAq / (2 * np.prod(self._A)))
+            h = self._rate * self._rate * (self._qAq / (2 * self._A.prod()))
             return np.asarray(np.ldexp(h, self._unit), dtype=np.float64)
 
     @property
     def momentum(self) -> Array:
         """Return p, shape (..., n)."""
-        p = self._A * self._sliding * self._qAq[..., None] / np.prod(self._A)
+        p = self._A * self._sliding * self._qAq[..., None] / self._A.prod()
         return np.asarray(np.ldexp(p, self._unit), dtype=np.float64)
 
     @property

@@ -50,7 +50,7 @@ def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
     restricted = basis.T @ (np.diag(1 / A) - np.outer(v, v)) @ basis
     vectors = basis @ np.linalg.eigh(restricted)[1]  # columns γ, n_2, …, n_{n−1}: c_1 = 0 is the smallest
     vectors = vectors * np.where(v @ vectors < 0, -1.0, 1.0)
-    frame = np.column_stack([q, vectors[:, 1:], vectors[:, :1]])
+    frame = np.concatenate([q[:, None], vectors[:, 1:], vectors[:, :1]], axis=1)
     if np.linalg.det(frame) < 0:
         frame[:, 1] = -frame[:, 1]
     return orthonormalized(frame)
@@ -61,7 +61,7 @@ def orthonormalized(frame: Array) -> Array:
 
     One Newton–Schulz step E(3 − EᵀE)/2 squares the defect: 1e-9 becomes 1e-18.
     """
-    gram = np.swapaxes(frame, -1, -2) @ frame
+    gram = frame.swapaxes(-1, -2) @ frame
     return np.asarray(0.5 * (3.0 * frame - frame @ gram), dtype=np.float64)
 
 

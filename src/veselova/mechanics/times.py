@@ -26,7 +26,7 @@ def validated_times(times: Any) -> Array:
         and not isinstance(times, np.ma.MaskedArray)
         and times.ndim == 1
         and times.dtype == np.float64
-        and np.all(np.isfinite(times))
+        and np.isfinite(times).all()
     ):
         array = np.array(times)
         array.setflags(write=False)
@@ -34,9 +34,9 @@ def validated_times(times: Any) -> Array:
         array = to_float(exact_vector(times, ("times",)))
     if array.size == 0:
         raise InvalidInput(("times",), "at least one time", "none")
-    falls = np.flatnonzero(array[1:] <= array[:-1])
-    if falls.size:
-        i = int(falls[0]) + 1
+    falls = array[1:] <= array[:-1]
+    if falls.any():
+        i = int(np.argmax(falls)) + 1
         raise InvalidInput(
             ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))
         )

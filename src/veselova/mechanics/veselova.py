@@ -199,8 +199,8 @@ class Veselova(TorusProblem):
         size = integrals.norm(p)
         return {
             "energy": found.energy,
-            "q_norm": np.sum(q * q, axis=-1),
-            "q_p": np.divide(np.sum(q * p, axis=-1), size, out=np.zeros_like(size), where=size > 0),
+            "q_norm": (q * q).sum(axis=-1),
+            "q_p": np.divide((q * p).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0),
             "neumann": found.neumann,
             "linear": integrals.linear_integrals(p, frame),
             "constants": found.constants,

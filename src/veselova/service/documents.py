@@ -115,7 +115,10 @@ def encoded(document: Mapping[str, Any]) -> bytes:
 def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
     """Write a document as JSON, its arrays block by block, so that the text of large ones is never in memory as a whole."""
     if _numbers(document) <= _FEW_NUMBERS:
-        stream.write(orjson.dumps(_writable(document), option=orjson.OPT_SERIALIZE_NUMPY))
+        text = orjson.dumps(document, _writable, orjson.OPT_SERIALIZE_NUMPY)
+        if b"null" in text:  # which may be one as well, or in a text
+            _require_finite_parts(document)
+        stream.write(text)
     else:
         _write_parts(document, stream)
 
@@ -123,7 +126,7 @@ def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
 def _numbers(document: Mapping[str, Any]) -> int:
     """Return how many numbers the arrays of a document have."""
     return sum(
-        _numbers(value) if isinstance(value, Mapping) else value.size if isinstance(value, np.ndarray) else 0
+        value.size if isinstance(value, np.ndarray) else _numbers(value) if isinstance(value, dict) else 0
         for value in document.values()
     )
 
@@ -151,16 +154,21 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
     stream.write(b"]")
 
 
-def _writable(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a document whose numbers are all finite, its arrays in the order in which they are written."""
-    parts: dict[str, Any] = {}
+def _writable(value: Any) -> Any:
+    """Return what orjson does not take, arrays in another order than they are written in, as what it does."""
+    if isinstance(value, np.ndarray):
+        return np.ascontiguousarray(value) if value.ndim else value.item()
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} has no JSON")
+
+
+def _require_finite_parts(document: Mapping[str, Any]) -> None:
     for name, value in document.items():
         if isinstance(value, Mapping):
-            parts[name] = _writable(value)
-            continue
-        _require_finite(value, name)
-        parts[name] = np.ascontiguousarray(value) if isinstance(value, np.ndarray) and value.ndim else value
-    return parts
+            _require_finite_parts(value)
+        else:
+            _require_finite(value, name)
 
 
 def _require_finite(value: Any, place: str) -> None:
