@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from pyarrow import ipc, parquet
 
 from conftest import Server, running_server
 from hostile import GOOD
+from test_admission import wait_until
 from test_http import is_problem, post
 from veselova import Trajectory, Veselova, solve
 from veselova.service.formats import FORMATS
@@ -227,7 +229,23 @@ def test_a_damaged_entry_is_removed_and_computed_again(tmp_path: Path, damage: s
         again = post(own, "/v1/trajectories", GOOD)
         assert "cache-status" not in again.headers
         assert again.json()["series"] == made.json()["series"]
-        assert kept_files(tmp_path) == [path]
+        wait_until(lambda: kept_files(tmp_path) == [path])
+
+
+def test_an_answer_can_be_had_again_at_once_and_is_on_the_disk_when_the_server_has_ended(tmp_path: Path) -> None:
+    with running_server(tmp_path, workers="1") as own, httpx2.Client(base_url=own.url, timeout=60) as client:
+        for k in range(1, 20):
+            made = client.post("/v1/trajectories", json={**GOOD, "times": [0, k]})
+            again = client.get(made.headers["content-location"])
+            assert again.headers["cache-status"] == "veselova; hit"
+            assert again.content == made.content
+        last = client.post("/v1/trajectories", json={**GOOD, "times": [0, 20]})
+        own.process.send_signal(signal.SIGTERM)
+        client.close()
+        assert own.process.wait(20) == 0
+    assert len(kept_files(tmp_path)) == 20
+    with running_server(tmp_path, workers="1") as other:
+        assert get(f"{other.url}{last.headers['content-location']}").content == last.content
 
 
 def test_servers_share_what_they_keep(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from hostile import GOOD
 from veselova.mechanics.trajectory import Trajectory
 from veselova.service.cache import Cache
 from veselova.service.delivery import Wanted, restored, solved
-from veselova.service.entry import DamagedEntry, Entry, read_entry
+from veselova.service.entry import DamagedEntry, Entry, read_entry, unpacked
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import TrajectoryRequest, read_request
 from veselova.service.spool import Spool
@@ -102,11 +102,12 @@ def full_disk(tmp_path: Path) -> str:
 
 
 def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk: str) -> None:
-    delivery = solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "entry"), full_disk, 10**6))
-    assert delivery.body
+    answer = tmp_path / "answer"
+    delivery = solved(GOOD, Wanted("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6))
     assert delivery.not_stored == "No space left on device"
-    assert delivery.stored == 0
-    assert not list(tmp_path.iterdir())
+    assert (delivery.stored, delivery.entry) == (0, None)
+    assert answer.read_bytes()
+    assert list(tmp_path.iterdir()) == [answer]
 
 
 def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> None:
@@ -123,9 +124,15 @@ def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> N
 def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(tmp_path: Path, changes: dict[str, Any]) -> None:
     entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
     made = solved({**GOOD, **changes}, IN_MEMORY, entry)
-    assert made.stored == (tmp_path / "kept").stat().st_size
-    for again in (restored(entry.path, IN_MEMORY), solved({**GOOD, **changes}, IN_MEMORY, entry)):
-        assert (again.body, again.provenance, again.kept, again.stored) == (made.body, made.provenance, True, 0)
+    assert made.entry
+    assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
+    for again in (
+        restored(made.entry, IN_MEMORY),
+        restored(entry.path, IN_MEMORY),
+        solved({**GOOD, **changes}, IN_MEMORY, entry),
+    ):
+        assert (again.body, again.provenance, again.kept) == (made.body, made.provenance, True)
+        assert (again.stored, again.entry) == (0, None)
     with pytest.raises(FileNotFoundError):
         restored(str(tmp_path / "none"), IN_MEMORY)
 
@@ -135,9 +142,33 @@ def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) 
     (tmp_path / "other").write_bytes(content)
     with pytest.raises(DamagedEntry):
         restored(str(tmp_path / "other"), IN_MEMORY)
-    made = solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6))
+    entry = Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6)
+    made = solved(GOOD, IN_MEMORY, entry)
     assert (made.kept, made.damaged) == (False, True)
+    assert made.entry
+    assert entry.write_packed(made.entry)
     assert restored(str(tmp_path / "other"), IN_MEMORY).body == made.body
+
+
+def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Path) -> None:
+    """Spheroconic coordinates are kept where the engine found them; where it did not, they follow from the frame."""
+    for method in ("theta", "angles"):
+        request = {**GOOD, "method": method}
+        made = solved({**request, "outputs": ["q"]}, IN_MEMORY, Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6))
+        assert made.entry
+        kept, expected = unpacked(made.entry)[1], requested_trajectory(read_request(TrajectoryRequest, request))
+        for name in expected.problem.outputs:
+            assert np.array_equal(kept.series(name), expected.series(name)), name
+
+
+def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr("veselova.service.delivery._MOST_SENT", 100)
+    entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
+    made = solved(GOOD, IN_MEMORY, entry)
+    assert made.entry is None
+    assert made.stored == (tmp_path / "kept").stat().st_size
+    assert solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
+    assert list(tmp_path.iterdir()) == [tmp_path / "kept"]
 
 
 def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(tmp_path: Path, monkeypatch: Any) -> None:

@@ -21,6 +21,7 @@ from veselova.service.formats import FORMATS, Format, format_of
 from veselova.service.identity import entity_tag, identity, is_identity, matches
 from veselova.service.metrics import Metrics
 from veselova.service.negotiation import accepted_coding, accepted_type
+from veselova.service.pending import Pending
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 from veselova.service.settings import Settings
@@ -49,14 +50,16 @@ class Answers:
     def __init__(self, settings: Settings, workers: Workers, metrics: Metrics) -> None:
         self._settings, self._workers, self._metrics = settings, workers, metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
+        self._pending = Pending(self._cache)
         self._spool = Spool(settings.data_dir / "spool")
 
     @asynccontextmanager
     async def serving(self) -> AsyncIterator[None]:
-        """Keep the spool open for the life of the server."""
+        """Keep the spool open, and write what is to be kept, for the life of the server."""
         await to_thread.run_sync(self._spool.open)
         try:
-            yield
+            async with self._pending.writing():
+                yield
         finally:
             self._spool.close()
 
@@ -77,20 +80,21 @@ class Answers:
         """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
         form = _format(request)
         asked = await self._asked(TrajectoryRequest, request)
-        name = identity(asked)
+        stated = asked.model_dump()
+        name = identity(asked, stated)
         await self._require_news(request, name, entity_tag(name, form.name))
         wanted = Wanted(form.name, _coding(request), self._place(_is_large(asked)))
-        entry, stated = self._cache.entry(name), asked.model_dump()
+        entry, content = self._cache.entry(name), self._pending.find(name)
+        task = (restored, content, wanted) if content else (solved, stated, wanted, entry)
 
         async def work() -> Response:
             with self._metrics.work("trajectory", stated) as ending:
                 try:
-                    delivery = await self._workers.run(solved, stated, wanted, entry, budget_s=asked.budget_s)
+                    delivery = await self._workers.run(*task, budget_s=asked.budget_s)
                     ending.kept = delivery.kept
                 finally:
                     self._metrics.cached(hit=ending.kept)
-            await self._see_to_cache(name, delivery)
-            headers = _headers(name, form, delivery.kept or delivery.stored > 0)
+            headers = _headers(name, form, await self._kept(name, delivery))
             return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.kept else headers)
 
         return await self._guarded(request, work, wanted.place, None if entry is None else entry.part)
@@ -100,23 +104,29 @@ class Answers:
         stated = _header(request, "if-none-match")
         if stated is None:
             return
-        kept = await to_thread.run_sync(self._cache.find, name)
-        if matches(stated, tag, kept is not None):
+        if matches(stated, tag, await self._find(name) is not None):
             raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
 
-    async def _see_to_cache(self, name: str, delivery: Delivery) -> None:
-        """See to what the cache has to do with an answer, and make room where one more entry fills it."""
+    async def _find(self, name: str) -> bytes | str | None:
+        """Return an entry that is kept: the content of one that is not written yet, the file of another."""
+        return self._pending.find(name) or await to_thread.run_sync(self._cache.find, name)
+
+    async def _kept(self, name: str, delivery: Delivery) -> bool:
+        """See to what the cache has to do with an answer, and return whether it can be had again."""
         if delivery.damaged:
             await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
         if delivery.not_stored is not None:
             self._cache.report(delivery.not_stored)
         if delivery.stored and self._cache.is_full(delivery.stored):
             await to_thread.run_sync(self._cache.make_room)
+        if delivery.entry is not None:
+            return await self._pending.keep(name, delivery.entry)
+        return delivery.kept or delivery.stored > 0
 
     async def named(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
         form = _format(request)
-        kept = await to_thread.run_sync(self._cache.find, name) if is_identity(name) else None
+        kept = await self._find(name) if is_identity(name) else None
         if kept is None:
             raise _not_kept(name)
         headers = {**_headers(name, form), "Cache-Control": _FOREVER}
@@ -141,10 +151,10 @@ class Answers:
         admit(asked, self._settings)
         return asked
 
-    async def _restored(self, name: str, kept: Path, wanted: Wanted, budget_s: float) -> Delivery | None:
+    async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, budget_s: float) -> Delivery | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
-            return await self._workers.run(restored, str(kept), wanted, budget_s=budget_s)
+            return await self._workers.run(restored, kept, wanted, budget_s=budget_s)
         except DamagedEntry:
             await to_thread.run_sync(self._cache.discard, name)
         except FileNotFoundError:
@@ -204,9 +214,9 @@ def _is_large(asked: TorusRequest) -> bool:
     return numbers > _LARGE_NUMBERS
 
 
-def _bytes(path: Path) -> int:
+def _bytes(kept: bytes | str) -> int:
     try:
-        return path.stat().st_size
+        return len(kept) if isinstance(kept, bytes) else Path(kept).stat().st_size
     except OSError:
         return 0
 

@@ -6,6 +6,7 @@ import logging
 import os
 import time
 import uuid
+from collections.abc import Mapping
 from pathlib import Path
 
 from veselova.service.entry import Entry
@@ -34,11 +35,11 @@ class Cache:
         self._failing = False
         self._room = 0
 
-    def find(self, name: str) -> Path | None:
+    def find(self, name: str) -> str | None:
         """Return the file of an entry, which is now the one used last, or None."""
         if not self._size:
             return None
-        path = self._path(name)
+        path = str(self._path(name))
         try:
             os.utime(path)
         except FileNotFoundError:
@@ -54,8 +55,19 @@ class Cache:
             return None
         return Entry(f"{self._folder}/{name}{_WHOLE}", f"{self._folder}/.{uuid.uuid4().hex}{_PART}", self._size)
 
+    def write(self, contents: Mapping[str, bytes]) -> dict[str, int]:
+        """Write entries until one fails, and return the bytes of those that are written, by name."""
+        written: dict[str, int] = {}
+        try:
+            for name, content in contents.items():
+                if entry := self.entry(name):
+                    written[name] = entry.write_packed(content)
+        except OSError as error:
+            self._report(error)
+        return written
+
     def is_full(self, size: int) -> bool:
-        """Count an entry of so many bytes, which was made; return whether room has to be made."""
+        """Count an entry of so many bytes, which was written; return whether room has to be made."""
         self._failing = False
         self._room -= size
         return self._room < 0

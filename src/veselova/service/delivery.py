@@ -5,13 +5,13 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from veselova.mechanics.trajectory import Trajectory
 from veselova.service.documents import write_document
-from veselova.service.entry import DamagedEntry, Entry, read_entry
+from veselova.service.entry import DamagedEntry, Entry, packed, read_entry, unpacked
 from veselova.service.formats import FORMATS, Format, coded
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import TrajectoryRequest
@@ -21,6 +21,9 @@ __all__ = ["Delivery", "Wanted", "answered", "restored", "solved"]
 
 #: Answers below this are not worth a content coding.
 _SMALL = 1000
+
+#: The largest entry that is sent to the server.
+_MOST_SENT = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,8 @@ class Wanted:
 class Delivery:
     """An answer: its bytes, or None where they are in the file wanted; its coding and its provenance.
 
-    Of the cache: whether the answer came from it, the bytes of the entry that was made, whether one was damaged, and why none
-    could be read or made.
+    Of the cache: whether the answer came from it, the bytes of the entry that was written, or the content of one that is yet to
+    be, whether one was damaged, and why none could be read or written.
     """
 
     body: bytes | None
@@ -45,6 +48,7 @@ class Delivery:
     provenance: str | None = None
     kept: bool = False
     stored: int = 0
+    entry: bytes | None = None
     damaged: bool = False
     not_stored: str | None = None
 
@@ -57,11 +61,14 @@ def answered(kind: str, request: Mapping[str, Any], wanted: Wanted) -> Delivery:
 
 
 def solved(request: Mapping[str, Any], wanted: Wanted, entry: Entry | None) -> Delivery:
-    """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed, and kept if that can be."""
+    """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed, and kept if that can be.
+
+    A small entry is not written: it goes to the server, which does that when the answer has been sent.
+    """
     damaged, failure = False, None
     if entry is not None:
         try:
-            return restored(entry.path, wanted)
+            return _written(*read_entry(entry.path), wanted, kept=True)
         except FileNotFoundError:
             pass
         except DamagedEntry:
@@ -70,30 +77,33 @@ def solved(request: Mapping[str, Any], wanted: Wanted, entry: Entry | None) -> D
             failure = error.strerror or str(error)
     asked = TrajectoryRequest.model_validate(request)
     trajectory = requested_trajectory(asked)
-    delivery = _written(trajectory, asked.outputs, wanted)
-    stored = 0
+    kept: dict[str, Any] = {"damaged": damaged, "not_stored": failure}
     if entry is not None and failure is None:
+        content = packed(request, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
         try:
-            stored = entry.write(request, trajectory)
+            kept |= {"entry": content} if content else {"stored": entry.write(request, trajectory)}
         except OSError as error:
-            failure = error.strerror or str(error)
-    return replace(delivery, stored=stored, damaged=damaged, not_stored=failure)
+            kept["not_stored"] = error.strerror or str(error)
+    return _written(asked, trajectory, wanted, **kept)
 
 
-def restored(path: str, wanted: Wanted) -> Delivery:
-    """Return a trajectory that was kept; raises DamagedEntry where the file is not whole, OSError where it cannot be read."""
-    asked, trajectory = read_entry(path)
-    return replace(_written(trajectory, asked.outputs, wanted), kept=True)
+def restored(kept: str | bytes, wanted: Wanted) -> Delivery:
+    """Return a trajectory that was kept, in a file or as the content of one that is yet to be written.
+
+    Raises DamagedEntry where the file is not whole, OSError where it cannot be read.
+    """
+    return _written(*(read_entry(kept) if isinstance(kept, str) else unpacked(kept)), wanted, kept=True)
 
 
-def _written(trajectory: Trajectory, outputs: list[str] | None, wanted: Wanted) -> Delivery:
+def _written(asked: TrajectoryRequest, trajectory: Trajectory, wanted: Wanted, **facts: Any) -> Delivery:
     form: Format = FORMATS[wanted.format]
     coding = "identity" if form.compressed else wanted.coding
-    provenance = json.dumps(trajectory.provenance.as_dict())
-    return _delivered(lambda stream: form.write(trajectory, stream, outputs), wanted, coding, provenance)
+    facts["provenance"] = json.dumps(trajectory.provenance.as_dict())
+    return _delivered(lambda stream: form.write(trajectory, stream, asked.outputs), wanted, coding, **facts)
 
 
-def _delivered(write: Callable[[BinaryIO], None], wanted: Wanted, coding: str, provenance: str | None = None) -> Delivery:
+def _delivered(write: Callable[[BinaryIO], None], wanted: Wanted, coding: str, **facts: Any) -> Delivery:
+    """Return what is written, in its coding, with what else there is to say of it."""
     if wanted.place is not None:
         try:
             with Path(wanted.place).open("wb") as file, coded(file, coding) as stream:
@@ -101,12 +111,12 @@ def _delivered(write: Callable[[BinaryIO], None], wanted: Wanted, coding: str, p
         except OSError as error:
             Path(wanted.place).unlink(missing_ok=True)
             raise Refused("storage-full", f"The answer could not be written: {error.strerror}.", retry_after=60) from None
-        return Delivery(None, coding, provenance)
+        return Delivery(None, coding, **facts)
     plain = io.BytesIO()
     write(plain)
     if coding == "identity" or plain.tell() < _SMALL:
-        return Delivery(plain.getvalue(), "identity", provenance)
+        return Delivery(plain.getvalue(), "identity", **facts)
     compact = io.BytesIO()
     with coded(compact, coding) as stream:
         stream.write(plain.getvalue())
-    return Delivery(compact.getvalue(), coding, provenance)
+    return Delivery(compact.getvalue(), coding, **facts)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,10 +21,9 @@ from veselova.mechanics.archive import archived_series, read_archive
 from veselova.mechanics.errors import VeselovaError
 from veselova.mechanics.table import row_blocks
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.service.documents import stored_outputs
 from veselova.service.schemas import TrajectoryRequest
 
-__all__ = ["DamagedEntry", "Entry", "read_entry"]
+__all__ = ["DamagedEntry", "Entry", "packed", "read_entry", "unpacked"]
 
 Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 
@@ -44,14 +44,18 @@ class Entry:
     most: int
 
     def write(self, request: Mapping[str, Any], trajectory: Trajectory) -> int:
-        """Keep a trajectory, whole or not at all, and return its bytes, 0 for one that is too large; raises OSError.
-
-        The file is a line of JSON (request, provenance, names and shapes of the arrays), the arrays, and a checksum of both.
-        NumPy's own archive has a header and a checksum for each array, which take four times as long to write for small ones.
-        """
-        part, arrays = Path(self.part), _arrays(trajectory)
-        if sum(array.nbytes for array in arrays.values()) > self.most:
+        """Keep a trajectory, whole or not at all, and return its bytes, 0 for one that is too large; raises OSError."""
+        arrays = _arrays(trajectory)
+        if _bytes(arrays) > self.most:
             return 0
+        return self._placed(lambda stream: _write(stream, request, trajectory, arrays))
+
+    def write_packed(self, content: bytes) -> int:
+        """Keep what ``packed`` gave; returns and raises the same."""
+        return self._placed(lambda stream: stream.write(content))
+
+    def _placed(self, write: Callable[[BinaryIO], object]) -> int:
+        part = Path(self.part)
         try:
             try:
                 stream = part.open("wb")
@@ -59,7 +63,7 @@ class Entry:
                 part.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 stream = part.open("wb")
             with stream:
-                _write(stream, request, trajectory.provenance, arrays)
+                write(stream)
                 size = stream.tell()
             if size <= self.most:
                 part.replace(self.path)
@@ -72,16 +76,38 @@ class Entry:
         return 0
 
 
+def packed(request: Mapping[str, Any], trajectory: Trajectory, most: int) -> bytes | None:
+    """Return the content of the entry of a trajectory, None where it has more bytes than that."""
+    arrays = _arrays(trajectory)
+    if _bytes(arrays) > most:
+        return None
+    stream = io.BytesIO()
+    _write(stream, request, trajectory, arrays)
+    return stream.getvalue() if stream.tell() <= most else None
+
+
+def _bytes(arrays: Arrays) -> int:
+    return sum(array.nbytes for array in arrays.values())
+
+
 def _arrays(trajectory: Trajectory) -> Arrays:
+    """Return what a trajectory is made of: what follows from it is computed again where it is asked for."""
     problem = trajectory.problem
-    outputs = tuple(problem.outputs) if trajectory.decimals is not None else stored_outputs(problem)
-    return dict(archived_series(trajectory, outputs))
+    if trajectory.decimals is not None:
+        return dict(archived_series(trajectory, problem.outputs))
+    series = {name: values for name, values in trajectory.arrays.items() if name not in problem.derived}
+    return {"times": trajectory.times, "error": trajectory.error, **series}
 
 
-def _write(stream: BinaryIO, request: Mapping[str, Any], provenance: Provenance, arrays: Arrays) -> None:
+def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> None:
+    """Write a line of JSON (request, provenance, names and shapes of the arrays), the arrays, and a checksum of both.
+
+    NumPy's own archive has a header and a checksum for each array, which take four times as long to write for small ones.
+    """
     header = {
         "request": {**request, "times": [0.0]},  # the times are among the arrays
-        "provenance": provenance.as_dict(),
+        "provenance": trajectory.provenance.as_dict(),
+        "decimals": trajectory.decimals is not None,
         "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
     }
     line = json.dumps(header).encode() + b"\n"
@@ -101,26 +127,25 @@ def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
     Raises DamagedEntry where the file is not whole, FileNotFoundError where there is none, OSError where it cannot be read.
     """
     os.utime(path)
-    content = memoryview(Path(path).read_bytes())
     try:
-        whole = content[: -_CHECKSUM.size]
-        if _CHECKSUM.pack(zlib.crc32(whole)) != content[-_CHECKSUM.size :]:
-            raise ValueError("another checksum")
-        line = bytes(whole[: _end_of_line(whole)])
-        header, place, arrays = json.loads(line), len(line), {}
-        for name, (kind, shape) in header["arrays"].items():
-            size = math.prod(shape) * np.dtype(kind).itemsize
-            arrays[name] = np.frombuffer(whole[place : place + size], kind).reshape(shape)
-            place += size
-        asked = TrajectoryRequest.model_validate(header["request"])
-        return asked, read_archive(asked.problem.problem(), {**arrays, "provenance": header["provenance"]})
+        return unpacked(Path(path).read_bytes())
     except (ValueError, KeyError, TypeError, VeselovaError) as error:
         raise DamagedEntry(f"{path}: {type(error).__name__}") from None
 
 
-def _end_of_line(content: memoryview) -> int:
-    """Return where the line of JSON ends, its break included."""
-    step, seen = 1 << 16, b""
-    while b"\n" not in seen and len(seen) < len(content):
-        seen, step = bytes(content[:step]), 4 * step
-    return seen.index(b"\n") + 1
+def unpacked(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
+    """Return what the content of an entry holds; raises ValueError, KeyError, TypeError or VeselovaError where it is damaged."""
+    whole, checksum = memoryview(content)[: -_CHECKSUM.size], content[-_CHECKSUM.size :]
+    if _CHECKSUM.pack(zlib.crc32(whole)) != checksum:
+        raise ValueError("another checksum")
+    line = content[: content.index(b"\n") + 1]
+    header, place, arrays = json.loads(line), len(line), {}
+    for name, (kind, shape) in header["arrays"].items():
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        arrays[name] = np.frombuffer(whole[place : place + size], kind).reshape(shape)
+        place += size
+    asked = TrajectoryRequest.model_validate(header["request"])
+    problem, provenance = asked.problem.problem(), header["provenance"]
+    if header["decimals"]:
+        return asked, read_archive(problem, {**arrays, "provenance": provenance})
+    return asked, Trajectory(problem, arrays.pop("times"), arrays.pop("error"), arrays, Provenance(**provenance))

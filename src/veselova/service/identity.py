@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from veselova.service.schemas import TrajectoryRequest
@@ -13,14 +14,21 @@ from veselova.version import __version__
 __all__ = ["entity_tag", "identity", "is_identity", "matches"]
 
 
-def identity(request: TrajectoryRequest) -> str:
-    """Return the SHA-256 of the canonical request and of the version of the package, which answers it, in hexadecimal."""
+#: Canonical text: a dictionary has no order.
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
+
+def identity(request: TrajectoryRequest, stated: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of the canonical request and of the version of the package, which answers it, in hexadecimal.
+
+    ``stated`` is the request as JSON values.
+    """
     kind, engine = SYSTEMS[request.problem.system].problem_class, request.chosen_engine
     formulation = request.formulation or (kind.formulations[0] if engine == "numeric" else None)
     chosen = {"engine": engine, "formulation": formulation, "outputs": list(request.outputs or kind.outputs)}
-    document = {**request.model_dump(exclude={"budget_s"}), **chosen, "version": __version__}
-    text = json.dumps(_canonical(document), sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    document = {**stated, **chosen, "version": __version__}
+    del document["budget_s"]
+    return hashlib.sha256(_ENCODER.encode(_canonical(document)).encode()).hexdigest()
 
 
 def is_identity(text: str) -> bool:
@@ -45,7 +53,7 @@ def _canonical(value: Any) -> Any:
     if kind is int:
         return float(value) if abs(value) <= 2**53 else value
     if kind is list or kind is tuple:
-        return [_canonical(item) for item in value]
+        return [item if type(item) is float else _canonical(item) for item in value]
     if kind is dict:
         return {key: _canonical(item) for key, item in value.items()}
     return value
