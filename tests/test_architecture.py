@@ -26,7 +26,7 @@ ALLOWED = {
 ALLOWED_LATER = {
     # Veselova.from_torus asks the table of engines; decimals turn into numbers of the two libraries on request.
     "mechanics": {"matplotlib", "orjson", "pyarrow", "xarray", "mpmath", "flint", "veselova.engines"},
-    "analytic": set(),
+    "analytic": {"finufft"},
     "numeric": {"heyoka"},
 }
 
@@ -146,7 +146,7 @@ def test_importing_the_package_loads_no_part_and_no_library() -> None:
 def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
     loaded = _loaded_by("import veselova; veselova.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1])")
     assert "numpy" in loaded
-    assert not loaded & {"scipy", "mpmath", "flint", "heyoka", "matplotlib", "pydantic", "veselova.engines"}
+    assert not loaded & {"scipy", "mpmath", "flint", "finufft", "heyoka", "matplotlib", "pydantic", "veselova.engines"}
 
 
 @pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])

@@ -60,9 +60,11 @@ def test_a_trajectory_comes_back_as_the_library_gives_it(server: Server, engine:
 def test_problems_travel_exactly(server: Server) -> None:
     for name in ("matrix-inertia", "random-n4-0", "large-units"):
         problem = next(case for case in tagged("generic") if case.name == name).problem()
-        with Client(server.url) as client:
-            found = client.trajectory(problem, [1.0, 2.0], method="angles")
-        assert np.array_equal(found.frame, solve(problem, [1.0, 2.0], method="angles").frame)
+        for method in ("theta", "nufft", "angles"):
+            with Client(server.url) as client:
+                found = client.trajectory(problem, [1.0, 2.0], method=method)
+            assert found.provenance.method == method
+            assert np.array_equal(found.frame, solve(problem, [1.0, 2.0], method=method).frame)
 
 
 def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:

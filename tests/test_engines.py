@@ -19,7 +19,7 @@ from veselova.analytic.solve import solve as solve_analytic
 #: The stated slack of every error estimate: the true error stays below this many times the reported one.
 SLACK = 2.0
 
-METHODS = [("analytic", "theta"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+METHODS = [("analytic", "theta"), ("analytic", "nufft"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
 SOLVABLE = [case for case in TABLE if "at-rest" not in case.tags]
 
 
@@ -46,7 +46,7 @@ def test_truth_reproduces_the_reference_motions(case: Case) -> None:
     assert np.max(np.abs(found[2] - tau1)) <= 1e-15 * np.max(np.abs(tau1))
 
 
-@pytest.mark.parametrize("method", ["theta", "angles"])
+@pytest.mark.parametrize("method", ["theta", "nufft", "angles"])
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: str) -> None:
     times, frame, q_dot, tau1 = reference(case)

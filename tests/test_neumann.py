@@ -34,7 +34,7 @@ def drawn(rng: Generator, n: int) -> NeumannSystem:
 
 
 @pytest.mark.parametrize("n", range(2, 8))
-@pytest.mark.parametrize("method", ["theta", "angles"])
+@pytest.mark.parametrize("method", ["theta", "nufft", "angles"])
 def test_the_closed_form_agrees_with_integration(n: int, method: str, rng: Generator) -> None:
     for _ in range(5):
         problem = drawn(rng, n)

@@ -65,7 +65,8 @@ def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
 
 
 @pytest.mark.parametrize(
-    ("engine", "method"), [("analytic", "theta"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+    ("engine", "method"),
+    [("analytic", "theta"), ("analytic", "nufft"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")],
 )
 def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -> None:
     problem = tagged("generic")[1].problem()
@@ -132,6 +133,12 @@ def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
     monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
     with pytest.raises(BackendMissing, match="heyoka"):
         solve(tagged("generic")[1].problem(), [1.0], "numeric", "taylor")
+
+
+def test_missing_transforms_are_named(monkeypatch: Any) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "finufft", None)
+    with pytest.raises(BackendMissing, match="finufft"):
+        solve(tagged("generic")[1].problem(), [1.0], method="nufft")
 
 
 def test_parquet_arrow_and_xarray_hold_the_series(trajectory: Trajectory, tmp_path: Path) -> None:

@@ -100,7 +100,12 @@ def test_what_has_no_closed_form_is_a_named_outcome(fields: dict[str, Any], outc
 
 def test_methods_and_digits_that_it_has_not_are_refused(rng: Generator) -> None:
     problem = drawn(rng, None)
-    for options, field in (({"method": "theta"}, "method"), ({"digits": 30}, "digits"), ({"certified": True}, "digits")):
+    for options, field in (
+        ({"method": "theta"}, "method"),
+        ({"method": "nufft"}, "method"),
+        ({"digits": 30}, "digits"),
+        ({"certified": True}, "digits"),
+    ):
         with pytest.raises(InvalidInput) as caught:
             solve(problem, TIMES, "analytic", **options)  # type: ignore[arg-type]
         assert caught.value.field == field

@@ -81,6 +81,11 @@ class Costs:
         of_panels = (cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
         return of_panels + inversions * _PANEL_INVERSION
 
+    def estimates(self, inversions: int) -> dict[str, float]:
+        """Return the seconds of either clock, those out of the question left out."""
+        seconds = {name: self.seconds(name, inversions) for name in ("fourier", "panels")}
+        return {name: round(value, 5) for name, value in seconds.items() if math.isfinite(value)}
+
     def cheaper_clock(self, inversions: int) -> Literal["fourier", "panels"]:
         """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits."""
         fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 _EPSILON = float(np.finfo(float).eps)
 
 #: Rounding of one evaluation of the attitude, in ε; largest seen over the problem tables: 8 by angles, 20 by theta quotients, and
-#: there for each unit of the largest entry of T, whose rounding stands in an exponent.
-_EVALUATION = {"angles": 16.0, "theta": 40.0}
+#: there for each unit of the largest entry of T, whose rounding stands in an exponent. That of transforms comes on top.
+_EVALUATION = {"angles": 16.0, "theta": 40.0, "nufft": 40.0}
 
 #: Rounding of a phase in ε: the start's Abel map, the reduced advance, Newton's residual.
 _PHASE = 8.0
@@ -47,11 +47,11 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
-    start = solution.start_rounding if method == "theta" else 0.0
+    start = 0.0 if method == "angles" else solution.start_rounding
     at_once = float(np.sum((_PHASE * _EPSILON + start) * steepness.by_phase))
-    at_once += solution.quotients.rounding if method == "theta" else 0.0
+    at_once += 0.0 if method == "angles" else solution.quotients.rounding
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
-    evaluation = _EVALUATION[method] * (max(1.0, solution.largest_period) if method == "theta" else 1.0)
+    evaluation = _EVALUATION[method] * (1.0 if method == "angles" else max(1.0, solution.largest_period))
     error = clock.error(tau1)  # in place from here on: fresh memory costs more than sums
     error *= steepness.along_flow
     elapsed *= with_time

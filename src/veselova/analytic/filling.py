@@ -50,12 +50,12 @@ class Filling:
         """Return the answer, with what is still open evaluated time by time."""
         if self._times.size <= _TIMES and np.all(self._open):
             tau1, z = self._clock.tau1(self._times)
-            return Along(tau1, self._evaluation(z)[1], self._error, int(tau1.size))
+            return Along(tau1, self._evaluation(tau1, z)[1], self._error, int(tau1.size))
         rest = np.flatnonzero(self._open)
         for k in range(0, rest.size, _TIMES):
             rows = rest[k : k + _TIMES]
             self._tau1[rows], z = self._clock.tau1(self._times[rows])
-            _, series = self._evaluation(z)
+            _, series = self._evaluation(self._tau1[rows], z)
             self._evaluations += rows.size
             self._shapes = [part.shape[1:] for part in series]
             self._states[rows, 1:] = np.concatenate([part.reshape(rows.size, -1) for part in series], axis=1)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 
-__all__ = ["RADIUS", "Coordinates", "centred_points", "half_of", "lattice_points", "schur", "small_norm"]
+__all__ = ["RADIUS", "Coordinates", "centred_points", "half_of", "lattice_points", "points_within", "schur", "small_norm"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -79,7 +79,7 @@ class Coordinates:
         S, _, inverse = schur(np.asarray(self.form(T)), F, G)
         if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
             return math.inf
-        bells, waves = _points(inverse, _spreads(inverse)), _points(S, np.full(len(F), RADIUS))
+        bells, waves = points_within(inverse, _spreads(inverse)), points_within(S, np.full(len(F), RADIUS))
         return bells * waves + _BELL * bells + (_WAVE * waves if F else 0.0)
 
     def form(self, T: Any) -> Any:
@@ -127,7 +127,7 @@ def _reduced(form: Array) -> Integers:
     return U[np.argsort(np.diag(gram), kind="stable")]
 
 
-def _points(form: Array, radii: Array) -> float:
+def points_within(form: Array, radii: Array) -> float:
     """Return about how many points of Z^d an ellipsoid with these half axes has, in the norm of the form: its volume, or one."""
     dimension = len(form)
     ball = math.pi ** (dimension / 2) / math.gamma(dimension / 2 + 1)

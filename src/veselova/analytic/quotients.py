@@ -63,15 +63,18 @@ class ThetaQuotients:
         return [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
 
     @cached_property
-    def _distinct(self) -> tuple[list[Characteristic], NDArray[np.intp]]:
-        distinct = sorted(set(self._characteristics))
-        return distinct, np.array([distinct.index(c) for c in self._characteristics])
+    def functions(self) -> list[Characteristic]:
+        """Return the characteristics of all functions once: that of the denominator, then those of the numerators."""
+        return [Characteristic.zero(self.theta.genus), *sorted(set(self._characteristics))]
 
-    def _raw(self, z: Array) -> Array:
-        """Return θ[η](z)/θ(z) for the listed functions, shape (N, n + g + n·g)."""
-        distinct, places = self._distinct
-        values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *distinct])
-        return np.asarray((values[:, 1:] / values[:, :1])[:, places])
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Return where among the functions the numerator of each constant κ stands."""
+        return np.array([self.functions.index(c, 1) for c in self._characteristics])
+
+    def _raw(self, values: Array) -> Array:
+        """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g), from values of the functions."""
+        return np.asarray((values / values[:, :1])[:, self.places])
 
     @cached_property
     def constants(self) -> Array:
@@ -81,7 +84,7 @@ class ThetaQuotients:
         half_periods = xp.array(np.array(np.meshgrid(*[[0.0, 1.0]] * g, indexing="ij")).reshape(g, -1).T)
         attitude = self.frame.at(xp.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
-        raw = self._raw(half_periods / 2)
+        raw = self._raw(self.theta.values(half_periods / 2, self.functions))
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
@@ -111,7 +114,11 @@ class ThetaQuotients:
 
     def at(self, z: Array) -> Attitude:
         """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are left to the caller (empty)."""
-        values = self._raw(z) * self.constants
+        return self.attitude(self.theta.values(z, self.functions))
+
+    def attitude(self, values: Array) -> Attitude:
+        """Return the same from values of the ``functions``, shape (N, functions), however they were computed."""
+        entries = self._raw(values) * self.constants
         g = self.theta.genus
         n = g + 1
-        return Attitude(values[:, :n], values[:, n + g :].reshape(-1, n, g), values[:, n : n + g], np.empty((z.shape[0], 0)))
+        return Attitude(entries[:, :n], entries[:, n + g :].reshape(-1, n, g), entries[:, n : n + g], np.empty((len(values), 0)))

@@ -25,6 +25,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
+from veselova.analytic.transforms import Transforms
 from veselova.analytic.trial import NODES
 from veselova.analytic.windows import Windows
 from veselova.mechanics.errors import Unsolved
@@ -35,8 +36,8 @@ __all__ = ["METHODS", "Solution"]
 
 Array = NDArray[np.float64]
 
-#: The two routes from phases to attitude.
-METHODS = ("theta", "angles")
+#: The routes from phases to attitude; transforms are never the cheapest.
+METHODS = ("theta", "nufft", "angles")
 
 #: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.4, 1.1, 4 and 24
 #: against 2.6, 3.6, 10 and 8).
@@ -155,12 +156,12 @@ class Solution:
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None and (self.near_separatrix or self.moving.rate_variation > _WIDEST_RATE):
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
-        if (name or self.costs(times).cheaper_clock(self.windows(times, "fourier").inversions)) == "fourier":
+        if (name or self.costs(times).cheaper_clock(self.windows(times, "fourier", method).inversions)) == "fourier":
             return self._fourier(guarded)
         if cycles > PANEL_CYCLES:
             reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {reached}")
-        earliest, latest = self.windows(times, "panels").span
+        earliest, latest = self.windows(times, "panels", method).span
         in_tau1, rate = self._guarded[0] if guarded else self.in_tau1, partial(self.rate_at, method=method)
         return PanelClock(rate, self.mean_rate, in_tau1, earliest, latest)
 
@@ -191,15 +192,10 @@ class Solution:
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
         return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
-    def clock_estimates(self, times: Array) -> dict[str, float]:
-        """Return the seconds that either clock was thought to take, those out of the question left out."""
-        costs, inversions = self.costs(times), self.windows(times, "fourier").inversions
-        seconds = {name: costs.seconds(name, inversions) for name in ("fourier", "panels")}
-        return {name: round(value, 5) for name, value in seconds.items() if np.isfinite(value)}
-
-    def windows(self, times: Array, clock: str) -> Windows:
-        """Return the windows in which many times are interpolated, where that is cheaper with the clock."""
-        return Windows(times, self._fastest, self.costs(times).fewest_in_window(NODES, clock))
+    def windows(self, times: Array, clock: str, method: str | None) -> Windows:
+        """Return the windows in which many times are interpolated, where that is cheaper with the clock; none for transforms."""
+        fewest = times.size + 1 if method == "nufft" else self.costs(times).fewest_in_window(NODES, clock)
+        return Windows(times, self._fastest, fewest)
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times, which increase."""
@@ -237,6 +233,11 @@ class Solution:
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
         return ThetaQuotients.of(np.asarray(self.periods.riemann_matrix, dtype=np.float64), self.frame)
+
+    @cached_property
+    def transforms(self) -> Transforms:
+        """Return the same along the orbit by nonuniform FFTs."""
+        return Transforms(self.quotients, self.in_tau1.rates)
 
     @cached_property
     def largest_period(self) -> float:

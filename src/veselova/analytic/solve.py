@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -41,6 +41,9 @@ _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 #: An error above this leaves no digit of the attitude.
 _NO_DIGIT = 0.1
 
+#: What else may leave none.
+_OR_CANCELLATION = ", or the sums of nufft cancel beyond the digits of a double; those of theta do not"
+
 
 def solve(
     problem: TorusProblem | VeselovaSO3 | SeparableVeselova,
@@ -54,13 +57,15 @@ def solve(
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
-    ``method``: ``theta`` (every entry of the attitude a theta quotient) or ``angles`` (Abel–Jacobi inversion, then the
-    algebraic frame); None takes the cheaper. ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the
-    same with the Fourier clock. Every start is served: equal A's, frozen directions, coinciding constants, rest. On a
-    separatrix the error is that of starts a rounding away, and grows like e^(rate·t).
+    ``method``: ``theta`` (every entry of the attitude a theta quotient), ``nufft`` (the same by nonuniform FFTs at all times,
+    extra ``fast``) or ``angles`` (Abel–Jacobi inversion, then the algebraic frame); None takes the cheapest, which ``nufft``
+    never is. ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same with the Fourier clock. Every
+    start is served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is that of starts a
+    rounding away, and grows like e^(rate·t); near one sums by ``nufft`` cancel, which is in their error.
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
     ``solution``: that of the problem in double precision, where it is known already.
-    Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer.
+    Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer,
+    BackendMissing for ``nufft`` without finufft.
     Accuracy: see the trajectory's ``error``; about 1e-14 at t of order 10².
     """
     grid = validated_times(times)
@@ -74,8 +79,10 @@ def solve(
         if solution is not None:  # no field of the motion: pickling leaves behind what can be computed again
             vars(motion)["_solution"] = solution
         return motion.along(grid)
-    if certified and method == "theta":
-        raise InvalidInput(("method",), "angles, where errors are certified", shown(method))
+    served = ("angles",) if certified else ("theta", "angles")
+    if method is not None and method not in served:
+        precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
+        raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", shown(method))
     if clock is not None:
         raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
     if not isinstance(problem, Veselova):
@@ -121,18 +128,19 @@ class _TorusMotion(Motion[TorusProblem]):
         lost = np.flatnonzero(~(error <= _NO_DIGIT))
         if lost.size:
             first = grid[lost[np.argmin(np.abs(grid[lost]))]]
-            raise Unsolved(
-                "no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: the data determine no digit there"
-            )
+            cause = "the data determine no digit there" + _OR_CANCELLATION * (route == "nufft")
+            raise Unsolved("no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
+        inversions = solution.windows(grid, "fourier", route).inversions
+        sums = None if route == "angles" else solution.transforms if route == "nufft" else solution.quotients.theta
         details = {
             "regime": solution.regime,
             "clock": clock.name,
             "clock_size": clock.size,
             "evaluations": along.evaluations,
-            "clock_estimates": solution.clock_estimates(grid) if clock.name != "uniform" else {},
+            "clock_estimates": solution.costs(grid).estimates(inversions) if clock.name != "uniform" else {},
             "guard_digits": solution.is_guarded(grid),
             "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
-            "theta_terms": solution.quotients.theta.size if route == "theta" else 0,
+            "theta_terms": sums.size if sums else 0,
         }
         states = (along.tau1 * solution.tau1_unit, *along.series)
         series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
@@ -145,15 +153,25 @@ def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[A
     Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
     does not.
     """
-    windows = solution.windows(grid, clock.name)
+    windows = solution.windows(grid, clock.name, route)
     with_coordinates = route == "angles" and windows.inversions == grid.size
 
-    def evaluation(z: Array) -> tuple[Array, tuple[Array, ...]]:
-        attitude = solution.attitude(z, route)
+    def evaluation(tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
+        further: tuple[Array, ...] = ()
+        if route == "nufft":
+            attitude, rounding = solution.transforms.at(tau1, z)
+            further = (rounding,)
+        else:
+            attitude = solution.attitude(z, route)
+            if with_coordinates:
+                further = (solution.spheroconic(attitude),)
         rate, *series = solution.states(attitude)
-        return 1 / rate, (*series, solution.spheroconic(attitude)) if with_coordinates else tuple(series)
+        return 1 / rate, (*series, *further)
 
     along = windows.along(clock, solution.in_tau1.rates, evaluation)
     error = estimated_error(solution, grid, along.tau1, clock, route)
     error += along.error
+    if route == "nufft":
+        error += along.series[2]
+        along = replace(along, series=along.series[:2])
     return along, error

@@ -17,8 +17,8 @@ __all__ = ["MOST_HALVINGS", "NODES", "SUM_ROUNDING", "Cells", "Evaluation", "Tri
 
 Array = NDArray[np.float64]
 
-#: From phases (N, g) to dt/dτ₁, (N,), and the series, each with first axis N.
-Evaluation = Callable[[Array], tuple[Array, tuple[Array, ...]]]
+#: From τ₁ (N,) and the phases there (N, g) to dt/dτ₁, (N,), and the series, each with first axis N.
+Evaluation = Callable[[Array, Array], tuple[Array, tuple[Array, ...]]]
 
 #: Chebyshev points of a window.
 NODES = 48
@@ -89,8 +89,9 @@ class Trial:
     @classmethod
     def of(cls, evaluation: Evaluation, starts: Array, z: Array, stretch: float, frequencies: Array, before: Array) -> Trial:
         """Return the windows at whose starts the phases are z (W, g), and move with the frequencies."""
-        nodes = z[:, None, :] + (_OFFSETS * stretch)[:, None] * frequencies
-        rate, series = evaluation(nodes.reshape(-1, z.shape[1]))
+        offsets = _OFFSETS * stretch
+        nodes = z[:, None, :] + offsets[:, None] * frequencies
+        rate, series = evaluation((starts[:, None] + offsets).ravel(), nodes.reshape(-1, z.shape[1]))
         columns = [part.reshape(starts.size, NODES, -1) for part in series]
         sizes = np.repeat([float(np.max(np.abs(part))) or 1.0 for part in series], [part.shape[2] for part in columns])
         in_tau1 = _TO_COEFFICIENTS @ (np.concatenate(columns, axis=2) / sizes)
