@@ -165,8 +165,8 @@ class Theta:
         """Return the families by δ_G."""
         groups = self._grouped.get(characteristics)
         if groups is None:
-            families = self._coordinates.families(characteristics)
-            groups = self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families.items()]
+            families = self._coordinates.families(characteristics).items()
+            groups = self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families]
         return groups
 
     @cached_property

@@ -6,6 +6,7 @@ I_i = 1/A_i throughout.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any
 
@@ -38,7 +39,7 @@ _COINCIDENT = 1e-12
 
 def unit_scale(A: Array) -> tuple[Array, int]:
     """Return A/2^k with determinant near one, and k: det A itself leaves the float range for large n."""
-    k = round(float(np.log2(A).sum()) / A.size)
+    k = round(sum(map(math.log2, A.tolist())) / A.size)
     return np.ldexp(A, -k), k
 
 
@@ -56,7 +57,7 @@ def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
 def norm(vectors: Array) -> Array:
     """Return the lengths of vectors whose squares may leave the float range."""
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
-    unit = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
+    unit = _quotient(vectors, largest)
     return np.asarray(largest[..., 0] * np.sqrt((unit * unit).sum(axis=-1)), dtype=np.float64)
 
 
@@ -84,8 +85,14 @@ def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
 
 
 def _over_rate(q_dot: Array, rate: Array) -> Array:
-    over = rate[..., None]
-    return np.divide(q_dot, over, out=np.zeros_like(q_dot), where=over > 0)
+    return _quotient(q_dot, rate[..., None])
+
+
+def _quotient(values: Array, sizes: Array) -> Array:
+    """Return values over their sizes; zero where the size is."""
+    if sizes.all():
+        return np.asarray(values / sizes, dtype=np.float64)
+    return np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
 
 
 def linear_integrals(p: Array, frame: Array) -> Array:

@@ -15,6 +15,9 @@ __all__ = ["Pending"]
 #: Bytes that may be on their way together.
 _MOST = 8_000_000
 
+#: Seconds for which an entry waits: whoever asks again at once is heard first, and entries that come meanwhile go along.
+_PAUSE_S = 0.005
+
 
 class Pending:
     """What is kept and not written yet. Writing follows the answers as long as it works and keeps up with them.
@@ -59,6 +62,7 @@ class Pending:
     async def _write_what_is_due(self) -> None:
         while True:
             await self._due.wait()
+            await anyio.sleep(_PAUSE_S)
             self._due = anyio.Event()
             await self._write(self._contents)
 
