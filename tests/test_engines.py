@@ -138,6 +138,20 @@ def test_adversarial_starts_are_served_honestly(seed: int) -> None:
     assert np.max(found.error) < 1e-9, name
 
 
+@pytest.mark.parametrize("method", ["theta", "nufft", "angles"])
+@pytest.mark.parametrize("count", [0, 3000])
+def test_very_wide_inertia_is_served_honestly_by_every_route(method: str, count: int) -> None:
+    """A's over eight orders of magnitude: q from theta quotients would tell dt/dτ₁ to 1e-12 only."""
+    A, q = ["12854689", "68561808", "0.35321", "55950.258"], ["-0.677", "-0.143", "-0.921", "0.396"]
+    problem = Veselova(A, q, ["0.345", "-0.448", "-0.006", "0.415"], normalize=True)
+    wanted = np.linspace(-0.01, 0.01, 9)
+    times = np.unique(np.concatenate([wanted, np.linspace(-0.01, 0.01, count)]))
+    found = solve(problem, times, method=method)
+    rows = np.searchsorted(times, wanted)
+    error = np.max(np.abs(found.frame[rows] - true_motion(problem, wanted)[0]), axis=(1, 2))
+    assert np.all(error <= SLACK * found.error[rows])
+
+
 def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     case = tagged("separatrix")[0]
     times = np.linspace(0, 14, 29)

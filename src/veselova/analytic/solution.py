@@ -101,8 +101,8 @@ class Solution:
         return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
     def rate_at(self, z: Array, method: str | None = None) -> Array:
-        """Return dt/dτ₁ at phases z (N, g): in angles, or from q by theta; near a separatrix, where angles say little, always."""
-        if (method or self.default_method()) == "angles" and not self.near_separatrix:
+        """Return dt/dτ₁ at phases z (N, g): from q near a separatrix, in angles on uneven tori, else as the method has it."""
+        if not self.near_separatrix and (not self.is_even or (method or self.default_method()) == "angles"):
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return np.asarray(1 / self._rate_of_position(self.quotients.position(z)))
 

@@ -166,7 +166,8 @@ def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[A
             if with_coordinates:
                 further = (solution.spheroconic(attitude),)
         rate, *series = solution.states(attitude)
-        return 1 / rate, (*series, *further)
+        pace = solution.rate_at(z, route) if route == "theta" and not solution.is_even else 1 / rate
+        return pace, (*series, *further)
 
     along = windows.along(clock, solution.in_tau1.rates, evaluation)
     error = estimated_error(solution, grid, along.tau1, clock, route)
