@@ -90,9 +90,10 @@ def _over_rate(q_dot: Array, rate: Array) -> Array:
 
 def _quotient(values: Array, sizes: Array) -> Array:
     """Return values over their sizes; zero where the size is."""
-    if sizes.all():
+    positive = sizes > 0
+    if positive.all():
         return np.asarray(values / sizes, dtype=np.float64)
-    return np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
+    return np.divide(values, sizes, out=np.zeros_like(values), where=positive)
 
 
 def linear_integrals(p: Array, frame: Array) -> Array:
