@@ -120,7 +120,7 @@ def wait_until(condition: Any) -> None:
 
 def test_an_answer_is_let_go_when_its_client_leaves_in_the_middle(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
-        body = {**BODY4, "times": many(100_000)}
+        body = {**BODY4, "times": many(100_000), "budget_s": 60}
         with httpx2.Client(timeout=60) as client, client.stream("POST", f"{own.url}/v1/trajectories", json=body) as response:
             assert response.status_code == 200
             assert next(response.iter_raw())
