@@ -8,10 +8,11 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import numpy as np
@@ -21,6 +22,9 @@ from hypothesis import settings
 os.environ.setdefault("MPLBACKEND", "agg")
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.load_profile("default")
+
+#: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the machine is.
+PATIENCE = 300.0
 
 
 @pytest.fixture
@@ -42,18 +46,39 @@ class Server:
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
         return [int(child) for child in children]
 
+    def ask(self, method: str, path: str, **options: Any) -> httpx2.Response:
+        """Return the answer to a request."""
+        return httpx2.request(method, f"{self.url}{path}", **{"timeout": PATIENCE, **options})
+
+    def get(self, path: str, **options: Any) -> httpx2.Response:
+        """Return the answer to a GET."""
+        return self.ask("GET", path, **options)
+
+    def at_work(self) -> tuple[int, int]:
+        """Return how many workers are busy and how many requests wait for one."""
+        lines = [line.split() for line in self.get("/metrics").text.splitlines() if not line.startswith("#")]
+        shown = {line[0]: float(line[-1]) for line in lines}
+        return int(shown["veselova_workers_busy"]), int(shown["veselova_queue_length"])
+
     def wait_ready(self, path: str = "/readyz") -> None:
         """Wait until a worker is warm and all parts are there, or by another path for less."""
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            try:
-                if httpx2.get(f"{self.url}{path}").status_code == 200:
-                    return
-            except httpx2.TransportError:
-                pass
+
+        def ready() -> bool:
             assert self.process.poll() is None, self.log.read_text()
-            time.sleep(0.05)
-        raise AssertionError(f"not ready in time: {self.log.read_text()}")
+            try:
+                return self.get(path).status_code == 200
+            except httpx2.TransportError:
+                return False
+
+        wait_until(ready)
+
+
+def wait_until(condition: Callable[[], Any]) -> None:
+    """Wait until a condition holds."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "what was awaited did not come"
+        time.sleep(0.02)
 
 
 def free_port() -> int:
@@ -80,7 +105,7 @@ def running_server(folder: Path, *arguments: str, awaited: str = "/readyz", **li
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
-                process.wait(20)
+                process.wait(PATIENCE)
 
 
 @pytest.fixture(scope="session")

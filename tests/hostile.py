@@ -6,7 +6,11 @@ import json
 from typing import Any
 
 GOOD_PROBLEM: dict[str, Any] = {"system": "veselova", "A": [3, 2, 1], "q": [0.6, 0.0, 0.8], "q_dot": [0.8, 1.0, -0.6]}
-GOOD: dict[str, Any] = {"problem": GOOD_PROBLEM, "times": [0, 1]}
+
+#: The longest budget that a server gives unless told otherwise: what is not about budgets shall not depend on the machine.
+BUDGET_S = 60.0
+
+GOOD: dict[str, Any] = {"problem": GOOD_PROBLEM, "times": [0, 1], "budget_s": BUDGET_S}
 
 
 def changed(**fields: Any) -> str:

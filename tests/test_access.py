@@ -19,7 +19,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from conftest import Server, running_server
+from conftest import PATIENCE, Server, running_server
 from hostile import GOOD
 from test_http import is_problem
 from veselova import Client, InvalidInput, ProblemResponse, Veselova
@@ -32,7 +32,7 @@ PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["
 def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder / "data")}
     command = [sys.executable, "-m", "veselova", "keys", *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
 
 
 def new_key(folder: Path, name: str) -> dict[str, str]:
@@ -44,7 +44,7 @@ def new_key(folder: Path, name: str) -> dict[str, str]:
 
 def get(server: Server, path: str = "/v1/systems", key: str | None = None, **headers: str) -> httpx2.Response:
     shown = {} if key is None else {"authorization": f"Bearer {key}"}
-    return httpx2.get(f"{server.url}{path}", headers={**shown, **headers})
+    return server.get(path, headers={**shown, **headers})
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def test_a_request_with_a_key_is_answered_and_one_without_is_refused(guarded: Se
 def test_what_is_no_key_of_the_server_is_refused(guarded: Server, key: str, shown: str) -> None:
     other = key[:17] + "A" * 43
     headers = {"authorization": shown.format(key=key, short=key[:-1], other=other).encode("latin-1")}
-    response = httpx2.get(f"{guarded.url}/v1/systems", headers=headers)
+    response = guarded.get("/v1/systems", headers=headers)
     document = is_problem(response, 401, "unauthorized")
     assert response.headers["www-authenticate"] == 'Bearer realm="veselova", error="invalid_token"'
     assert key[17:] not in document["detail"]
@@ -118,7 +118,7 @@ def test_what_is_no_key_of_the_server_is_refused(guarded: Server, key: str, show
 
 def test_two_authorizations_are_none(guarded: Server, key: str) -> None:
     headers = [("authorization", f"Bearer {key}"), ("authorization", f"Bearer {key}")]
-    is_problem(httpx2.get(f"{guarded.url}/v1/systems", headers=headers), 401, "unauthorized")
+    is_problem(guarded.get("/v1/systems", headers=headers), 401, "unauthorized")
 
 
 def test_a_revoked_key_is_refused_from_the_next_request_on(guarded: Server, folder: Path) -> None:
@@ -271,7 +271,7 @@ def test_pages_of_other_origins_are_not_invited(server: Server) -> None:
     assert response.status_code == 200
     assert not [name for name in response.headers if name.startswith("access-control")]
     asked = {"origin": "https://a.example", "access-control-request-method": "POST"}
-    is_problem(httpx2.options(f"{server.url}/v1/tori", headers=asked), 405, "method-not-allowed")
+    is_problem(server.ask("OPTIONS", "/v1/tori", headers=asked), 405, "method-not-allowed")
 
 
 def test_pages_of_stated_origins_are(guarded: Server, key: str) -> None:
@@ -280,11 +280,11 @@ def test_pages_of_stated_origins_are(guarded: Server, key: str) -> None:
         "access-control-request-method": "POST",
         "access-control-request-headers": "authorization, content-type",
     }
-    allowed = httpx2.options(f"{guarded.url}/v1/tori", headers=asked)
+    allowed = guarded.ask("OPTIONS", "/v1/tori", headers=asked)
     assert allowed.status_code == 200
     assert allowed.headers["access-control-allow-origin"] == "https://b.example"
     assert "access-control-allow-credentials" not in allowed.headers
-    refused = httpx2.options(f"{guarded.url}/v1/tori", headers={**asked, "origin": "https://c.example"})
+    refused = guarded.ask("OPTIONS", "/v1/tori", headers={**asked, "origin": "https://c.example"})
     assert refused.status_code == 400
     assert "access-control-allow-origin" not in refused.headers
     for shown in (None, key):  # a page may read why it was refused, too
@@ -345,7 +345,7 @@ def test_a_setting_that_says_nothing_is_refused_at_the_start(name: str, value: s
     variable = f"VESELOVA_{name.upper()}"
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), variable: value}
     command = [sys.executable, "-m", "veselova", "serve", "--port", "0", *(["--require-keys"] if name == "database_url" else [])]
-    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
     assert answer.returncode == 2
     assert answer.stderr.startswith(f"veselova: {variable}: required ")
     assert answer.stderr.count("\n") == 1
@@ -377,7 +377,7 @@ def test_a_database_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> Non
 
 def test_settings_that_contradict_each_other_are_refused() -> None:
     command = [sys.executable, "-m", "veselova", "serve", "--require-keys", "--insecure"]
-    answer = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert answer.returncode == 2
     assert "--insecure: required one of --require-keys and --insecure; given both." in answer.stderr
 

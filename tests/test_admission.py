@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
 
-from conftest import Server, running_server
+from conftest import Server, running_server, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova.mechanics.errors import InvalidInput
@@ -109,13 +108,6 @@ def spooled(server: Server) -> list[str]:
         except FileNotFoundError:
             continue
     return [link for link in links if "spool" in link and "deleted" in link]
-
-
-def wait_until(condition: Any) -> None:
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_an_answer_is_let_go_when_its_client_leaves_in_the_middle(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 import stamina
 
 from conftest import Server
-from hostile import GOOD
+from hostile import BUDGET_S, GOOD
 from problems import tagged
 from veselova import (
     AsyncClient,
@@ -30,6 +30,7 @@ from veselova import (
     solve,
     torus,
 )
+from veselova.service import dispatch
 from veselova.service.download import MEDIA_TYPES
 from veselova.service.formats import FORMATS
 
@@ -47,7 +48,7 @@ def fast_retries() -> Any:
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
 def test_a_trajectory_comes_back_as_the_library_gives_it(server: Server, engine: str) -> None:
     with Client(server.url) as client:
-        found = client.trajectory(PROBLEM, TIMES, engine)
+        found = client.trajectory(PROBLEM, TIMES, engine, budget_s=BUDGET_S)
     expected = solve(PROBLEM, TIMES, engine)
     assert isinstance(found, Trajectory)
     for name in PROBLEM.outputs:
@@ -62,14 +63,14 @@ def test_problems_travel_exactly(server: Server) -> None:
         problem = next(case for case in tagged("generic") if case.name == name).problem()
         for method in ("theta", "nufft", "angles"):
             with Client(server.url) as client:
-                found = client.trajectory(problem, [1.0, 2.0], method=method)
+                found = client.trajectory(problem, [1.0, 2.0], method=method, budget_s=BUDGET_S)
             assert found.provenance.method == method
             assert np.array_equal(found.frame, solve(problem, [1.0, 2.0], method=method).frame)
 
 
 def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
     with Client(server.url) as client:
-        found = client.trajectory(GOOD["problem"], {"start": 0, "stop": 1, "count": 3})
+        found = client.trajectory(GOOD["problem"], {"start": 0, "stop": 1, "count": 3}, budget_s=BUDGET_S)
         assert found.times.tolist() == [0, 0.5, 1]
         with pytest.raises(InvalidRequest):
             client.trajectory({**GOOD["problem"], "mass": 1}, [0, 1])
@@ -79,7 +80,7 @@ def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
 
 def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
     with Client(server.url) as client:
-        comparison, found = client.compare(PROBLEM, TIMES, "taylor"), client.torus(PROBLEM)
+        comparison, found = client.compare(PROBLEM, TIMES, "taylor", budget_s=BUDGET_S), client.torus(PROBLEM, budget_s=BUDGET_S)
     assert comparison.agrees
     assert comparison.deviation["frame"] == compare(PROBLEM, TIMES, "taylor").deviation["frame"]
     expected = torus(PROBLEM)
@@ -90,8 +91,9 @@ def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
 def test_the_asynchronous_client_has_the_same_methods(server: Server) -> None:
     async def ask() -> Any:
         async with AsyncClient(server.url) as client:
-            motions = client.trajectory(PROBLEM, TIMES), client.trajectory(PROBLEM, [5.0])
-            return await asyncio.gather(client.compare(PROBLEM, TIMES), client.torus(PROBLEM), *motions)
+            motions = [client.trajectory(PROBLEM, times, budget_s=BUDGET_S) for times in (TIMES, [5.0])]
+            others = client.compare(PROBLEM, TIMES, budget_s=BUDGET_S), client.torus(PROBLEM, budget_s=BUDGET_S)
+            return await asyncio.gather(*others, *motions)
 
     comparison, found, trajectory, later = asyncio.run(ask())
     assert np.array_equal(trajectory.frame, solve(PROBLEM, TIMES).frame)
@@ -215,6 +217,14 @@ def test_timeouts_follow_the_budget() -> None:
     assert script.timeouts[0]["connect"] == 10
 
 
+def test_the_end_of_a_job_is_waited_for_as_long_as_the_server_may_take() -> None:
+    script = Script(200, 200)
+    with Client("http://server", transport=httpx2.MockTransport(script)) as client:
+        client.job("some").cancel()
+        client.job("some").remove()
+    assert all(timeout["read"] > 2 * dispatch._PATIENCE_S for timeout in script.timeouts)
+
+
 @pytest.mark.parametrize("body", [b"<html>busy</html>", b"[]", b"\xff"])
 def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: bytes) -> None:
     transport = httpx2.MockTransport(lambda request: httpx2.Response(502, content=body))
@@ -263,12 +273,12 @@ def test_downloads_are_the_files_of_the_library(server: Server, kind: str, async
 
         async def fetch() -> Any:
             async with AsyncClient(server.url) as client:
-                return await client.download(PROBLEM, TIMES, path, kind, **options)
+                return await client.download(PROBLEM, TIMES, path, kind, budget_s=BUDGET_S, **options)
 
         provenance = asyncio.run(fetch())
     else:
         with Client(server.url) as client:
-            provenance = client.download(PROBLEM, TIMES, str(path), kind, **options)
+            provenance = client.download(PROBLEM, TIMES, str(path), kind, budget_s=BUDGET_S, **options)
     expected = solve(PROBLEM, TIMES, "numeric")
     assert provenance.details == expected.provenance.details
     assert np.array_equal(read_table(path)["tau1"], expected.tau1)
@@ -292,7 +302,7 @@ def read_table(path: Path) -> Any:
 def test_a_download_goes_to_an_open_stream_too(server: Server) -> None:
     stream = io.BytesIO()
     with Client(server.url) as client:
-        client.download(PROBLEM, TIMES, stream)
+        client.download(PROBLEM, TIMES, stream, budget_s=BUDGET_S)
     assert np.array_equal(np.load(io.BytesIO(stream.getvalue()))["frame"], solve(PROBLEM, TIMES).frame)
 
 
@@ -330,7 +340,7 @@ def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sen
         (tmp_path / "x", "xls", "format"),
     ):
         with pytest.raises(InvalidInput, match=field):
-            client.download(PROBLEM, TIMES, target, kind)
+            client.download(PROBLEM, TIMES, target, kind, budget_s=BUDGET_S)
     with Client(server.url) as client, pytest.raises(ProblemResponse) as raised:
         client.download(PROBLEM, TIMES, tmp_path / "x.csv", "csv", outputs=["p"])
     assert raised.value.status == 422

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import trustme
 
-from conftest import free_port
+from conftest import PATIENCE, free_port
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.cluster import open_cluster
 from veselova.service.local_sweep import run_sweep
@@ -77,7 +77,7 @@ def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
 def test_every_connection_of_the_cluster_is_encrypted(cluster: dict[str, Any], tmp_path: Path) -> None:
     async def addresses() -> list[str]:
         async with open_cluster(Settings(data_dir=tmp_path, **cluster)) as client:
-            await client.wait_for_workers(2, timeout=60)
+            await client.wait_for_workers(2, timeout=PATIENCE)
             found = client.scheduler_info(n_workers=-1)
             return [found["address"], *found["workers"]]
 
@@ -89,7 +89,6 @@ def test_every_connection_of_the_cluster_is_encrypted(cluster: dict[str, Any], t
 def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("veselova.service.cluster._CONNECT_S", 3)
     stranger = {**cluster, **certificates(tmp_path / "another")}
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
@@ -100,6 +99,7 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     asyncio.run(connect(cluster))
     with pytest.raises(OSError, match="TLS certificate does not match"):
         asyncio.run(connect(stranger))
+    monkeypatch.setattr("veselova.service.cluster._CONNECT_S", 3)
     with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
         asyncio.run(connect(plain))
 

@@ -340,7 +340,7 @@ def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
 
 def test_the_service_answers_in_decimals(server: Server) -> None:
     with vs.Client(server.url) as client:
-        answer = client.trajectory(body3(), ["0.1", 2], digits=40, certified=True)
+        answer = client.trajectory(body3(), ["0.1", 2], digits=40, certified=True, budget_s=60)
     here = vs.solve(body3(), ["0.1", 2], digits=40, certified=True)
     assert answer.decimals is not None
     assert here.decimals is not None

@@ -11,10 +11,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import httpx2
 import pytest
 
-from conftest import Server
+from conftest import PATIENCE, Server
 from veselova import __version__
 
 ROOT = Path(__file__).parent.parent
@@ -48,7 +47,9 @@ def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:
     for command in commands[:-1]:
         words = shlex.split(command)
         assert words[0] == "veselova"
-        answer = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=120, env=environment)
+        answer = subprocess.run(
+            [sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=PATIENCE, env=environment
+        )
         assert answer.returncode == 0, answer.stderr
     assert (tmp_path / "motion.png").exists()
     assert (tmp_path / "motion.csv").exists()
@@ -57,7 +58,7 @@ def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:
 def test_the_request_of_the_readme_is_answered(server: Server) -> None:
     body = re.search(r"-d '(\{.*?\})'$", README, re.MULTILINE | re.DOTALL)
     assert body
-    response = httpx2.post(f"{server.url}/v1/trajectories", content=body[1], headers={"content-type": "application/json"})
+    response = server.ask("POST", "/v1/trajectories", content=body[1], headers={"content-type": "application/json"})
     assert response.status_code == 200
     assert list(response.json()["series"]) == ["q", "frame"]
 

@@ -24,7 +24,7 @@ import pytest
 from pyarrow import parquet
 
 import veselova
-from conftest import Server, free_port, running_server
+from conftest import PATIENCE, Server, free_port, running_server
 from test_http import is_problem, post
 
 BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
@@ -36,6 +36,7 @@ LONG = {
     "samples": 150,
     "times": {"start": 0, "stop": 9, "count": 1000},
     "outputs": ["q"],
+    "budget_s": 60,
 }
 
 BASE_FIELDS = ("problem", "vary")
@@ -48,16 +49,16 @@ def jobs_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def job(server: Server, link: str) -> dict[str, Any]:
-    response = httpx2.get(f"{server.url}{link}", timeout=30)
+    response = server.get(link)
     assert response.status_code == 200, response.text
     document: dict[str, Any] = response.json()
     return document
 
 
-def wait_for(server: Server, link: str, reached: Any, seconds: float = 120) -> dict[str, Any]:
+def wait_for(server: Server, link: str, reached: Any) -> dict[str, Any]:
     """Follow the events of a job until it has got somewhere."""
-    deadline = time.monotonic() + seconds
-    with httpx2.stream("GET", f"{server.url}{link}/events", timeout=30) as response:
+    deadline = time.monotonic() + PATIENCE
+    with httpx2.stream("GET", f"{server.url}{link}/events", timeout=PATIENCE) as response:
         assert response.headers["content-type"].startswith("text/event-stream")
         for line in response.iter_lines():
             if line.startswith("data: ") and reached(document := json.loads(line[6:])):
@@ -77,7 +78,7 @@ def half_way(document: dict[str, Any]) -> bool:
 
 
 def table(server: Server, link: str) -> list[dict[str, Any]]:
-    response = httpx2.get(f"{server.url}{link}/result", timeout=60)
+    response = server.get(f"{link}/result")
     assert response.status_code == 200, response.text
     rows: list[dict[str, Any]] = parquet.read_table(io.BytesIO(response.content)).to_pylist()
     return rows
@@ -88,7 +89,7 @@ def undisturbed(jobs_server: Server) -> bytes:
     """The result of the long sweep where nothing happens to it."""
     link = post(jobs_server, "/v1/sweeps", LONG).headers["location"]
     wait_for(jobs_server, link, finished)
-    return httpx2.get(f"{jobs_server.url}{link}/result", timeout=60).content
+    return jobs_server.get(f"{link}/result").content
 
 
 def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
@@ -104,9 +105,9 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
     document = job(jobs_server, link)
     assert document["request"]["vary"] == body["vary"]
     assert document["created_at"].endswith("+00:00")
-    packed = httpx2.get(f"{jobs_server.url}{document['links']['trajectories']}")
+    packed = jobs_server.get(f"{document['links']['trajectories']}")
     assert packed.headers["content-type"] == "application/zip"
-    assert link.endswith(httpx2.get(f"{jobs_server.url}/v1/jobs").json()["jobs"][0]["id"])
+    assert link.endswith(jobs_server.get("/v1/jobs").json()["jobs"][0]["id"])
     # The same request is the same job, finished already.
     again = post(jobs_server, "/v1/sweeps", body)
     assert (again.headers["location"], again.json()["state"]) == (link, "finished")
@@ -118,7 +119,7 @@ def test_a_job_whose_files_are_gone_is_run_again(jobs_server: Server) -> None:
     wait_for(jobs_server, link, finished)
     expected = table(jobs_server, link)
     shutil.rmtree(jobs_server.log.parent / "data" / "jobs" / link.rsplit("/", 1)[1])
-    is_problem(httpx2.get(f"{jobs_server.url}{link}/result"), 404, "no-such-resource")
+    is_problem(jobs_server.get(f"{link}/result"), 404, "no-such-resource")
     assert post(jobs_server, "/v1/sweeps", body).json()["state"] == "queued"
     wait_for(jobs_server, link, finished)
     assert table(jobs_server, link) == expected
@@ -183,7 +184,7 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
 
 def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
     for path, methods in (("/v1/jobs/x", "DELETE, GET"), ("/v1/trajectories/x", "GET, HEAD"), ("/v1/tori", "POST")):
-        assert httpx2.put(f"{jobs_server.url}{path}").headers["allow"] == methods
+        assert jobs_server.ask("PUT", path).headers["allow"] == methods
 
 
 def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
@@ -191,31 +192,31 @@ def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
     assert fault["errors"][0]["pointer"] == "/vary/~1B"
     is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [1]}, "budget_s": 1e6}), 422, "invalid-input")
     for path in ("", "/events", "/result", "/trajectories"):
-        is_problem(httpx2.get(f"{jobs_server.url}/v1/jobs/none{path}"), 404, "no-such-job")
-    is_problem(httpx2.delete(f"{jobs_server.url}/v1/jobs/none"), 404, "no-such-job")
+        is_problem(jobs_server.get(f"/v1/jobs/none{path}"), 404, "no-such-job")
+    is_problem(jobs_server.ask("DELETE", "/v1/jobs/none"), 404, "no-such-job")
 
 
 def test_a_job_is_cancelled_resumed_and_removed(jobs_server: Server, undisturbed: bytes) -> None:
     body = {**LONG, "seed": 1}
     link = post(jobs_server, "/v1/sweeps", body).headers["location"]
     wait_for(jobs_server, link, half_way)
-    is_problem(httpx2.get(f"{jobs_server.url}{link}/result"), 409, "not-finished")
-    cancelled = httpx2.delete(f"{jobs_server.url}{link}", timeout=60).json()
+    is_problem(jobs_server.get(f"{link}/result"), 409, "not-finished")
+    cancelled = jobs_server.ask("DELETE", link).json()
     assert cancelled["state"] == "cancelled"
     assert 0 < cancelled["done"] < 300
     assert job(jobs_server, link)["done"] == cancelled["done"]  # nothing goes on behind it
     resumed = post(jobs_server, "/v1/sweeps", body)
     assert resumed.headers["location"] == link
     assert resumed.json()["done"] == cancelled["done"]
-    assert httpx2.delete(f"{jobs_server.url}{link}?remove=true", timeout=60).status_code == 204
-    is_problem(httpx2.get(f"{jobs_server.url}{link}"), 404, "no-such-job")
+    assert jobs_server.ask("DELETE", f"{link}?remove=true").status_code == 204
+    is_problem(jobs_server.get(link), 404, "no-such-job")
 
 
 def test_a_job_that_is_cancelled_while_the_workers_start_leaves_none(tmp_path: Path) -> None:
     with running_server(tmp_path, sweep_workers="2") as server:
         link = post(server, "/v1/sweeps", LONG).headers["location"]
         wait_for(server, link, lambda document: document["state"] == "running")
-        assert httpx2.delete(f"{server.url}{link}", timeout=60).json()["state"] == "cancelled"
+        assert server.ask("DELETE", link).json()["state"] == "cancelled"
         commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in server.workers()]
         assert not [command for command in commands if "spawn_main" in command]
 
@@ -228,7 +229,7 @@ def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: byte
         victim = max(set(server.workers()) - before)
         os.kill(victim, signal.SIGKILL)
         wait_for(server, link, finished)
-        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+        assert server.get(f"{link}/result").content == undisturbed
 
 
 def test_the_death_of_the_server_loses_no_finished_chunk(tmp_path: Path, undisturbed: bytes) -> None:
@@ -249,7 +250,7 @@ def test_the_death_of_the_server_loses_no_finished_chunk(tmp_path: Path, undistu
         wait_for(server, link, lambda document: document["done"] > 100 or finished(document))
         assert dates == [path.stat().st_mtime_ns for path in kept]
         wait_for(server, link, finished)
-        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+        assert server.get(f"{link}/result").content == undisturbed
 
 
 def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undisturbed: bytes) -> None:
@@ -265,13 +266,13 @@ def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undistur
         assert refused.headers["retry-after"]
         holder.execute("ROLLBACK")
         wait_for(server, link, finished)
-        assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+        assert server.get(f"{link}/result").content == undisturbed
 
 
 def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     with running_server(tmp_path, awaited="/healthz", data_dir=str(tmp_path / "file")) as server:
-        assert "Jobs cannot be stored" in is_problem(httpx2.get(f"{server.url}/readyz"), 503, "not-ready")["detail"]
+        assert "Jobs cannot be stored" in is_problem(server.get("/readyz"), 503, "not-ready")["detail"]
         assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
         refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
         assert "Jobs cannot be stored at present" in is_problem(refused, 503, "storage-unavailable")["detail"]
@@ -299,7 +300,7 @@ def test_a_cluster_that_was_started_elsewhere_computes_the_same(tmp_path: Path, 
             wait_for(server, link, half_way)
         with dask(*scheduler), dask(*worker), dask(*worker):
             wait_for(server, link, finished)
-            assert httpx2.get(f"{server.url}{link}/result").content == undisturbed
+            assert server.get(f"{link}/result").content == undisturbed
 
 
 @pytest.mark.parametrize(
@@ -316,7 +317,7 @@ def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(
 ) -> None:
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), **{f"VESELOVA_{k.upper()}": v for k, v in settings.items()}}
     command = [sys.executable, "-m", "veselova", "serve", "--port", "0"]
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60, check=False)
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE, check=False)
     assert answer.returncode == 2
     assert message in answer.stderr
     assert "secret" not in answer.stderr

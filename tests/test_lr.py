@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import httpx2
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -432,8 +431,13 @@ def test_the_example_is_solved_on_the_command_line() -> None:
 
 
 def test_the_service_answers_and_refuses_like_python(server: Server) -> None:
-    request = json.loads(EXAMPLE.read_text()) | {"times": [0, 1], "method": "taylor", "formulation": "multipliers"}
-    answer = httpx2.post(f"{server.url}/v1/trajectories", json=request).json()
+    request = json.loads(EXAMPLE.read_text()) | {
+        "times": [0, 1],
+        "method": "taylor",
+        "formulation": "multipliers",
+        "budget_s": 60,
+    }
+    answer = server.ask("POST", "/v1/trajectories", json=request).json()
     assert answer["provenance"]["details"]["formulation"] == "multipliers"
     assert np.array(answer["series"]["multipliers"]).shape == (2, 1)
     changes: dict[str, tuple[Any, str]] = {
@@ -444,6 +448,6 @@ def test_the_service_answers_and_refuses_like_python(server: Server) -> None:
     }
     for field, (value, pointer) in changes.items():
         body = {**request, "problem": {**request["problem"], field: value}}
-        response = httpx2.post(f"{server.url}/v1/trajectories", json=body)
+        response = server.ask("POST", "/v1/trajectories", json=body)
         assert response.status_code == 422
         assert response.json()["errors"][0]["pointer"] == pointer

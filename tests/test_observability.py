@@ -6,7 +6,9 @@ import asyncio
 import io
 import json
 import logging
+import os
 import re
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -21,7 +23,7 @@ import pytest
 from fastapi import FastAPI
 from prometheus_client.parser import text_string_to_metric_families
 
-from conftest import Server, running_server
+from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova.service.app import create_app
@@ -45,19 +47,18 @@ def lines(server: Server) -> list[dict[str, Any]]:
 
 def line_of(server: Server, response: httpx2.Response) -> dict[str, Any]:
     """Return the one line that the server wrote of a request, once it is there."""
-    deadline = time.monotonic() + 10
-    while time.monotonic() < deadline:
-        found = [line for line in lines(server) if line.get("request_id") == response.headers["x-request-id"]]
-        if found:
-            assert len(found) == 1
-            return found[0]
-        time.sleep(0.02)
-    raise AssertionError("no line")
+
+    def found() -> list[dict[str, Any]]:
+        return [line for line in lines(server) if line.get("request_id") == response.headers["x-request-id"]]
+
+    wait_until(found)
+    (line,) = found()
+    return line
 
 
 def numbers(server: Server) -> dict[tuple[str, ...], float]:
     """Return the metrics: (name, value of every label in the order of label names) → number."""
-    text = httpx2.get(f"{server.url}/metrics").text
+    text = server.get("/metrics").text
     return samples(text)
 
 
@@ -105,23 +106,23 @@ def test_every_line_is_json_those_of_the_server_library_too(own: Server) -> None
 
 
 def test_ids_of_clients_are_echoed_and_others_are_made(own: Server) -> None:
-    answer = httpx2.get(f"{own.url}/v1/systems", headers={"x-request-id": "run-7.part_2"})
+    answer = own.get("/v1/systems", headers={"x-request-id": "run-7.part_2"})
     assert answer.headers["x-request-id"] == "run-7.part_2"
     assert line_of(own, answer)["outcome"] == "answered"
-    made = {httpx2.get(f"{own.url}/v1/systems").headers["x-request-id"] for _ in range(3)}
+    made = {own.get("/v1/systems").headers["x-request-id"] for _ in range(3)}
     assert len(made) == 3
 
 
 @pytest.mark.parametrize("given", ["two words", "x" * 65, '"}{', "<script>", "é".encode("latin-1"), "a,b"])
 def test_an_id_that_could_harm_a_log_is_replaced(own: Server, given: Any) -> None:
-    answer = httpx2.get(f"{own.url}/v1/systems", headers={"x-request-id": given})
+    answer = own.get("/v1/systems", headers={"x-request-id": given})
     assert answer.status_code == 200
     assert len(answer.headers["x-request-id"]) == 32
     assert line_of(own, answer)["status"] == 200
 
 
 def test_a_path_cannot_write_lines_of_its_own(own: Server) -> None:
-    answer = httpx2.get(f"{own.url}/none%0A%7B%22event%22%3A%22forged%22%7D%1b[31m" + "x" * 500)
+    answer = own.get("/none%0A%7B%22event%22%3A%22forged%22%7D%1b[31m" + "x" * 500)
     line = line_of(own, answer)
     assert "route" not in line
     assert line["path"].startswith("/none%0A%7B")
@@ -132,7 +133,7 @@ def test_a_path_cannot_write_lines_of_its_own(own: Server) -> None:
 def test_no_secret_is_logged(own: Server) -> None:
     secret = "vsl_0123456789ab_" + "S" * 43
     headers = {"authorization": f"Bearer {secret}", "cookie": "session=TTTTTTTT"}
-    answer = httpx2.get(f"{own.url}/v1/systems?token=UUUUUUUU", headers=headers)
+    answer = own.get("/v1/systems?token=UUUUUUUU", headers=headers)
     assert line_of(own, answer)
     log = own.log.read_text()
     assert not [part for part in ("SSSSSSSS", "TTTTTTTT", "UUUUUUUU") if part in log]
@@ -174,7 +175,7 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
     post(own, "/v1/trajectories", {**GOOD, "times": [1e40]})
     post(own, "/v1/tori", {"problem": GOOD["problem"]})
     post(own, "/v1/tori", b"{", accept="text/html")
-    httpx2.get(f"{own.url}/nowhere-{time.time()}")
+    own.get(f"/nowhere-{time.time()}")
     after = numbers(own)
     grown = {name: after[name] - before.get(name, 0) for name in after if after[name] != before.get(name, 0)}
     assert grown[("veselova_outcomes_total", "analytic", "trajectory", "solved")] == 1
@@ -195,17 +196,19 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
 
 def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     assert numbers(own)[("veselova_workers",)] == 1
-    threads = [threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": 4})) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    seen = set()
-    while any(thread.is_alive() for thread in threads):
-        now = numbers(own)
-        seen.add((now[("veselova_workers_busy",)], now[("veselova_queue_length",)]))
-    assert (1, 1) in seen
-    now = numbers(own)
-    assert (now[("veselova_workers_busy",)], now[("veselova_queue_length",)]) == (0, 0)
-    assert now[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] >= 2
+    before = numbers(own)
+    works, waits = (threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": s})) for s in (60, 3))
+    works.start()
+    wait_until(lambda: own.at_work() == (1, 0))
+    waits.start()
+    wait_until(lambda: own.at_work() == (1, 1))
+    waits.join(PATIENCE)
+    os.kill(own.workers()[0], signal.SIGKILL)
+    works.join(PATIENCE)
+    assert own.at_work() == (0, 0)
+    grown = {key: value - before.get(key, 0) for key, value in numbers(own).items()}
+    assert grown[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] == 1
+    assert grown[("veselova_outcomes_total", "numeric", "trajectory", "worker-lost")] == 1
 
 
 def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
@@ -296,7 +299,7 @@ assert {f"{span.context.trace_id:x}" for span in spans} == {"a" * 32}, spans
 assert "GET /v1/systems" in {span.name for span in spans}, [span.name for span in spans]
 assert not any("SSSS" in span.to_json() for span in spans)
 """
-    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE)
     assert answer.returncode == 0, answer.stderr
 
 
@@ -306,6 +309,6 @@ def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) ->
     assert settings >= {"KEYS", "RATE_LIMIT", "LOG_FORMAT"}
     assert {name.lower() for name in settings} <= set(Settings.model_fields)
     metrics = set(re.findall(r"`((?:veselova|http)_\w+)`", text))
-    shown = httpx2.get(f"{own.url}/metrics").text
+    shown = own.get("/metrics").text
     assert len(metrics) > 8
     assert not [name for name in metrics if f"# TYPE {name.removesuffix('_total')}" not in shown]

@@ -9,6 +9,7 @@ from typing import Any
 
 import anyio
 
+from conftest import PATIENCE
 from veselova.service.cache import Cache
 from veselova.service.pending import Pending
 
@@ -22,7 +23,7 @@ class SlowCache(Cache):
         self.goes.set()
 
     def write(self, contents: Mapping[str, bytes]) -> dict[str, int]:
-        assert self.goes.wait(20)
+        assert self.goes.wait(PATIENCE)
         return super().write(contents)
 
 
@@ -33,7 +34,7 @@ def content_of(cache: Cache, name: str) -> bytes | None:
 
 async def written(pending: Pending, name: str) -> None:
     """Wait until an entry is on its way no more."""
-    with anyio.fail_after(20):
+    with anyio.fail_after(PATIENCE):
         while pending.find(name) is not None:
             await anyio.sleep(0.01)
 
@@ -99,7 +100,7 @@ def test_an_entry_that_cannot_be_written_stays_and_those_after_it_are_not_promis
             folder.rmdir()
             folder.write_text("a file in its place")
             assert await pending.keep("promised", b"2")
-            with anyio.fail_after(20):
+            with anyio.fail_after(PATIENCE):
                 while "answers are not cached" not in caplog.text:
                     await anyio.sleep(0.01)
             for _ in range(2):

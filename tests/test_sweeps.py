@@ -25,6 +25,7 @@ from distributed import Nanny
 from pyarrow import parquet
 
 import veselova as vs
+from conftest import PATIENCE
 from veselova.analytic.solution import Solution
 from veselova.mechanics.errors import InvalidRequest, Unsolved
 from veselova.service import dispatch
@@ -259,7 +260,7 @@ def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch:
         raise ZeroDivisionError
 
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, budget_s=0.4)
+    sweep = request(problem=plain, budget_s=1)
     expected = rows(sweep, 0, 2)
     for failure in (broken, lambda *_: _for_ever()):
         monkeypatch.setattr("veselova.analytic.tori.tori", failure)
@@ -467,7 +468,7 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
 
     def held(self: Jobs, *arguments: Any) -> None:
         storing.set()
-        go_on.wait(30)
+        go_on.wait(PATIENCE)
         store(self, *arguments)
 
     monkeypatch.setattr(Jobs, "store", held)
@@ -475,7 +476,7 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
     async def run() -> None:
         sweeps = running.Sweeps(settings, jobs, processes=False)
         sweeps.begin(job.id)
-        await asyncio.to_thread(storing.wait, 30)
+        await asyncio.to_thread(storing.wait, PATIENCE)
         cancelling = asyncio.create_task(sweeps.cancel(job.id))
         while not jobs.get(job.id).ended:
             await asyncio.sleep(0.01)
@@ -631,7 +632,7 @@ def test_the_command_line_sweeps(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "veselova", "sweep", str(file), "--folder", str(tmp_path / "kept")]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([*command, *more], capture_output=True, text=True, timeout=120, check=False)
+        return subprocess.run([*command, *more], capture_output=True, text=True, timeout=PATIENCE, check=False)
 
     answer = run("--json", "--output", str(tmp_path / "table.csv"))
     assert answer.returncode == 0, answer.stderr

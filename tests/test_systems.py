@@ -7,7 +7,6 @@ import pickle
 from pathlib import Path
 from typing import Any
 
-import httpx2
 import numpy as np
 import orjson
 import pytest
@@ -106,17 +105,17 @@ def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path)
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
-    body = {"problem": document(name), "times": TIMES}
-    response = httpx2.post(f"{server.url}/v1/trajectories", json=body)
+    body = {"problem": document(name), "times": TIMES, "budget_s": 60}
+    response = server.ask("POST", "/v1/trajectories", json=body)
     assert response.status_code == 200, response.text
     problem = problem_of(name)
     assert list(response.json()["series"]) == list(problem.outputs)
     with Client(server.url) as client:
-        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1])
+        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1], budget_s=60)
     expected = solve(problem, TIMES, "numeric", formulation=problem.formulations[-1])
     assert np.array_equal(found.series(problem.portrait), expected.series(problem.portrait))
     assert found.provenance.details["formulation"] == problem.formulations[-1]
-    listed = {item["system"]: item for item in httpx2.get(f"{server.url}/v1/systems").json()["systems"]}
+    listed = {item["system"]: item for item in server.get("/v1/systems").json()["systems"]}
     assert listed[name]["outputs"] == list(problem.outputs)
     assert set(listed[name]["fields"]) >= set(PROBLEMS[name])
 

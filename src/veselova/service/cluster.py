@@ -88,6 +88,10 @@ def _configuration(niceness: int) -> dict[str, Any]:
         "distributed.worker.memory.pause": False,
         "distributed.scheduler.allowed-failures": 2,
         "distributed.comm.timeouts.connect": _CONNECT_S,
+        # As often as Dask looks after itself by default, a cluster without work takes a seventh of a processor.
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.system-monitor.interval": "10s",
+        "distributed.worker.memory.monitor-interval": "500ms",
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.worker.profile.enabled": False,
         # A worker that replaces another is started in the same way.

@@ -25,6 +25,9 @@ __all__ = ["Flow", "Pause", "RemoteJob", "sweep_flow"]
 #: Seconds that a finished table may be prepared before its first byte.
 _PREPARATION_S = 60.0
 
+#: Seconds that a server may take to end what its workers are in the midst of: a worker that does not say where it is has 20.
+_ENDING_S = 60.0
+
 #: Seconds between two questions how far a job is, from the first to the longest.
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 2.0
 
@@ -66,11 +69,11 @@ class RemoteJob:
 
     def cancel(self) -> Any:
         """Stop the job, keeping what is done, and return its document; the same sweep asked for again goes on from there."""
-        return self._client.run(self._one(Call(self._link(), None, 0.0, dict, method="DELETE")))
+        return self._client.run(self._one(Call(self._link(), None, _ENDING_S, dict, method="DELETE")))
 
     def remove(self) -> Any:
         """Stop the job and forget it, with its results."""
-        return self._client.run(self._one(Call(self._link("?remove=true"), None, 0.0, lambda _: None, method="DELETE")))
+        return self._client.run(self._one(Call(self._link("?remove=true"), None, _ENDING_S, lambda _: None, method="DELETE")))
 
     def download(self, target: Target) -> Any:
         """Write the table, as Parquet, to a path or a binary stream when the job has finished."""
