@@ -27,6 +27,11 @@ settings.load_profile("default")
 PATIENCE = 300.0
 
 
+def slow(*values: Any) -> Any:
+    """Return a row of a parametrized test that runs only where all tests do (./check --slow)."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """A generator with a fixed seed: every run sees the same random input."""

@@ -164,6 +164,7 @@ def test_beyond_loopback_keys_are_required(tmp_path: Path) -> None:
         assert get(own, key=new_key(tmp_path, "Ada")["key"]).status_code == 200
 
 
+@pytest.mark.slow
 def test_whoever_wants_no_keys_beyond_loopback_says_so(tmp_path: Path) -> None:
     with running_server(tmp_path, "--host", "0.0.0.0", "--insecure") as own:
         assert get(own).status_code == 200
@@ -204,6 +205,7 @@ def test_without_keys_addresses_are_counted_and_forwarded_ones_are_not_believed(
         assert forwarded == [200, 200, 429]
 
 
+@pytest.mark.slow
 def test_a_trusted_proxy_tells_the_address(tmp_path: Path) -> None:
     with running_server(tmp_path, "--forwarded-allow-ips", "127.0.0.1", rate_limit="1/hour", log_level="debug") as own:
         assert [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in (1, 1, 2)] == [200, 429, 200]

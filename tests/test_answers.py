@@ -15,7 +15,7 @@ import pytest
 import zstandard
 from pyarrow import ipc, parquet
 
-from conftest import PATIENCE, Server, running_server, wait_until
+from conftest import PATIENCE, Server, running_server, slow, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova import Trajectory, Veselova, solve
@@ -214,7 +214,7 @@ def kept_files(folder: Path) -> list[Path]:
     return sorted((folder / "data" / "cache").glob("*.kept"))
 
 
-@pytest.mark.parametrize("damage", ["flipped", "truncated", "emptied"])
+@pytest.mark.parametrize("damage", ["flipped", slow("truncated"), slow("emptied")])
 def test_a_damaged_entry_is_removed_and_computed_again(tmp_path: Path, damage: str) -> None:
     with running_server(tmp_path, workers="1") as own:
         made = post(own, "/v1/trajectories", GOOD)
@@ -247,6 +247,7 @@ def test_an_answer_can_be_had_again_at_once_and_is_on_the_disk_when_the_server_h
         assert get(f"{other.url}{last.headers['content-location']}").content == last.content
 
 
+@pytest.mark.slow
 def test_servers_share_what_they_keep(tmp_path: Path) -> None:
     shared = str(tmp_path / "data")
     for name in ("one", "two"):
@@ -257,7 +258,7 @@ def test_servers_share_what_they_keep(tmp_path: Path) -> None:
             assert get(f"{two.url}{made.headers['content-location']}").content == made.content
 
 
-@pytest.mark.parametrize("obstacle", ["a file in its place", "a folder that is too small", "no size at all"])
+@pytest.mark.parametrize("obstacle", ["a file in its place", slow("a folder that is too small"), slow("no size at all")])
 def test_without_a_cache_answers_are_the_same(tmp_path: Path, obstacle: str) -> None:
     (tmp_path / "data").mkdir()
     if obstacle == "a file in its place":

@@ -92,9 +92,15 @@ def solve_good() -> Any:
 
 @pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".arrow", ".json"])
 def test_motions_are_written_to_files(suffix: str, tmp_path: Path) -> None:
-    answer = run("solve", "-", "--output", f"motion{suffix}", "--plot", "motion.svg", stdin=request(), cwd=tmp_path)
+    answer = run("solve", "-", "--output", f"motion{suffix}", stdin=request(), cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
     assert (tmp_path / f"motion{suffix}").stat().st_size > 200
+
+
+def test_a_motion_is_plotted_beside_its_file(tmp_path: Path) -> None:
+    answer = run("solve", "-", "--output", "motion.npz", "--plot", "motion.svg", stdin=request(), cwd=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    assert (tmp_path / "motion.npz").exists()
     assert (tmp_path / "motion.svg").stat().st_size > 1000
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import slow
 from truth import true_motion
 from veselova.analytic.balls import balls
 from veselova.analytic.drift import Drift, expected_growth
@@ -102,7 +103,7 @@ def test_a_separatrix_is_not_certified() -> None:
     assert caught.value.outcome == "not-enclosed"
 
 
-@pytest.mark.parametrize("digits", [62, 150, 210])
+@pytest.mark.parametrize("digits", [62, slow(150), slow(210)])
 def test_coincidences_keep_to_the_digits_asked_for(digits: int) -> None:
     """Equal A's, a separatrix, and a coordinate of 1e-150, which is no zero from there on."""
     for problem in (SYMMETRIC, TINY):

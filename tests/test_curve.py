@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from conftest import slow
 from draws import random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova
@@ -119,7 +120,7 @@ def nodal_integral(curve: Curve, interval: Interval, k: int) -> Any:
         return mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 5))
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 6])
+@pytest.mark.parametrize("n", [2, 3, 4, slow(6)])
 def test_periods_agree_with_another_quadrature(n: int, rng: np.random.Generator) -> None:
     periods = Periods(curve_of(random_problem(rng, n, 5.0)))
     for intervals in (periods.cuts, periods.gaps):

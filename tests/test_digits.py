@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, slow
 from draws import random_problem
 from problems import Case, tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
@@ -67,7 +67,7 @@ def test_more_digits_confirm_those_promised(n: int, rng: np.random.Generator) ->
         assert np.all(np.abs(found.midpoints[name] - finer.midpoints[name]) <= found.radii[name] + finer.radii[name]), name
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> None:
     """Proven radii hold what many more digits give, and the ordinary error estimate is no smaller than what is proven."""
     problem = random_problem(rng, n)
@@ -85,6 +85,7 @@ def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> No
     assert np.all(true_error <= ordinary.error)
 
 
+@pytest.mark.slow
 def test_thirty_digits_at_a_million_million() -> None:
     times = ["1e12", Fraction(10**12) + Fraction(1, 3)]
     found, finer = (vs.solve(body3(), times, digits=digits) for digits in (30, 36))
@@ -122,6 +123,7 @@ def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
     assert caught.value.outcome == "too-far"
 
 
+@pytest.mark.slow
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
     solution = EnclosedSolution(Solution(body3()), 45, False, "angles")

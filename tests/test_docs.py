@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from conftest import PATIENCE, Server
+from conftest import PATIENCE, Server, slow
 from veselova import __version__
 
 ROOT = Path(__file__).parent.parent
@@ -39,20 +39,20 @@ def test_the_python_of_the_readme_runs(server: Server, tmp_path: Path, monkeypat
     assert scope["body"].system == "veselova-so3"
 
 
-def test_the_commands_of_the_readme_run(tmp_path: Path) -> None:
+COMMANDS = next(block for block in blocks(README, "sh") if "veselova demo" in block).splitlines()
+
+
+@pytest.mark.parametrize("command", [slow(line) if "bench" in line else line for line in COMMANDS if "serve" not in line])
+def test_the_commands_of_the_readme_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
-    commands = next(block for block in blocks(README, "sh") if "veselova demo" in block).splitlines()
-    assert commands[-1] == "veselova serve"
-    for command in commands[:-1]:
-        words = shlex.split(command)
-        assert words[0] == "veselova"
-        answer = subprocess.run(
-            [sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=PATIENCE, env=environment
-        )
-        assert answer.returncode == 0, answer.stderr
-    assert (tmp_path / "motion.png").exists()
-    assert (tmp_path / "motion.csv").exists()
+    words = shlex.split(command)
+    assert words[0] == "veselova"
+    answer = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=PATIENCE, env=environment)
+    assert answer.returncode == 0, answer.stderr
+    for option in ("--plot", "--output"):
+        if option in words:
+            assert (tmp_path / words[words.index(option) + 1]).exists()
 
 
 def test_the_request_of_the_readme_is_answered(server: Server) -> None:

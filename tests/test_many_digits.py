@@ -48,6 +48,7 @@ def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
     assert max(many.decimals.error) < 1e-30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["theta", "angles"])
 def test_windows_in_balls_serve_either_route_and_far_times(method: str) -> None:
     start, chosen = 10**8, [0, 399, 799]

@@ -9,6 +9,7 @@ import pytest
 from numpy.polynomial import polynomial
 from scipy.integrate import solve_ivp
 
+from conftest import slow
 from draws import random_problem
 from veselova import Unsolved, VeselovaSO3, solve
 from veselova.mechanics import integrals, separation
@@ -148,7 +149,7 @@ def test_coordinates_reach_their_turning_points_and_no_farther(name: str, rng: n
     assert np.allclose(np.max(lam, axis=0), ends[:, 1], atol=1e-3)
 
 
-@pytest.mark.parametrize("n", [3, 4, 5])
+@pytest.mark.parametrize("n", [3, slow(4), slow(5)])
 def test_constants_are_kept_in_any_dimension(n: int, rng: np.random.Generator) -> None:
     """Hamilton's equations in τ, H* = ½(A⁻¹p,p) + V on T*Sⁿ⁻¹, with V's gradient by complex steps."""
     (A, q, v), V = random_state(rng, n), random_potential(rng, n, n + 1)

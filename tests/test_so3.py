@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conftest import slow
 from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
 from veselova.mechanics import sphere_geodesics
 from veselova.mechanics.euler_poisson import dual
@@ -484,7 +485,7 @@ def completed_by_hand(rng: np.random.Generator) -> VeselovaSO3:
     return VeselovaSO3(moments, gamma, np.cross(gamma, rng.normal(size=3)), parts)
 
 
-@pytest.mark.parametrize("name", ["none", "clebsch", "family", "by hand"])
+@pytest.mark.parametrize("name", ["none", "clebsch", slow("family"), "by hand"])
 def test_the_dual_system_is_integrable_with_the_potentials_exchanged(name: str, rng: np.random.Generator) -> None:
     problem = completed_by_hand(rng) if name == "by hand" else draw(rng, VeselovaSO3, name)
     partner = dual(problem)

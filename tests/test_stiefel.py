@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from conftest import slow
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Unsolved, Veselova, solve
 from veselova.mechanics.body_inertia import BodyInertia, body_inertia
@@ -156,7 +157,7 @@ def test_traces_are_those_of_the_matrix_polynomial(n: int, r: int, rng: np.rando
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), (4, 2), (5, 3), (6, 4)])
+@pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), slow(4, 2), slow(5, 3), slow(6, 4)])
 def test_both_formulations_keep_the_integrals_and_agree(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
     problem, times = random_flow(rng, n, r, kind), np.linspace(-10, 10, 11)
     reduced, momentum = (solve(problem, times, formulation=name) for name in problem.formulations)
@@ -175,7 +176,7 @@ def test_integrals_hold_to_1e_12_over_a_hundred_units_of_time(n: int, r: int, ki
     assert max(found.drift.values()) < 1e-12
 
 
-@pytest.mark.parametrize(("n", "r", "kind"), [(3, 1, "special"), (4, 2, "special"), (4, 2, "matrix")])
+@pytest.mark.parametrize(("n", "r", "kind"), [(3, 1, "special"), slow(4, 2, "special"), slow(4, 2, "matrix")])
 def test_taylor_series_keep_the_integrals_to_rounding_and_bound_the_other_error(
     n: int, r: int, kind: str, rng: np.random.Generator
 ) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
@@ -92,6 +92,11 @@ class Balls(Arithmetic):
             mantissa, exponent = value.man_exp  # of the absolute value
             return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
+
+    def polynomial_roots(self, coefficients: Sequence[Fraction]) -> list[tuple[Fraction, Fraction, int]]:
+        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of a real one is 0."""
+        polynomial: Any = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in coefficients])
+        return [(self.rational(root.real), self.rational(root.imag), count) for root, count in polynomial.complex_roots()]
 
     #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
     atan2 = staticmethod(np.frompyfunc(lambda y, x: flint.arb.atan2(y, x), 2, 1))

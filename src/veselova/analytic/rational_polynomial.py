@@ -6,8 +6,6 @@ import itertools
 from collections.abc import Sequence
 from fractions import Fraction
 
-import numpy as np
-
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["NEAR", "Polynomial", "monic", "product", "quotient", "remainder", "roots", "total", "trimmed", "value"]
@@ -17,8 +15,8 @@ Polynomial = list[Fraction]
 #: Numbers nearer than this, relative to those around, count as one: roots have more digits.
 NEAR = Fraction(1, 10**40)
 
-#: Newton steps on the roots, from sixteen digits or from six where two are near each other; the bits kept in them.
-_STEPS, _BITS = 12, 256
+#: Digits of the roots.
+_DIGITS = 77
 
 
 def monic(roots: Sequence[Fraction]) -> Polynomial:
@@ -74,41 +72,18 @@ def value(polynomial: Polynomial, x: Fraction) -> Fraction:
 
 
 def roots(polynomial: Polynomial) -> list[tuple[Fraction, Fraction]]:
-    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair: Newton from double precision."""
-    if len(polynomial) == 1:
-        return []
-    largest = max(abs(c) for c in polynomial)
-    roots = np.polynomial.polynomial.polyroots([float(c / largest) for c in polynomial])
-    polished = [_polished(polynomial, complex(root)) for root in roots]
-    for (a, b), (c, d) in itertools.combinations(polished, 2):
+    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair, to 77 digits.
+
+    Each is isolated by Arb: two real roots however near each other are two, and no pair of complex ones.
+    Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer than NEAR.
+    """
+    from veselova.analytic.balls import balls  # loads python-flint
+
+    with balls(_DIGITS, False) as arithmetic:
+        found = arithmetic.polynomial_roots(polynomial)
+    if any(count > 1 for _, _, count in found):
+        raise Unsolved("clustered-roots", "R has a double root: the motion is on a separatrix, or at rest in one coordinate")
+    for (a, b, _), (c, d, _) in itertools.combinations(found, 2):
         if abs(a - c) + abs(b - d) <= NEAR * (1 + abs(a)):
             raise Unsolved("clustered-roots", "two roots of R could not be told apart: the motion is near a separatrix")
-    return [(x, y) for x, y in polished if y >= 0]
-
-
-def _polished(polynomial: Polynomial, root: complex) -> tuple[Fraction, Fraction]:
-    x, y = Fraction(root.real), Fraction(root.imag)
-    scale = 1 + abs(x)
-    for _ in range(_STEPS):
-        value, slope = (Fraction(), Fraction()), (Fraction(), Fraction())
-        for c in reversed(polynomial):
-            slope = _times(slope, (x, y))
-            slope = slope[0] + value[0], slope[1] + value[1]
-            value = _times(value, (x, y))
-            value = value[0] + c, value[1]
-        size = slope[0] ** 2 + slope[1] ** 2
-        if not size:
-            raise Unsolved("clustered-roots", "R has a double root: the motion is on a separatrix, or at rest in one coordinate")
-        step = _times(value, (slope[0] / size, -slope[1] / size))
-        x, y = _rounded(x - step[0]), _rounded(y - step[1])
-        if abs(step[0]) + abs(step[1]) <= scale / 2 ** (_BITS - 16):
-            break
-    return x, y if abs(y) > NEAR * scale else Fraction(0)
-
-
-def _times(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _rounded(x: Fraction) -> Fraction:
-    return Fraction(round(x * 2**_BITS), 2**_BITS)
+    return [(x, y) for x, y, _ in found if y >= 0]
