@@ -5,10 +5,10 @@
 Starts a server with one worker and an empty cache, then POSTs REQUESTS (200) different bodies of three and of four dimensions one
 after the other, q at 100 times, and of four dimensions the frame at 1000. The time of a request is that of its client: from the
 first byte sent on a connection that is kept open on loopback to the last byte received. The client looks for the end of the
-answer and no more (Python's own takes a tenth of it all to read the headers). Beyond the solve is that time less the seconds
-which the engine reports in this very answer; it has in it HTTP itself, validation, the way to the worker and back, the making of
-the problem, the integrals of motion, the entry of the cache and the text of the answer. For comparison the same client asks
-for /healthz, which has HTTP and nothing else, and this process makes the same problems and writes the same answers itself.
+answer and no more (Python's own takes a tenth of it all to read the headers). After each request this process makes the same
+problem, solves it and writes the same answer itself: what the request took more is the overhead of the service, which has in it
+HTTP, validation, the way to the worker and back and the entry of the cache. Beyond the engine's own seconds, which stand in every
+answer, come the problem, the integrals of motion and the text, with a server or without. /healthz is HTTP and nothing else.
 """
 
 from __future__ import annotations
@@ -84,26 +84,33 @@ def quantiles(taken: list[float]) -> str:
 
 def measure(port: int, base: dict[str, Any], count: int, outputs: list[str], requests: int) -> None:
     """Print what a request costs beyond the solve."""
-    beyond, whole, size = [], [], 0
+    whole, beyond, here, overhead, size = [], [], [], [], 0
     with Connection(port) as connection:
         for body in bodies(base, count, outputs, requests):
             seconds, content = connection.ask("POST", "/v1/trajectories", body)
             whole.append(seconds)
-            beyond.append(seconds - json.loads(content)["provenance"]["seconds"])
+            beyond.append(seconds - solve_seconds(content))
+            seconds, content = without_http(json.loads(body))
+            here.append(seconds - solve_seconds(content))
+            overhead.append(whole[-1] - seconds)
             size = len(content)
-    here = [without_http(json.loads(body)) for body in bodies(base, count, outputs, requests)]
     print(f"{outputs[0]} at {count} times, n = {len(base['A'])}, {size / 1e3:.0f} kB: whole request {quantiles(whole)},")
-    print(f"  beyond the solve {quantiles(beyond)},")
-    print(f"  of which without any server {quantiles(here)}")
+    print(f"  more than the same answer takes without a server {quantiles(overhead)};")
+    print(f"  beyond the engine's own seconds {quantiles(beyond)}, without a server {quantiles(here)}")
 
 
-def without_http(request: dict[str, Any]) -> float:
-    """Return the seconds beyond the solve of the same answer in this process: the problem, the integrals, the text."""
+def solve_seconds(answer: bytes) -> float:
+    """Return the seconds that an answer says the engine took."""
+    return float(json.loads(answer)["provenance"]["seconds"])
+
+
+def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
+    """Return the seconds of the same answer in this process, and the answer: the problem, the solve, the integrals, the text."""
     began = time.perf_counter()
     delivery = solved(request, Wanted("json", "identity"), None)
     seconds = time.perf_counter() - began
     assert delivery.body is not None
-    return seconds - json.loads(delivery.body)["provenance"]["seconds"]
+    return seconds, delivery.body
 
 
 def main() -> None:
