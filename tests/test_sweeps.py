@@ -259,10 +259,13 @@ def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch:
     def broken(*_: Any) -> Any:
         raise ZeroDivisionError
 
+    def stopped(*_: Any) -> Any:
+        raise TimeIsUp
+
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, budget_s=1)
+    sweep = request(problem=plain, budget_s=60)
     expected = rows(sweep, 0, 2)
-    for failure in (broken, lambda *_: _for_ever()):
+    for failure in (broken, stopped):
         monkeypatch.setattr("veselova.analytic.tori.tori", failure)
         found = rows(sweep, 0, 2)
         assert [row["outcome"] for row in found] == ["solved"] * 2
@@ -291,9 +294,9 @@ def _for_ever() -> None:
 def test_the_time_limit_ends_a_loop_and_nothing_after_it() -> None:
     with pytest.raises(TimeIsUp), time_limit(0.05):
         _for_ever()
-    with time_limit(0.05):
+    with time_limit(1.0):
         total = sum(range(1000))
-    time.sleep(0.1)  # the limit of a block that has ended must stay silent
+    time.sleep(1.1)  # the limit of a block that has ended must stay silent
     assert total == 499500
 
 
