@@ -18,6 +18,7 @@ import httpx2
 import numpy as np
 import pytest
 from hypothesis import settings
+from prometheus_client.parser import text_string_to_metric_families
 
 os.environ.setdefault("MPLBACKEND", "agg")
 settings.register_profile("default", deadline=None, derandomize=True)
@@ -59,11 +60,15 @@ class Server:
         """Return the answer to a GET."""
         return self.ask("GET", path, **options)
 
+    def processor_seconds(self) -> float:
+        """Return the processor time that the server has taken, its workers not counted."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def at_work(self) -> tuple[int, int]:
         """Return how many workers are busy and how many requests wait for one."""
-        lines = [line.split() for line in self.get("/metrics").text.splitlines() if not line.startswith("#")]
-        shown = {line[0]: float(line[-1]) for line in lines}
-        return int(shown["veselova_workers_busy"]), int(shown["veselova_queue_length"])
+        shown = samples(self.get("/metrics").text)
+        return int(shown["veselova_workers_busy",]), int(shown["veselova_queue_length",])
 
     def wait_ready(self, path: str = "/readyz") -> None:
         """Wait until a worker is warm and all parts are there, or by another path for less."""
@@ -76,6 +81,16 @@ class Server:
                 return False
 
         wait_until(ready)
+
+
+def samples(text: str) -> dict[tuple[str, ...], float]:
+    """Return the numbers in the text of /metrics: (name, value of every label in the order of label names) → number."""
+    families = text_string_to_metric_families(text)
+    return {
+        (sample.name, *(sample.labels[label] for label in sorted(sample.labels))): sample.value
+        for family in families
+        for sample in family.samples
+    }
 
 
 def wait_until(condition: Callable[[], Any]) -> None:

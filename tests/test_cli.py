@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,7 @@ import numpy as np
 import pytest
 
 from conftest import PATIENCE, wait_until
-from hostile import GOOD, INVALID, MALFORMED
+from hostile import BUDGET_S, GOOD, INVALID, MALFORMED
 from veselova import __version__, solve
 from veselova.service.cli import main
 from veselova.service.examples import BODY4
@@ -202,9 +203,11 @@ def test_streams_that_are_closed_or_full_end_without_a_traceback(stream: str) ->
 
 
 def test_a_stated_budget_is_kept() -> None:
+    began = time.monotonic()
     answer = run("solve", "-", stdin=request(times=[0, 1e7], engine="numeric", budget_s=1))
     assert answer.returncode == 1
     assert b"stopped after its budget of 1 s" in answer.stderr
+    assert time.monotonic() - began < BUDGET_S  # of one second, not of that which every other test states
 
 
 def test_more_times_than_memory_holds_are_refused() -> None:

@@ -16,6 +16,7 @@ import pytest
 import veselova as vs
 from conftest import Server, slow
 from draws import random_problem
+from hostile import BUDGET_S
 from problems import Case, tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
@@ -342,7 +343,7 @@ def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
 
 def test_the_service_answers_in_decimals(server: Server) -> None:
     with vs.Client(server.url) as client:
-        answer = client.trajectory(body3(), ["0.1", 2], digits=40, certified=True, budget_s=60)
+        answer = client.trajectory(body3(), ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S)
     here = vs.solve(body3(), ["0.1", 2], digits=40, certified=True)
     assert answer.decimals is not None
     assert here.decimals is not None

@@ -13,6 +13,7 @@ import pytest
 from scipy.linalg import expm
 
 from conftest import Server, slow
+from hostile import BUDGET_S
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on, random_potential
 from veselova import InvalidInput, LRSystem, MatrixGroup, Unsolved, Veselova, solve
 from veselova.mechanics.distribution import Distribution
@@ -435,7 +436,7 @@ def test_the_service_answers_and_refuses_like_python(server: Server) -> None:
         "times": [0, 1],
         "method": "taylor",
         "formulation": "multipliers",
-        "budget_s": 60,
+        "budget_s": BUDGET_S,
     }
     answer = server.ask("POST", "/v1/trajectories", json=request).json()
     assert answer["provenance"]["details"]["formulation"] == "multipliers"

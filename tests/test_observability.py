@@ -21,9 +21,8 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi import FastAPI
-from prometheus_client.parser import text_string_to_metric_families
 
-from conftest import PATIENCE, Server, running_server, wait_until
+from conftest import PATIENCE, Server, running_server, samples, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova.service.app import create_app
@@ -60,15 +59,6 @@ def numbers(server: Server) -> dict[tuple[str, ...], float]:
     """Return the metrics: (name, value of every label in the order of label names) → number."""
     text = server.get("/metrics").text
     return samples(text)
-
-
-def samples(text: str) -> dict[tuple[str, ...], float]:
-    families = text_string_to_metric_families(text)
-    return {
-        (sample.name, *(sample.labels[label] for label in sorted(sample.labels))): sample.value
-        for family in families
-        for sample in family.samples
-    }
 
 
 def in_process(app: FastAPI, path: str, **headers: str) -> httpx2.Response:

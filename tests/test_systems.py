@@ -12,6 +12,7 @@ import orjson
 import pytest
 
 from conftest import Server
+from hostile import BUDGET_S
 from veselova import Client, InvalidInput, InvalidRequest, compare, solve
 from veselova.service.documents import encoded, stored_outputs, trajectory_document, trajectory_of
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
@@ -105,13 +106,13 @@ def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path)
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
-    body = {"problem": document(name), "times": TIMES, "budget_s": 60}
+    body = {"problem": document(name), "times": TIMES, "budget_s": BUDGET_S}
     response = server.ask("POST", "/v1/trajectories", json=body)
     assert response.status_code == 200, response.text
     problem = problem_of(name)
     assert list(response.json()["series"]) == list(problem.outputs)
     with Client(server.url) as client:
-        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1], budget_s=60)
+        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1], budget_s=BUDGET_S)
     expected = solve(problem, TIMES, "numeric", formulation=problem.formulations[-1])
     assert np.array_equal(found.series(problem.portrait), expected.series(problem.portrait))
     assert found.provenance.details["formulation"] == problem.formulations[-1]
