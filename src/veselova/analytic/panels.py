@@ -68,7 +68,7 @@ class Panels:
             return 2 * np.abs(np.interp(tau1, self.borders, self.tails))
         # Of whole panels, which is faster, but next to zero.
         ends, zero = np.searchsorted(tau1, self.borders), int(np.searchsorted(self.borders, 0.0))
-        ends[-1] = tau1.size
+        ends[0], ends[-1] = 0, tau1.size  # whatever the first and the last time are rounded to
         tails = 2 * np.maximum(np.abs(self.tails[1:]), np.abs(self.tails[:-1]))
         result = np.repeat(tails, np.diff(ends[1:-1], prepend=0, append=tau1.size))
         near = slice(ends[max(0, zero - 1)], ends[min(zero + 1, tails.size)])

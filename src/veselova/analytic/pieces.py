@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import chebyshev
+from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import NDArray
 
 from veselova.analytic.increasing import increasing_root
@@ -33,6 +33,9 @@ _TIMES = 4096
 
 #: Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
 _X, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(ORDER)), DOUBLE.cosine_series(np.eye(ORDER)).T
+#: Integrals of T_0 … T_{ORDER−1} over [−1, 1], and x^0 … x^ORDER at the points.
+_INTEGRALS = np.array([2 / (1 - k * k) if k % 2 == 0 else 0.0 for k in range(ORDER)])
+_AT_POINTS = polynomial.polyvander(_X, ORDER).T
 #: From Chebyshev coefficients to those of powers.
 _TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
 
@@ -48,7 +51,7 @@ def _restriction(nodes: int, count: int) -> Array:
 class Pieces:
     """The pieces of W windows.
 
-    borders (W, count+1) in time since the window's start · tables (W, count, ORDER, C) of powers; the first column is the part of
+    borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers; the first row is the part of
     the window's Neumann time that has passed · tails (W,) the largest of the last Chebyshev coefficients
     """
 
@@ -61,32 +64,37 @@ class Pieces:
         """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns)."""
         windows, nodes = rates.shape
         restriction, half = _restriction(nodes, count), stretch / (2 * count)
-        slope = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
-        elapsed = chebyshev.chebint(slope, lbnd=-1)
-        durations = np.sum(elapsed, axis=0)
+        pace = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
+        durations, slope = _INTEGRALS @ pace, _TO_POWERS @ pace
+        elapsed = polynomial.polyint(slope, lbnd=-1)
         # Axes: the pieces of all windows, the points in time, the columns.
         target = durations[:, None] * ((_X + 1) / 2)
 
         def excess(x: Array) -> tuple[Array, Array]:
-            value, rise = (chebyshev.chebval(x, c[:, :, None], tensor=False) for c in (elapsed, slope))
+            value, rise = (polynomial.polyval(x, c[:, :, None], tensor=False) for c in (elapsed, slope))
             return np.asarray(value - target), np.asarray(rise)
 
         one = np.ones_like(target)
-        x = increasing_root(excess, np.broadcast_to(_X, target.shape), -one, one, _SETTLED)
+        with np.errstate(all="ignore"):  # a first step of Newton's from the same points everywhere is a product of matrices
+            guess = np.clip(_X - (elapsed.T @ _AT_POINTS - target) / (slope.T @ _AT_POINTS[:-1]), -1, 1)
+        x = increasing_root(excess, guess, -one, one, _SETTLED)
         in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
-        at_times = np.moveaxis(_polynomials(x, ORDER), 0, -1) @ in_tau1
-        passed = (np.tile(np.arange(count), windows)[:, None] + (x + 1) / 2) / count
-        coefficients = _TO_COEFFICIENTS @ np.concatenate([passed[:, :, None], at_times], axis=2)
+        # Points first: the matrices that are the same for all pieces take them at once.
+        at_times = np.empty((ORDER, windows * count, 1 + in_tau1.shape[2]))
+        at_times[:, :, 0] = ((np.tile(np.arange(count), windows)[:, None] + (x + 1) / 2) / count).T
+        np.matmul(np.moveaxis(_polynomials(x, ORDER), 0, -1), in_tau1, out=np.moveaxis(at_times, 0, 1)[:, :, 1:])
+        coefficients = _TO_COEFFICIENTS @ at_times.reshape(ORDER, -1)
         borders = np.zeros((windows, count + 1))
         np.cumsum(durations.reshape(windows, count), axis=1, out=borders[:, 1:])
-        tails = np.max(np.abs(coefficients[:, -3:]).reshape(windows, -1), axis=1)
-        return cls(borders, (_TO_POWERS @ coefficients).reshape(windows, count, ORDER, -1), tails)
+        tails = np.max(np.abs(coefficients[-3:]).reshape(3, windows, -1), axis=(0, 2))
+        tables = (coefficients.T @ _TO_POWERS.T).reshape(windows, count, -1, ORDER)
+        return cls(borders, np.asarray(tables), tails)
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> Pieces:
         return self if np.all(chosen) else Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
     def fill(self, window: int, since: Array, out: Array) -> None:
-        """Fill ``out`` (N, C) with the series at increasing times since the start of a window."""
+        """Fill ``out`` (C, N) with the series at increasing times since the start of a window."""
         borders, scale = self.borders[window], 2 / np.diff(self.borders[window])
         for first in range(0, since.size, _TIMES):
             block = since[first : first + _TIMES]
@@ -95,7 +103,7 @@ class Pieces:
             powers = _powers((block - np.repeat(borders[:-1], counts)) * np.repeat(scale, counts) - 1)
             for table, begin, end in zip(self.tables[window], ends[:-1], ends[1:], strict=True):
                 if begin < end:
-                    np.matmul(powers[:, begin:end].T, table, out=out[first + begin : first + end])
+                    np.matmul(table, powers[:, begin:end], out=out[:, first + begin : first + end])
 
 
 def _powers(x: Array) -> Array:

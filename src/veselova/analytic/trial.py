@@ -117,7 +117,7 @@ class Trial:
         larger."""
         pieces = Pieces.of(self.rates, self.series, self.stretch, count)
         tables = pieces.tables
-        tables[..., 1:] *= self.sizes
-        tables[..., 0] *= self.stretch
+        tables[:, :, 1:] *= self.sizes[:, None]
+        tables[:, :, 0] *= self.stretch
         tables[:, :, 0, 0] += self.starts[:, None]
         return pieces, np.maximum(self.tails, pieces.tails)

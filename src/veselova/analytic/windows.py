@@ -37,7 +37,7 @@ _CYCLES = 2.0
 _MOST_LENGTHS, _CLOSE_LENGTHS = 16, 6
 
 #: Pieces of a window, the fewest that serve.
-_PIECES = (8, 16, 32)
+_PIECES = (6, 8, 16, 32)
 
 #: Lengths of a window from t = 0 at which times have too few bits left to lie densely in one.
 _FARTHEST = 2.0**32
