@@ -9,10 +9,14 @@ answer and no more (Python's own takes a tenth of it all to read the headers). A
 problem, solves it and writes the same answer itself: what the request took more is the overhead of the service, which has in it
 HTTP, validation, the way to the worker and back and the entry of the cache. Beyond the engine's own seconds, which stand in every
 answer, come the problem, the integrals of motion and the text, with a server or without. /healthz is HTTP and nothing else.
+
+The peer is the least that a FastAPI service can be: one route that reads a model and hands it to a ProcessPoolExecutor of one
+process, which makes the same answer; it has no limits, budgets, cache, log or counters. Its requests alternate with ours.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -23,10 +27,16 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import httpx2
+import uvicorn
+from fastapi import FastAPI, Response
+from pydantic import BaseModel
 
 from veselova.service.delivery import Wanted, solved
 from veselova.service.examples import BODY4_PROBLEM
@@ -82,21 +92,24 @@ def quantiles(taken: list[float]) -> str:
     return f"{1e3 * statistics.median(taken):.2f} ms (a tenth below {1e3 * tenth:.2f}, a tenth above {1e3 * ninth:.2f})"
 
 
-def measure(port: int, base: dict[str, Any], count: int, outputs: list[str], requests: int) -> None:
-    """Print what a request costs beyond the solve."""
-    whole, beyond, here, overhead, size = [], [], [], [], 0
-    with Connection(port) as connection:
+def measure(ours: int, bare: int, base: dict[str, Any], count: int, outputs: list[str], requests: int) -> None:
+    """Print what a request costs beyond the solve; the servers listen at these ports."""
+    whole, beyond, here, overhead, peer, size = [], [], [], [], [], 0
+    with Connection(ours) as connection, Connection(bare) as other:
         for body in bodies(base, count, outputs, requests):
             seconds, content = connection.ask("POST", "/v1/trajectories", body)
             whole.append(seconds)
             beyond.append(seconds - solve_seconds(content))
+            seconds, content = other.ask("POST", "/v1/trajectories", body)
+            peer.append(seconds - solve_seconds(content))
             seconds, content = without_http(json.loads(body))
             here.append(seconds - solve_seconds(content))
             overhead.append(whole[-1] - seconds)
             size = len(content)
     print(f"{outputs[0]} at {count} times, n = {len(base['A'])}, {size / 1e3:.0f} kB: whole request {quantiles(whole)},")
     print(f"  more than the same answer takes without a server {quantiles(overhead)};")
-    print(f"  beyond the engine's own seconds {quantiles(beyond)}, without a server {quantiles(here)}")
+    print(f"  beyond the engine's own seconds {quantiles(beyond)}, without a server {quantiles(here)},")
+    print(f"  of bare FastAPI {quantiles(peer)}: ours over its {statistics.median(beyond) / statistics.median(peer):.2f}")
 
 
 def solve_seconds(answer: bytes) -> float:
@@ -113,42 +126,81 @@ def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
     return seconds, delivery.body
 
 
-def main() -> None:
-    requests = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+class Request(BaseModel):
+    """What the bare service reads."""
+
+    problem: dict[str, Any]
+    times: dict[str, Any]
+    outputs: list[str]
+
+
+def serve_bare(port: int) -> None:
+    """Serve the same answers with FastAPI, a process pool and nothing else."""
+    application = FastAPI()
+    pool = ProcessPoolExecutor(1, get_context("spawn"), warm_up)
+
+    @application.post("/v1/trajectories")
+    async def answer(request: Request) -> Response:
+        _, body = await asyncio.get_running_loop().run_in_executor(pool, without_http, request.model_dump())
+        return Response(body, media_type="application/json")
+
+    @application.get("/readyz")
+    async def ready() -> None:
+        await asyncio.get_running_loop().run_in_executor(pool, warm_up)
+
+    uvicorn.run(application, port=port, log_level="error")
+
+
+@contextmanager
+def serving(command: list[str], port: int, environment: dict[str, str]) -> Iterator[int]:
+    """Run a server until the end of the block; its process stands for it once it is ready."""
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    try:
+        while True:
+            try:
+                if httpx2.get(f"http://127.0.0.1:{port}/readyz", timeout=60).status_code == 200:
+                    break
+            except httpx2.TransportError:
+                time.sleep(0.02)
+        yield process.pid
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait(20)
+
+
+def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+        return int(probe.getsockname()[1])
+
+
+def main() -> None:
+    requests = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    port, other = free_port(), free_port()
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "VESELOVA_WORKERS": "1", "VESELOVA_DATA_DIR": folder}
-        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
-        process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        try:
-            began = time.perf_counter()
-            while True:
-                try:
-                    if httpx2.get(f"http://127.0.0.1:{port}/readyz").status_code == 200:
-                        break
-                except httpx2.TransportError:
-                    time.sleep(0.02)
+        environment = {**os.environ, "VESELOVA_WORKERS": "1", "VESELOVA_DATA_DIR": folder, "OPENBLAS_NUM_THREADS": "1"}
+        began = time.perf_counter()
+        with serving([sys.executable, "-m", "veselova", "serve", "--port", str(port)], port, environment) as pid:
             print(f"ready after {time.perf_counter() - began:.2f} s")
-            worker = int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
-            server_size, worker_size = resident_megabytes(process.pid), resident_megabytes(worker)
+            worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+            server_size, worker_size = resident_megabytes(pid), resident_megabytes(worker)
             total = server_size + worker_size
             print(f"idle: server {server_size:.0f} MB + one warm worker {worker_size:.0f} MB = {total:.0f} MB")
 
             warm_up()
             with Connection(port) as connection:
                 print(f"/healthz: {quantiles([connection.ask('GET', '/healthz')[0] for _ in range(requests)])}")
-            for base, count, outputs in (
-                (BODY3_PROBLEM, 100, ["q"]),
-                (BODY4_PROBLEM, 100, ["q"]),
-                (BODY4_PROBLEM, 1000, ["frame"]),
-            ):
-                measure(port, base, count, outputs, requests)
-        finally:
-            process.send_signal(signal.SIGTERM)
-            process.wait(20)
+            with serving([sys.executable, __file__, "bare", str(other)], other, environment):
+                for base, count, outputs in (
+                    (BODY3_PROBLEM, 100, ["q"]),
+                    (BODY4_PROBLEM, 100, ["q"]),
+                    (BODY4_PROBLEM, 1000, ["frame"]),
+                ):
+                    measure(port, other, base, count, outputs, requests)
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["bare"]:
+        serve_bare(int(sys.argv[2]))
+    else:
+        main()

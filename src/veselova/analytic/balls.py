@@ -42,6 +42,7 @@ _UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX)
 #: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero.
 _UNASKED_DIGITS = 5
 _UNASKED = 10**_UNASKED_DIGITS
+_HALF = _UNASKED // 2
 
 _global = threading.RLock()
 
@@ -265,13 +266,13 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     if not x.is_finite():
         return Decimal(0), Decimal("Infinity")
     middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
-    rounded = (middle + _UNASKED // 2) // _UNASKED
-    radius += abs(middle - rounded * _UNASKED)
+    rounded, rest = divmod(middle + _HALF, _UNASKED)
+    radius += abs(rest - _HALF)
     return _decimal_of(rounded, exponent + _UNASKED_DIGITS, _EXACT), _decimal_of(radius, exponent, _UPWARDS)
 
 
 def _decimal_of(mantissa: int, exponent: int, context: Context) -> Decimal:
-    return context.create_decimal(mantissa).scaleb(exponent, context) if mantissa else Decimal(0)
+    return Decimal(mantissa).scaleb(exponent, context) if mantissa else Decimal(0)
 
 
 def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:

@@ -46,6 +46,11 @@ class Rate(ABC, Generic[P]):
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
 
+    def _at_nodes(self, s: int) -> Values:
+        """Return the same at the nodes of the cut's own series."""
+        periods = self.inversion.periods
+        return self._weighted_forms(s, periods.arithmetic.nodes(periods.cut_series[s].shape[-1]))
+
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
 
@@ -57,20 +62,22 @@ class Rate(ABC, Generic[P]):
         for s in range(genus):
             angles = np.zeros((count, genus), dtype=psi.dtype)
             angles[:, s] = psi
-            result.append((self._weights(s, psi), self.inversion.map(angles)))
+            result.append((self._weights(self._weighted_forms(s, psi)), self.inversion.map(angles)))
         return result
 
-    def _weights(self, s: int, psi: Values) -> Values:
-        """Return a⁻¹ times the forms at nodes of cut s, and 2π over their number, shape (g, N)."""
+    def _weights(self, forms: Values) -> Values:
+        """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number, shape (g, N)."""
         periods = self.inversion.periods
-        return np.asarray(periods.inverse_cycles @ self._weighted_forms(s, psi) * (2 * periods.arithmetic.pi / len(psi)))
+        return np.asarray(periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1]))
 
     @cached_property
     def mean(self) -> Any:
-        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
+        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods.
+
+        Its error falls like e^(−2πN K'/K), that of the series like e^(−πN K'/K): their nodes are enough.
+        """
         periods = self.inversion.periods
-        psi = periods.arithmetic.nodes(periods.longest)
-        means = [np.sum(self._weights(s, psi), axis=-1) for s in range(periods.genus)]
+        means = [np.sum(self._weights(self._at_nodes(s)), axis=-1) for s in range(periods.genus)]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
 
 
@@ -105,10 +112,16 @@ class ClockRate(Rate[Periods]):
         return np.asarray(rate_factor(curve, s, point, self.time, curve.arithmetic))
 
     def _weighted_forms(self, s: int, psi: Values) -> Values:
-        periods = self.inversion.periods
-        below, above = periods.cuts[s].distances(psi)
-        sign = (-1) ** (periods.genus - s - 1)
-        return np.asarray(sign * periods.cuts[s].forms(below, above) * self._factor(s, below)[..., None, :])
+        cut = self.inversion.periods.cuts[s]
+        below, above = cut.distances(psi)
+        return self._weighted(s, below, cut.forms(below, above))
+
+    def _at_nodes(self, s: int) -> Values:
+        return self._weighted(s, *self.inversion.periods.at_nodes[s])
+
+    def _weighted(self, s: int, below: Values, forms: Values) -> Values:
+        sign = (-1) ** (self.inversion.periods.genus - s - 1)
+        return np.asarray(sign * forms * self._factor(s, below)[..., None, :])
 
 
 def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
@@ -159,7 +172,7 @@ class Clock(ABC):
 
     @abstractmethod
     def error(self, tau1: Array) -> Array:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0 and f, shape (N,)."""
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0 and f, (N,), or (1,) for all times."""
 
     @property
     @abstractmethod
@@ -193,8 +206,8 @@ class UniformClock(Clock):
         return self._rate * tau1
 
     def error(self, tau1: Array) -> Array:
-        """Return zeros: nothing is integrated."""
-        return np.zeros_like(tau1)
+        """Return zero: nothing is integrated."""
+        return np.zeros(1)
 
     @property
     def size(self) -> int:

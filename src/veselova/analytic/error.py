@@ -43,7 +43,7 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     if solution.near_separatrix or not solution.is_even:  # the frame turns within a hundredth of the torus, which samples miss
         rows = np.linspace(0, times.size - 1, min(times.size, _ON_ORBIT)).astype(int)
         steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
-    frequencies, elapsed = np.abs(solution.in_tau1.rates), np.abs(tau1)
+    frequencies = np.abs(solution.in_tau1.rates)
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
@@ -52,13 +52,11 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     at_once += 0.0 if method == "angles" else solution.quotients.rounding
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
     evaluation = _EVALUATION[method] * (1.0 if method == "angles" else max(1.0, solution.largest_period))
-    error = clock.error(tau1)  # in place from here on: fresh memory costs more than sums
-    error *= steepness.along_flow
-    elapsed *= with_time
+    error = np.abs(tau1)  # in place from here on: fresh memory costs more than sums
+    error *= with_time
+    error += clock.error(tau1) * steepness.along_flow
     if (slowness := _slowness(solution, tau1)) is not None:
         error *= slowness
-        elapsed *= slowness
-    error += elapsed
     error += evaluation * _EPSILON + at_once
     if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
         error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)

@@ -89,7 +89,7 @@ class FourierClock(Clock):
         """
         farthest = float(max(abs(tau1[0]), abs(tau1[-1])))
         spread = np.sqrt(np.sum(np.minimum(self._longest, farthest) ** 2))
-        return np.full(tau1.shape, 4 * _SMALLEST_MODE * (spread + 1 / self._fastest))
+        return np.full(1, 4 * _SMALLEST_MODE * (spread + 1 / self._fastest))
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""

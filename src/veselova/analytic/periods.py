@@ -81,16 +81,25 @@ class Periods(AngleSeries):
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
-    def _series(self, interval: Interval) -> Values:
-        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
+    def _at_nodes(self, interval: Interval) -> tuple[Values, Values]:
+        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an interval's series."""
         count = self.node_count(interval)
         if self.arithmetic.has_radii and count > _MOST_NODES:
             wanted = (
                 f"{self.arithmetic.digits} digits take series of {count} terms beside a relative gap of {self.narrowest_gap:.2g}"
             )
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
-        psi = self.arithmetic.nodes(count)
-        coefficients = self.arithmetic.cosine_series(interval.forms(*interval.distances(psi)))
+        below, above = interval.distances(self.arithmetic.nodes(count))
+        return below, interval.forms(below, above)
+
+    @cached_property
+    def at_nodes(self) -> tuple[tuple[Values, Values], ...]:
+        """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its series."""
+        return tuple(self._at_nodes(cut) for cut in self.cuts)
+
+    def _series(self, interval: Interval, forms: Values) -> Values:
+        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
+        coefficients = self.arithmetic.cosine_series(forms)
         if self.arithmetic.certified:
             coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))
         return coefficients
@@ -117,7 +126,10 @@ class Periods(AngleSeries):
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
-        return tuple((-1) ** (self.genus - s) * self._series(cut) for s, cut in enumerate(self.cuts, start=1))
+        return tuple(
+            (-1) ** (self.genus - s) * self._series(cut, forms)
+            for s, (cut, (_, forms)) in enumerate(zip(self.cuts, self.at_nodes, strict=True), start=1)
+        )
 
     @cached_property
     def cancellation(self) -> Values:
@@ -128,7 +140,8 @@ class Periods(AngleSeries):
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [
-            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap)[..., 0] for s, gap in enumerate(self.gaps)
+            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap, self._at_nodes(gap)[1])[..., 0]
+            for s, gap in enumerate(self.gaps)
         ]
         return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
 

@@ -100,7 +100,10 @@ class Pieces:
             block = since[first : first + _TIMES]
             ends = [0, *np.searchsorted(block, borders[1:-1]).tolist(), block.size]
             counts = np.diff(ends)
-            powers = _powers((block - np.repeat(borders[:-1], counts)) * np.repeat(scale, counts) - 1)
+            x = block - np.repeat(borders[:-1], counts)
+            x *= np.repeat(scale, counts)
+            x -= 1
+            powers = _powers(x)
             for table, begin, end in zip(self.tables[window], ends[:-1], ends[1:], strict=True):
                 if begin < end:
                     np.matmul(table, powers[:, begin:end], out=out[:, first + begin : first + end])
