@@ -171,6 +171,19 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(n: int, part
     assert np.max(closed.error) < 1e-10
 
 
+@pytest.mark.parametrize("A", [(20, 1), (3, 1), (20, 3, 1), slow((300, 20, 3, 1))])
+@pytest.mark.parametrize("part", range(len(PARTS)))
+def test_far_points_of_wide_bodies_agree_with_integration(part: int, A: tuple[float, ...], rng: Generator) -> None:
+    """The form of n = 2 may be constant along its cut, while dt/dτ turns sharply there."""
+    drawn = point(rng, len(A), PARTS[part])
+    velocity = drawn.q_dot / np.linalg.norm(drawn.q_dot)
+    problem = SeparableVeselova(A, drawn.q, velocity, drawn.given.get("potential"), normalize=True)
+    times = np.array([-80.0, 0.5, 150.0])
+    closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
+    assert closed.provenance.details["clock"] == "fourier"
+    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+
+
 @pytest.mark.parametrize("n", [3, *map(slow, (2, 4, 5, 6))])
 def test_integrated_points_keep_their_integrals(n: int, rng: Generator) -> None:
     assert max(solve(point(rng, n, PARTS[4]), np.linspace(0, 100, 11), "numeric").drift.values()) < 1e-11

@@ -46,10 +46,18 @@ class Rate(ABC, Generic[P]):
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
 
-    def _at_nodes(self, s: int) -> Values:
-        """Return the same at the nodes of the cut's own series."""
-        periods = self.inversion.periods
-        return self._weighted_forms(s, periods.arithmetic.nodes(periods.cut_series[s].shape[-1]))
+    @abstractmethod
+    def needed_nodes(self, s: int) -> int:
+        """Return how many nodes of cut s resolve them."""
+
+    @cached_property
+    def longest(self) -> int:
+        """Return the most nodes that any cut needs."""
+        return max(self.needed_nodes(s) for s in range(self.inversion.periods.genus))
+
+    def _weighted_at_nodes(self, s: int) -> Values:
+        """Return the weighted forms at so many nodes."""
+        return self._weighted_forms(s, self.inversion.arithmetic.nodes(self.needed_nodes(s)))
 
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
@@ -72,12 +80,9 @@ class Rate(ABC, Generic[P]):
 
     @cached_property
     def mean(self) -> Any:
-        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods.
-
-        Its error falls like e^(−2πN K'/K), that of the series like e^(−πN K'/K): their nodes are enough.
-        """
+        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
-        means = [np.sum(self._weights(self._at_nodes(s)), axis=-1) for s in range(periods.genus)]
+        means = [np.sum(self._weights(self._weighted_at_nodes(s)), axis=-1) for s in range(periods.genus)]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
 
 
@@ -111,13 +116,17 @@ class ClockRate(Rate[Periods]):
         point = curve.point(2 * s + 1) + below
         return np.asarray(rate_factor(curve, s, point, self.time, curve.arithmetic))
 
+    def needed_nodes(self, s: int) -> int:
+        """Return those of the forms' own series: the factors are analytic in their strips."""
+        return int(self.inversion.periods.forms_at_nodes[s][0].shape[-1])
+
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
         return self._weighted(s, below, cut.forms(below, above))
 
-    def _at_nodes(self, s: int) -> Values:
-        return self._weighted(s, *self.inversion.periods.at_nodes[s])
+    def _weighted_at_nodes(self, s: int) -> Values:
+        return self._weighted(s, *self.inversion.periods.forms_at_nodes[s])
 
     def _weighted(self, s: int, below: Values, forms: Values) -> Values:
         sign = (-1) ** (self.inversion.periods.genus - s - 1)

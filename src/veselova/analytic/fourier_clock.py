@@ -148,12 +148,12 @@ class ColumnsForModes:
     """``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
 
     def __init__(self, rate: Rate[Any]) -> None:
-        self._rate, self._longest = rate, rate.inversion.periods.longest
+        self._rate = rate
         self._count, self._columns = 0, list[tuple[Values, Values]]()
 
     def __call__(self, modes: NDArray[np.int64]) -> list[tuple[Values, Values]]:
         """Return the columns for modes (M, g)."""
-        needed = 2 * (self._longest + int(np.max(np.abs(modes))))
+        needed = 2 * (self._rate.longest + int(np.max(np.abs(modes))))
         if needed > self._count:
             self._count = needed + _SPARE_NODES
             self._columns = self._rate.columns(self._count)

@@ -81,7 +81,7 @@ class Periods(AngleSeries):
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
-    def _at_nodes(self, interval: Interval) -> tuple[Values, Values]:
+    def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
         """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an interval's series."""
         count = self.node_count(interval)
         if self.arithmetic.has_radii and count > _MOST_NODES:
@@ -93,9 +93,9 @@ class Periods(AngleSeries):
         return below, interval.forms(below, above)
 
     @cached_property
-    def at_nodes(self) -> tuple[tuple[Values, Values], ...]:
+    def forms_at_nodes(self) -> tuple[tuple[Values, Values], ...]:
         """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its series."""
-        return tuple(self._at_nodes(cut) for cut in self.cuts)
+        return tuple(self._forms_at_nodes(cut) for cut in self.cuts)
 
     def _series(self, interval: Interval, forms: Values) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
@@ -128,7 +128,7 @@ class Periods(AngleSeries):
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
         return tuple(
             (-1) ** (self.genus - s) * self._series(cut, forms)
-            for s, (cut, (_, forms)) in enumerate(zip(self.cuts, self.at_nodes, strict=True), start=1)
+            for s, (cut, (_, forms)) in enumerate(zip(self.cuts, self.forms_at_nodes, strict=True), start=1)
         )
 
     @cached_property
@@ -140,7 +140,7 @@ class Periods(AngleSeries):
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [
-            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap, self._at_nodes(gap)[1])[..., 0]
+            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap, self._forms_at_nodes(gap)[1])[..., 0]
             for s, gap in enumerate(self.gaps)
         ]
         return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)

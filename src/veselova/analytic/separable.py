@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,6 +142,11 @@ class SeparatedRate(Rate[SeparatedPeriods]):
     def at(self, psi: Array) -> Array:
         """Return dt/dτ at angles of shape (N, g)."""
         return np.asarray(np.sqrt(np.prod(self.inversion.periods.points(psi), axis=1)))
+
+    def needed_nodes(self, s: int) -> int:
+        """Return the number of coefficients of the forms or the weighted ones: √λ may make two of them many."""
+        periods = self.inversion.periods
+        return int(max(periods.resolved(partial(self._weighted_forms, s)).shape[1], periods.cut_series[s].shape[1]))
 
     def _weighted_forms(self, s: int, psi: Array) -> Array:
         periods = self.inversion.periods

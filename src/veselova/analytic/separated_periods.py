@@ -7,9 +7,9 @@ the torus (Liouville), and is inverted as in analytic.abel_jacobi.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,12 +75,16 @@ class SeparatedPeriods(AngleSeries):
     @cached_property
     def cut_series(self) -> tuple[Array, ...]:
         """Return, per cut, the cosine coefficients of du_k/dφ (signs included), shape (g, N_s)."""
-        return tuple(self._series(s) for s in range(self.genus))
+        return tuple(self.resolved(partial(self.forms, s)) for s in range(self.genus))
 
-    def _series(self, s: int) -> Array:
+    def resolved(self, function: Callable[[Array], Array]) -> Array:
+        """Return the cosine coefficients of even functions of an angle, (K, M), from their values (K, N) at angles (N,).
+
+        Raises Unsolved where they do not fall to rounding.
+        """
         count = _FEWEST_NODES
         while count <= _MOST_NODES:
-            coefficients = self.arithmetic.cosine_series(self.forms(s, self.arithmetic.nodes(count)))
+            coefficients = self.arithmetic.cosine_series(function(self.arithmetic.nodes(count)))
             size = np.max(np.abs(coefficients), axis=1, keepdims=True)
             if np.all(np.abs(coefficients[:, -2:]) <= _RESOLVED * size):
                 significant = np.flatnonzero(np.any(np.abs(coefficients) > _RESOLVED / 4 * size, axis=0))

@@ -52,7 +52,7 @@ class Trajectory:
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as ``trajectory.q``.
 
     times (N,) · error (N,) a bound on every component of the problem's ``bounded`` series at each time, in absolute value
-    arrays: the series that do not follow from others, by name, first axis the times, in memory the last one where they are many
+    arrays: the series that do not follow from others, by name, first axis the times, which may be the last in memory
     decimals: the same series to more digits, or with certified errors, where that was asked for
 
     System veselova: q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i, along the body axes of the problem · omega (N, n, n)
