@@ -175,9 +175,9 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(n: int, part
 @pytest.mark.parametrize("part", range(len(PARTS)))
 def test_far_points_of_wide_bodies_agree_with_integration(part: int, A: tuple[float, ...], rng: Generator) -> None:
     """The form of n = 2 may be constant along its cut, while dt/dτ turns sharply there."""
-    drawn = point(rng, len(A), PARTS[part])
-    velocity = drawn.q_dot / np.linalg.norm(drawn.q_dot)
-    problem = SeparableVeselova(A, drawn.q, velocity, drawn.given.get("potential"), normalize=True)
+    start = point(rng, len(A), PARTS[part])
+    velocity = start.q_dot / np.linalg.norm(start.q_dot)
+    problem = SeparableVeselova(A, start.q, velocity, start.given.get("potential"), normalize=True)
     times = np.array([-80.0, 0.5, 150.0])
     closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
     assert closed.provenance.details["clock"] == "fourier"

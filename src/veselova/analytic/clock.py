@@ -46,18 +46,14 @@ class Rate(ABC, Generic[P]):
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
 
+    @property
     @abstractmethod
-    def needed_nodes(self, s: int) -> int:
-        """Return how many nodes of cut s resolve them."""
-
-    @cached_property
-    def longest(self) -> int:
-        """Return the most nodes that any cut needs."""
-        return max(self.needed_nodes(s) for s in range(self.inversion.periods.genus))
+    def needed_nodes(self) -> tuple[int, ...]:
+        """Return, per cut, how many nodes resolve them."""
 
     def _weighted_at_nodes(self, s: int) -> Values:
         """Return the weighted forms at so many nodes."""
-        return self._weighted_forms(s, self.inversion.arithmetic.nodes(self.needed_nodes(s)))
+        return self._weighted_forms(s, self.inversion.arithmetic.nodes(self.needed_nodes[s]))
 
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
@@ -116,9 +112,10 @@ class ClockRate(Rate[Periods]):
         point = curve.point(2 * s + 1) + below
         return np.asarray(rate_factor(curve, s, point, self.time, curve.arithmetic))
 
-    def needed_nodes(self, s: int) -> int:
+    @property
+    def needed_nodes(self) -> tuple[int, ...]:
         """Return those of the forms' own series: the factors are analytic in their strips."""
-        return int(self.inversion.periods.forms_at_nodes[s][0].shape[-1])
+        return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
 
     def _weighted_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]

@@ -36,7 +36,7 @@ class Along:
 class Filling:
     """The answer while it is filled: a row for τ₁ and one for every component of the series, along the times.
 
-    So the answer is written by long rows, in half the time of short ones, and functions of many states run along them.
+    So the answer is written by long rows, in three fifths of the time of short ones, and functions of many states run along them.
     """
 
     def __init__(self, times: Array, fewest: int, clock: Clock, rates: Array, evaluation: Evaluation) -> None:

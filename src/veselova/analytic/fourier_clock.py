@@ -153,7 +153,7 @@ class ColumnsForModes:
 
     def __call__(self, modes: NDArray[np.int64]) -> list[tuple[Values, Values]]:
         """Return the columns for modes (M, g)."""
-        needed = 2 * (self._rate.longest + int(np.max(np.abs(modes))))
+        needed = 2 * (max(self._rate.needed_nodes) + int(np.max(np.abs(modes))))
         if needed > self._count:
             self._count = needed + _SPARE_NODES
             self._columns = self._rate.columns(self._count)

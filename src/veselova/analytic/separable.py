@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,10 +143,12 @@ class SeparatedRate(Rate[SeparatedPeriods]):
         """Return dt/dτ at angles of shape (N, g)."""
         return np.asarray(np.sqrt(np.prod(self.inversion.periods.points(psi), axis=1)))
 
-    def needed_nodes(self, s: int) -> int:
-        """Return the number of coefficients of the forms or the weighted ones: √λ may make two of them many."""
+    @cached_property
+    def needed_nodes(self) -> tuple[int, ...]:
+        """Return, per cut, the number of coefficients of the forms or the weighted ones: √λ may make two of them many."""
         periods = self.inversion.periods
-        return int(max(periods.resolved(partial(self._weighted_forms, s)).shape[1], periods.cut_series[s].shape[1]))
+        weighted = (periods.resolved(partial(self._weighted_forms, s)) for s in range(periods.genus))
+        return tuple(max(a.shape[1], b.shape[1]) for a, b in zip(weighted, periods.cut_series, strict=True))
 
     def _weighted_forms(self, s: int, psi: Array) -> Array:
         periods = self.inversion.periods
