@@ -52,6 +52,10 @@ class Server:
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
         return [int(child) for child in children]
 
+    def interrupt(self) -> None:
+        """Send the interrupt of a terminal, which goes to the server and all processes that it has started."""
+        os.killpg(self.process.pid, signal.SIGINT)
+
     def ask(self, method: str, path: str, **options: Any) -> httpx2.Response:
         """Return the answer to a request."""
         return httpx2.request(method, f"{self.url}{path}", **{"timeout": PATIENCE, **options})
@@ -117,7 +121,7 @@ def running_server(folder: Path, *arguments: str, awaited: str = "/readyz", **li
     log = folder / "server.log"
     with log.open("wb") as stream:
         command = [sys.executable, "-m", "veselova", "serve", "--port", str(port), *arguments]
-        process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment)
+        process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
             server.wait_ready(awaited)

@@ -330,19 +330,33 @@ def test_signals_end_the_server_cleanly(tmp_path: Path, number: signal.Signals) 
         assert "Application shutdown complete" in own.log.read_text()
 
 
-def test_sigterm_ends_work_in_flight_after_its_grace(tmp_path: Path) -> None:
+@pytest.mark.parametrize("from_terminal", [False, True])
+def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1", shutdown_grace_s="1") as own:
         workers = own.workers()
         answers: list[Any] = []
         thread = threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
         thread.start()
         wait_until(lambda: own.at_work() == (1, 0))
-        own.process.send_signal(signal.SIGTERM)
+        if from_terminal:
+            own.interrupt()
+        else:
+            own.process.send_signal(signal.SIGTERM)
         assert own.process.wait(PATIENCE) == 0
         thread.join(PATIENCE)
         is_problem(answers[0], 503, "shutting-down")
         assert "Traceback" not in own.log.read_text()
         wait_until(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers))
+
+
+def test_the_interrupt_of_a_terminal_finds_a_worker_that_still_starts(tmp_path: Path) -> None:
+    with running_server(tmp_path, awaited="/healthz", workers="1") as own:
+        wait_until(own.workers)
+        assert own.get("/readyz").status_code == 503
+        own.interrupt()
+        assert own.process.wait(PATIENCE) == 0
+        assert "Traceback" not in own.log.read_text()
+        assert "Application shutdown complete" in own.log.read_text()
 
 
 def test_the_server_stays_small(tmp_path: Path) -> None:

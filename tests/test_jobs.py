@@ -254,6 +254,17 @@ def test_the_death_of_the_server_loses_no_finished_chunk(tmp_path: Path, undistu
         assert server.get(f"{link}/result").content == undisturbed
 
 
+def test_the_interrupt_of_a_terminal_ends_the_server_and_keeps_the_chunks(tmp_path: Path) -> None:
+    with running_server(tmp_path, sweep_workers="2") as own:
+        link = post(own, "/v1/sweeps", LONG).headers["location"]
+        done = wait_for(own, link, half_way)["done"]
+        own.interrupt()
+        assert own.process.wait(PATIENCE) == 0
+        assert "Traceback" not in own.log.read_text()
+    with running_server(tmp_path, sweep_workers="2") as own:
+        assert job(own, link)["done"] >= done
+
+
 @pytest.mark.slow
 def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undisturbed: bytes) -> None:
     with running_server(tmp_path, sweep_workers="2") as server:

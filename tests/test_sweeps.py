@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -25,7 +26,7 @@ from distributed import Nanny
 from pyarrow import parquet
 
 import veselova as vs
-from conftest import PATIENCE
+from conftest import PATIENCE, wait_until
 from veselova.analytic.solution import Solution
 from veselova.mechanics.errors import InvalidRequest, Unsolved
 from veselova.service import dispatch
@@ -650,3 +651,20 @@ def test_the_command_line_sweeps(tmp_path: Path) -> None:
     refused = run("--output", str(tmp_path / "table.xls"))
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "--output: required a file in an existing folder" in refused.stderr
+
+
+def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.json"
+    file.write_text(json.dumps({"problem": BASE, "vary": {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}}))
+    command = [sys.executable, "-m", "veselova", "sweep", str(file), "--folder", str(tmp_path / "kept"), "--workers", "2"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+
+        def workers() -> int:
+            children = " ".join(path.read_text() for path in Path(f"/proc/{process.pid}/task").glob("*/children")).split()
+            return sum("multiprocessing.spawn" in Path(f"/proc/{child}/cmdline").read_text() for child in children)
+
+        wait_until(lambda: workers() == 2)
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert errors == "What is done is kept; the same command goes on from there.\n"

@@ -114,6 +114,8 @@ def _is_request_id(text: str) -> bool:
 async def _warm(workers: Workers) -> None:
     try:
         await workers.start()
+    except Refused as error:
+        _LOG.error("the first worker could not be started; /readyz stays at 503: %s", error)
     except Exception:
         _LOG.exception("the first worker could not be started; /readyz stays at 503")
 

@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from veselova.mechanics.errors import BackendMissing, InvalidInput
+from veselova.service.interrupts import children_deaf
 from veselova.service.settings import MEGABYTE, Settings
 
 __all__ = ["open_cluster", "require_scheduler"]
@@ -69,7 +70,8 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
     with dask.config.set(_configuration(niceness if processes and hasattr(os, "setpriority") else 0)):
         starting = asyncio.ensure_future(LocalCluster(**_machine(settings, processes)))
         try:
-            cluster = await asyncio.shield(starting)
+            with children_deaf():
+                cluster = await asyncio.shield(starting)
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error
         except asyncio.CancelledError:  # workers that are half started would outlive their cluster

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.cluster import require_scheduler
+from veselova.service.interrupts import keep_from_children
 from veselova.service.settings import Settings
 
 __all__ = ["serve", "settings_of_environment"]
@@ -48,6 +49,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
     from veselova.service.logs import configure_logging
 
     configure_logging(limits)
+    keep_from_children()  # work in flight gets its grace after SIGINT as after SIGTERM
     app = create_app(limits, loopback=loopback)
     if not loopback and not Policy.requires_keys(limits, loopback):
         _LOG.warning("clients need no key although %s is no loopback address: whoever reaches it can use the service", host)

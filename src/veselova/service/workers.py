@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -40,7 +41,7 @@ class Workers:
 
     async def start(self) -> None:
         """Start one worker with both engines loaded."""
-        await to_process.run_sync(warm_up, cancellable=True, limiter=self._limiter)
+        await self.run(warm_up, budget_s=math.inf)
         self.warm = True
 
     async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
@@ -59,7 +60,7 @@ class Workers:
                 return await to_process.run_sync(*work, cancellable=True, limiter=self._limiter)
         except TimeoutError:
             raise Refused("over-budget", f"The work was stopped after its budget of {budget_s:g} s.") from None
-        except BrokenWorkerProcess:
+        except (BrokenWorkerProcess, KeyboardInterrupt):  # interrupted: only where another command serves
             raise Refused("worker-lost", "The worker process ended before it answered; try again.", retry_after=1) from None
 
 

@@ -1,0 +1,49 @@
+"""The interrupt of a terminal goes to every process it runs; workers are to leave it to the process that started them."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+
+__all__ = ["children_deaf", "keep_from_children"]
+
+_MASKS = hasattr(signal, "pthread_sigmask")  # only POSIX systems have them, and interrupts that go to a group of processes
+
+
+def keep_from_children() -> None:
+    """Let no process that the main thread starts from now on receive SIGINT; this process goes on receiving it.
+
+    A process inherits the signals that are blocked in the thread that starts it, and there is no other way to reach one that is
+    still loading its interpreter. Blocked here, SIGINT is awaited by a thread and handed to the main one.
+    """
+    if _MASKS:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        threading.Thread(target=_hand_on, name="interrupts", daemon=True).start()
+
+
+def _hand_on() -> None:
+    while True:
+        signal.sigwait({signal.SIGINT})
+        _thread.interrupt_main()
+
+
+@contextmanager
+def children_deaf() -> Iterator[None]:
+    """Let no process that this thread, or one that it starts, starts within the block receive SIGINT.
+
+    An interrupt of this thread comes after the block.
+    """
+    if not _MASKS:
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        resource_tracker.ensure_running()  # multiprocessing starts it with its first process, and unblocks SIGINT when it has
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
