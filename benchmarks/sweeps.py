@@ -1,28 +1,45 @@
 """How many problems does a sweep solve in a second, and how much do two workers give over one?
 
-    python benchmarks/sweeps.py [PROBLEMS]
+    python benchmarks/sweeps.py [PROBLEMS [ROUNDS]]
 
-Torus summaries of bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in one run. The time is that
-from the first chunk to the last, so the start of the processes does not count. Default: 10 000 problems for each.
+Torus summaries of PROBLEMS (10 000) bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in turn, ROUNDS
+(5) times over. The time is that from the first chunk to the last, so the start of the processes does not count.
+
+The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that neither keep a chunk nor know of
+another job: two processors may give less than twice one, or more while somebody else takes part of them, and the pool says what
+they give at the time. Two loops of Python that do nothing are asked, too.
 """
 
 from __future__ import annotations
 
+import os
+import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from multiprocessing import get_context
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.schemas import read_request
+from veselova.service.summaries import computed_chunk
 from veselova.service.sweep_request import SweepRequest
+from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [1, 1, 1], "q": [1, 0, 0], "q_dot": [0, 1, 0], "normalize": True}
 VARY = {"/A": {"uniform": [1, 3]}, "/q": {"normal": [0, 1]}, "/q_dot": {"normal": [0, 1]}}
 
 
-def rate(problems: int, workers: int) -> float:
-    """Return problems per second."""
-    sweep = read_request(SweepRequest, {"problem": BASE, "vary": VARY, "samples": problems, "seed": workers})
+def between(seen: list[tuple[float, int]]) -> float:
+    """Return problems per second from the first chunk to the last but one: at the end some of the processes have no work left."""
+    (began, first), (ended, last) = seen[0], seen[-2 if len(seen) > 2 else -1]
+    return (last - first) / (ended - began)
+
+
+def swept(sweep: SweepRequest, workers: int) -> float:
+    """Return problems per second of a sweep."""
     seen: list[tuple[float, int]] = []
 
     def note(done: int, _: int) -> None:
@@ -31,17 +48,65 @@ def rate(problems: int, workers: int) -> float:
 
     with tempfile.TemporaryDirectory() as folder:
         run_sweep(sweep, local_settings(folder, workers), note)
-    (began, first), (ended, last) = seen[0], seen[-2 if len(seen) > 2 else -1]
-    return (last - first) / (ended - began)
+    return between(seen)
+
+
+def chunk(work: tuple[bytes, int, int]) -> int:
+    """Return how many problems were solved: those of one chunk."""
+    return computed_chunk(*work, __version__).rows
+
+
+def pooled(sweep: SweepRequest, processes: int) -> float:
+    """Return problems per second of a pool of processes that computes the same chunks."""
+    text = sweep.model_dump_json(by_alias=True, exclude_unset=True).encode()
+    starts = range(0, sweep.total, sweep.chunk_rows)
+    work = [(text, start, min(start + sweep.chunk_rows, sweep.total)) for start in starts]
+    seen: list[tuple[float, int]] = []
+    with get_context("spawn").Pool(processes) as pool:
+        done = 0
+        for rows in pool.imap_unordered(chunk, work):
+            done += rows
+            seen.append((time.perf_counter(), done))
+    return between(seen)
+
+
+def counted(seconds: float) -> float:
+    """Return how often a second a loop of Python ran through."""
+    ended, rounds = time.perf_counter() + seconds, 0
+    while time.perf_counter() < ended:
+        sum(range(10_000))
+        rounds += 1
+    return rounds / seconds
+
+
+def looped(processes: int) -> float:
+    """Return how often a second processes that do nothing but count went round, together."""
+    with get_context("spawn").Pool(processes) as pool:
+        return sum(pool.map(counted, [1.0] * processes, chunksize=1))
+
+
+def rounds(problems: int, count: int) -> Iterator[dict[tuple[str, int], float]]:
+    """Yield what each round gave: (who, how many processes) → problems or loops per second."""
+    for k in range(count):
+        sweep = read_request(SweepRequest, {"problem": BASE, "vary": VARY, "samples": problems, "seed": k})
+        found: dict[tuple[str, int], float] = {}
+        for processes in (1, 2) if k % 2 else (2, 1):
+            found["sweep", processes] = swept(sweep, processes)
+            found["pool", processes] = pooled(sweep, processes)
+            found["loop", processes] = looped(processes)
+        yield found
 
 
 def main() -> None:
     problems = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
-    rates = {}
-    for workers in (1, 2):
-        rates[workers] = rate(problems, workers)
-        print(f"{workers} worker(s): {rates[workers]:.0f} problems per second")
-    print(f"two over one: {rates[2] / rates[1]:.2f}")
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else 5
+    ratios: dict[str, list[float]] = {"sweep": [], "pool": [], "loop": []}
+    for found in rounds(problems, count):
+        for who, ratio in ratios.items():
+            ratio.append(found[who, 2] / found[who, 1])
+        rates = ", ".join(f"{who} {found[who, 1]:.0f} and {found[who, 2]:.0f}" for who in ("sweep", "pool"))
+        print(f"problems per second by one and by two: {rates}; two over one: " + ", ".join(f"{w} {r[-1]:.2f}" for w, r in ratios.items()))
+    print("two over one, medians: " + ", ".join(f"{who} {statistics.median(ratio):.2f}" for who, ratio in ratios.items()))
 
 
 if __name__ == "__main__":

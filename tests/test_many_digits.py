@@ -99,10 +99,12 @@ def test_theta_functions_in_balls_hold_flints(genus: int, rng: np.random.Generat
 
 
 @pytest.mark.parametrize("digits", [20, 60])
-def test_lambdas_of_many_positions_hold_those_of_each(digits: int, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_lambdas_of_many_positions_hold_those_of_each(size: int, digits: int, rng: np.random.Generator) -> None:
     """At random, on a coordinate plane, beside one, and where two of them all but meet."""
-    inverse = [Fraction(1, 5), Fraction(1, 4), Fraction(1, 4) + Fraction(1, 10**9), Fraction(1)]
-    rows = [*rng.normal(size=(5, 4)).tolist(), [0.6, 0, 0.8, 0], [0.6, 1e-25, 0.5, 0.3], [0.6, 1e-9, 1e-9, 0.8], [0, 0, 0, 1]]
+    inverse = [Fraction(1, 5), Fraction(1, 4), Fraction(1, 4) + Fraction(1, 10**9), Fraction(1)][-size:]
+    chosen = [[0.6, 0, 0.8, 0], [0.6, 1e-25, 0.5, 0.3], [0.6, 1e-9, 1e-9, 0.8], [0, 0, 0, 1], [0.3, 1, 1e-12, 0]]
+    rows = [row[-size:] for row in rng.normal(size=(5, 4)).tolist() + chosen]
     with balls(digits, False) as xp:
         q = xp.array(rows)
         q = q / xp.sqrt(np.sum(q * q, axis=1))[:, None]

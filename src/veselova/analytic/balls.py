@@ -44,6 +44,8 @@ _UNASKED_DIGITS = 5
 _UNASKED = 10**_UNASKED_DIGITS
 _HALF = _UNASKED // 2
 
+_ZERO = Decimal(0)
+
 _global = threading.RLock()
 
 
@@ -262,17 +264,15 @@ _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many digits."""
-    x = flint.arb(x)
+    if not isinstance(x, flint.arb):
+        x = flint.arb(x)
     if not x.is_finite():
         return Decimal(0), Decimal("Infinity")
     middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
     rounded, rest = divmod(middle + _HALF, _UNASKED)
     radius += abs(rest - _HALF)
-    return _decimal_of(rounded, exponent + _UNASKED_DIGITS, _EXACT), _decimal_of(radius, exponent, _UPWARDS)
-
-
-def _decimal_of(mantissa: int, exponent: int, context: Context) -> Decimal:
-    return Decimal(mantissa).scaleb(exponent, context) if mantissa else Decimal(0)
+    shown = Decimal(rounded).scaleb(exponent + _UNASKED_DIGITS, _EXACT) if rounded else _ZERO
+    return shown, Decimal(radius).scaleb(exponent, _UPWARDS) if radius else _ZERO
 
 
 def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:

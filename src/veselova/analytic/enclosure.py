@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.precision import Decimals, Values
@@ -24,7 +25,7 @@ _FINER = 2
 #: Digits of zeros found in double precision.
 _DOUBLE_DIGITS = 12
 
-#: How much more than perturbation theory a step in intervals may leave open.
+#: How much more than perturbation theory the balls may leave open.
 _ROOM = 16
 
 #: Newton's steps from the zeros found to those digits.
@@ -54,9 +55,31 @@ def enclosed(found: Resolved) -> Spectrum:
 def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     """Return the λ's of positions q (N, m), shape (N, m−1): the zeros of Σ q_i² Π_{k≠i}(λ−I_k), all positions at once.
 
-    They are eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹: where an interval Newton step cannot show as much,
-    as it cannot where two nearly meet, they are found one position at a time.
+    They are eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹: where balls of about that size cannot be shown to hold
+    them, as they cannot where two nearly meet, they are found one position at a time.
     """
+    room = _ROOM * (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
+    found, shown = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
+    for row in np.flatnonzero(~shown):
+        poles = [xp.rational(x) for x in inverse]
+        middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
+        found[row] = xp.widened(xp.array(middle), room[row] / _ROOM)
+    return found
+
+
+def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, NDArray[np.bool_]]:
+    """Return balls around the zeros for m = 3, (N, 2), and which positions have theirs within the room; others nearly meet."""
+    squares, (first, second, third) = q * q, inverse
+    leading, half = np.sum(squares, axis=1), squares @ np.array([second + third, first + third, first + second]) / 2
+    constant = squares @ np.array([second * third, first * third, first * second])
+    larger = half + xp.sqrt(half * half - leading * constant)  # the smaller one as half − √ would cancel
+    zeros = np.stack([constant / larger, larger / leading], axis=1)
+    around = xp.midpoints(zeros) + xp.around_zero(room)[:, None]
+    return zeros, np.array([xp.inside(*pair) for pair in zip(zeros, around, strict=True)])
+
+
+def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, NDArray[np.bool_]]:
+    """Return the zeros for any m by Newton steps, (N, m−1), and where one in intervals of the room showed that they hold them."""
     weights = (q * q)[:, :, None]
     zeros = xp.array(to_spheroconic(1 / inverse.astype(float), q.astype(float)))
 
@@ -73,14 +96,9 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     while digits < xp.digits:
         value, slope = polynomial(zeros)
         zeros, digits = xp.midpoints(zeros - xp.midpoints(value) / xp.midpoints(slope)), 2 * digits
-    radius = (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
-    around = zeros + xp.around_zero(_ROOM * radius)[:, None]
+    around = zeros + xp.around_zero(room)[:, None]
     step = zeros - polynomial(zeros)[0] / polynomial(around)[1]
-    for row in [row for row in range(len(q)) if not xp.inside(step[row], around[row])]:
-        poles = [xp.rational(x) for x in inverse]
-        middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
-        step[row] = xp.widened(xp.array(middle), radius[row])
-    return np.asarray(step)
+    return np.asarray(step), np.array([xp.inside(*pair) for pair in zip(step, around, strict=True)])
 
 
 def resting_spheroconic(moving: Moving, xp: Balls) -> Values:
