@@ -4,10 +4,11 @@
 
 On a uniform grid every wave e^{2πi (x·f)(aB+b)h} is a giant step times a baby step, so the waves of one ε (A: giant steps ×
 waves, B: waves × baby steps) give each of their functions as a product (A w) B of complex matrices; two real functions share one.
-At any phases the lattice is split in two, Gaussians and waves, and a product of real matrices sums over the former
-(analytic.theta, which is how every theta function of this package is summed). "Whole answer": solve at as many uniform times, which
-takes theta functions at the nodes of its windows only, and has the clock, q̇ and the frame in it besides. Processor time for each
-point, the least of three, one thread, one process. The difference is that of both sums at a thousand points, over the largest value.
+At any phases the lattice is split in two, Gaussians and waves, and a product of real matrices sums over the former: so
+analytic.theta sums every theta function. Both are of the functions alone. "Products": solve with method="products", which sums
+them at every time, a tenth of so many; "chosen": solve at as many uniform times, which sums them at the nodes of its windows.
+Processor time for each point, the least of three, one thread, one process. The difference is that of the first two, over the
+largest value.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,9 @@ import veselova as vs
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.lattice import RADIUS, lattice_points, small_norm
 from veselova.analytic.solution import Solution
+
+#: Points at which functions are summed one by one.
+_SCATTERED = 20_000
 
 
 def least(call: Callable[[], Any]) -> tuple[float, Any]:
@@ -42,7 +46,7 @@ def least(call: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def on_grid(
-    T: np.ndarray, functions: list[Characteristic], origin: np.ndarray, rates: np.ndarray, step: float, side: int
+    T: np.ndarray, functions: Sequence[Characteristic], origin: np.ndarray, rates: np.ndarray, step: float, side: int
 ) -> np.ndarray:
     """Return the functions at τ₁ = 0, step … (side²−1)·step, shape (len(functions), side²)."""
     families = defaultdict(list)
@@ -65,27 +69,26 @@ def on_grid(
     return result.reshape(len(functions), -1)
 
 
+def compare(n: int, count: int) -> str:
+    """Return a row of the table; n = 6 makes do with a sixteenth of the points of a grid, whose products take seconds."""
+    body = problem(n)
+    solution = Solution(body)
+    T, functions, flow = np.asarray(solution.periods.riemann_matrix, float), solution.quotients.functions, solution.in_tau1
+    side, step = round(count**0.5) // (4 if n == 6 else 1), 1000 / count
+    of_grid, values = least(lambda: on_grid(T, functions, flow.start, flow.rates, step, side))
+    some = np.arange(0, side * side, max(1, side * side // _SCATTERED))
+    of_sums, sums = least(lambda: solution.quotients.theta.values(flow.start + np.outer(some * step, flow.rates), functions))
+    of_products = least(lambda: vs.solve(body, np.linspace(0, 100, count // 10), method="products"))[0]
+    chosen = least(lambda: vs.solve(body, np.linspace(0, 1000, count)))[0]
+    difference = np.max(np.abs(values[:, some].T - sums)) / np.max(np.abs(sums))
+    taken = (of_grid / side**2, of_sums / some.size, of_products / (count // 10), chosen / count)
+    return f"{n}   {len(functions):9d}   {'   '.join(f'{1e6 * seconds:8.3f} µs' for seconds in taken)}   {difference:.1e}"
+
+
 def main(count: int) -> None:
-    side = round(count**0.5)
-    print("n   functions   waves   uniform τ₁   any phases   whole answer   difference")
+    print("n   functions    uniform τ₁    any phases      products        chosen   difference")
     for n in (2, 3, 4, 5, 6):
-        body = problem(n)
-        solution = Solution(body)
-        T, functions = np.asarray(solution.periods.riemann_matrix, dtype=float), list(solution.quotients.functions)
-        rates, origin = solution.in_tau1.rates, solution.in_tau1.at(0.0) if hasattr(solution.in_tau1, "at") else np.zeros(n - 1)
-        step = 1000.0 / (side * side)
-        if n == 6:
-            side_here = side // 4
-        else:
-            side_here = side
-        grid, values = least(lambda: on_grid(T, functions, origin, rates, step, side_here))
-        z = origin + np.outer(np.arange(side_here**2)[:: max(1, side_here**2 // 20_000)] * step, rates)
-        single, sums = least(lambda: solution.quotients.theta.values(z, functions))
-        whole = least(lambda: vs.solve(body, np.linspace(0, 1000, side * side)))[0]
-        there = values[:, :: max(1, side_here**2 // 20_000)].T
-        difference = np.max(np.abs(there - sums)) / np.max(np.abs(sums))
-        waves = solution.quotients.theta.size
-        print(f"{n}   {len(functions):9d}   {waves:5d}   {1e6*grid/side_here**2:7.3f} µs   {1e6*single/len(z):7.3f} µs   {1e6*whole/side**2:9.3f} µs   {difference:.1e}", flush=True)
+        print(compare(n, count), flush=True)
 
 
 if __name__ == "__main__":

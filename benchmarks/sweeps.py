@@ -2,12 +2,12 @@
 
     python benchmarks/sweeps.py [PROBLEMS [ROUNDS]]
 
-Torus summaries of PROBLEMS (10 000) bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in turn, ROUNDS
-(5) times over. The time is that from the first chunk to the last, so the start of the processes does not count.
+Torus summaries of PROBLEMS (10 000) bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in turn,
+ROUNDS (5) times over. The time is that from the first chunk to the last, so the start of the processes does not count.
 
-The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that neither keep a chunk nor know of
-another job: two processors may give less than twice one, or more while somebody else takes part of them, and the pool says what
-they give at the time. Two loops of Python that do nothing are asked, too.
+The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that neither keep a chunk nor know
+of another job: two processors may give less than twice one, or more where somebody else takes part of them at times, and the pool
+says what they give. Two loops of Python that do nothing are asked, too.
 """
 
 from __future__ import annotations
@@ -105,7 +105,10 @@ def main() -> None:
         for who, ratio in ratios.items():
             ratio.append(found[who, 2] / found[who, 1])
         rates = ", ".join(f"{who} {found[who, 1]:.0f} and {found[who, 2]:.0f}" for who in ("sweep", "pool"))
-        print(f"problems per second by one and by two: {rates}; two over one: " + ", ".join(f"{w} {r[-1]:.2f}" for w, r in ratios.items()))
+        print(
+            f"problems per second by one and by two: {rates}; two over one: "
+            + ", ".join(f"{w} {r[-1]:.2f}" for w, r in ratios.items())
+        )
     print("two over one, medians: " + ", ".join(f"{who} {statistics.median(ratio):.2f}" for who, ratio in ratios.items()))
 
 

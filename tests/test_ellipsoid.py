@@ -42,7 +42,7 @@ def true_error(problem: EllipsoidGeodesic, arcs: Any, **options: Any) -> tuple[A
 
 
 @pytest.mark.parametrize("n", range(2, 7))
-@pytest.mark.parametrize("method", ["theta", "nufft", "angles"])
+@pytest.mark.parametrize("method", ["theta", "products", "nufft", "angles"])
 def test_theta_functions_follow_geodesics_to_twelve_digits(n: int, method: str, rng: Generator) -> None:
     arcs = np.array([-20.0, -3.0, 0.0, 0.1, 7.0, 20.0])
     for _ in range(2):

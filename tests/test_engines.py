@@ -21,7 +21,14 @@ from veselova.analytic.solve import solve as solve_analytic
 #: The stated slack of every error estimate: the true error stays below this many times the reported one.
 SLACK = 2.0
 
-METHODS = [("analytic", "theta"), ("analytic", "nufft"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+METHODS = [
+    ("analytic", "theta"),
+    ("analytic", "products"),
+    ("analytic", "nufft"),
+    ("analytic", "angles"),
+    ("numeric", "dop853"),
+    ("numeric", "taylor"),
+]
 SOLVABLE = [case for case in TABLE if "at-rest" not in case.tags]
 
 #: Cases of every kind, for what is tested of every method.
@@ -70,7 +77,7 @@ def test_truth_reproduces_the_reference_motions(case: Case) -> None:
     assert np.max(np.abs(found[2] - tau1)) <= 1e-15 * np.max(np.abs(tau1))
 
 
-@pytest.mark.parametrize("method", ["theta", "nufft", "angles"])
+@pytest.mark.parametrize("method", ["theta", "products", "nufft", "angles"])
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: str) -> None:
     times, frame, q_dot, tau1 = reference(case)
@@ -159,7 +166,7 @@ def test_adversarial_starts_are_served_honestly(seed: int) -> None:
     assert np.max(found.error) < 1e-9, name
 
 
-@pytest.mark.parametrize("method", ["theta", slow("nufft"), slow("angles")])
+@pytest.mark.parametrize("method", ["theta", "products", slow("nufft"), slow("angles")])
 @pytest.mark.parametrize("count", [0, 3000])
 def test_very_wide_inertia_is_served_honestly_by_every_route(method: str, count: int) -> None:
     """A's over eight orders of magnitude: q from theta quotients would tell dt/dτ₁ to 1e-12 only."""

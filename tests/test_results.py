@@ -66,7 +66,14 @@ def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
 
 @pytest.mark.parametrize(
     ("engine", "method"),
-    [("analytic", "theta"), ("analytic", "nufft"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")],
+    [
+        ("analytic", "theta"),
+        ("analytic", "products"),
+        ("analytic", "nufft"),
+        ("analytic", "angles"),
+        ("numeric", "dop853"),
+        ("numeric", "taylor"),
+    ],
 )
 def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -> None:
     problem = tagged("generic")[1].problem()

@@ -42,6 +42,15 @@ def test_many_times_are_the_motion_of_each(case: Case) -> None:
     assert np.all(many.error[chosen] <= 2 * single.error)
 
 
+def test_products_are_taken_at_every_time_and_windows_at_few() -> None:
+    problem, times = random_problem(np.random.default_rng(5), 4), np.linspace(-20, 40, 3000)
+    windows, products = solve(problem, times), solve(problem, times, method="products")
+    assert products.provenance.method == "products"
+    assert products.provenance.details["evaluations"] == times.size > windows.provenance.details["evaluations"]
+    assert_one_motion(windows, products, np.arange(times.size))
+    assert np.max(np.abs(windows.frame - products.frame)) < 1e-13
+
+
 @pytest.mark.parametrize("method", ["theta", "angles"])
 @pytest.mark.parametrize("clock", ["fourier", "panels"])
 def test_windows_serve_either_clock_and_route(method: str, clock: str) -> None:

@@ -42,8 +42,8 @@ def solve(
     """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``; None takes the closed form where
-    the system has one. ``method``: None for the engine's default; analytic: ``theta``, ``angles`` or ``nufft``; numeric:
-    ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``. ``formulation`` (numeric): which of
+    the system has one. ``method``: None for the engine's default; analytic: ``theta``, ``products``, ``nufft`` or ``angles``;
+    numeric: ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``. ``formulation`` (numeric): which of
     ``problem.formulations`` is integrated.
     ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal with that many digits after the
     point in q and frame, ``trajectory.decimals``. Data are taken at their word: strings exactly, doubles as the dyadic numbers

@@ -16,7 +16,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 #: Rounding of one evaluation of the attitude, in ε; largest seen over the problem tables: 8 by angles, 20 by theta quotients, and
 #: there for each unit of the largest entry of T, whose rounding stands in an exponent. That of transforms comes on top.
-_EVALUATION = {"angles": 16.0, "theta": 40.0, "nufft": 40.0}
+_EVALUATION = {"angles": 16.0, "theta": 40.0, "products": 40.0, "nufft": 40.0}
 
 #: Rounding of a phase in ε: the start's Abel map, the reduced advance, Newton's residual.
 _PHASE = 8.0

@@ -36,8 +36,8 @@ __all__ = ["METHODS", "Solution"]
 
 Array = NDArray[np.float64]
 
-#: The routes from phases to attitude; transforms are never the cheapest.
-METHODS = ("theta", "nufft", "angles")
+#: The routes from phases to attitude; sums at every time, by products of matrices or transforms, are never cheaper than windows.
+METHODS = ("theta", "products", "nufft", "angles")
 
 #: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.4, 1.1, 4 and 24
 #: against 2.6, 3.6, 10 and 8).
@@ -193,8 +193,8 @@ class Solution:
         return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
     def windows(self, times: Array, clock: str, method: str | None) -> Windows:
-        """Return the windows in which many times are interpolated, where that is cheaper with the clock; none for transforms."""
-        fewest = times.size + 1 if method == "nufft" else self.costs(times).fewest_in_window(NODES, clock)
+        """Return the windows in which many times are interpolated where that is cheaper with the clock and the method has any."""
+        fewest = times.size + 1 if method in ("products", "nufft") else self.costs(times).fewest_in_window(NODES, clock)
         return Windows(times, self._fastest, fewest)
 
     def cycles(self, times: Array) -> float:
@@ -259,7 +259,7 @@ class Solution:
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""
-        return self.quotients.at(z) if method == "theta" else self.frame.at(self.inversion.invert(z))
+        return self.frame.at(self.inversion.invert(z)) if method == "angles" else self.quotients.at(z)
 
     @cached_property
     def rotation(self) -> Array:

@@ -57,11 +57,12 @@ def solve(
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
-    ``method``: ``theta`` (every entry of the attitude a theta quotient), ``nufft`` (the same by nonuniform FFTs at all times,
-    extra ``fast``) or ``angles`` (Abel–Jacobi inversion, then the algebraic frame); None takes the cheapest, which ``nufft``
-    never is. ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same with the Fourier clock. Every
-    start is served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is that of starts a
-    rounding away, and grows like e^(rate·t); near one sums by ``nufft`` cancel, which is in their error.
+    ``method``: ``theta`` (every entry of the attitude a theta quotient; many times from few, in windows), ``products`` (the same
+    at every time, by products of matrices), ``nufft`` (at every time, by nonuniform FFTs, extra ``fast``) or ``angles``
+    (Abel–Jacobi inversion, then the algebraic frame; windows too); None takes the cheaper of ``theta`` and ``angles``.
+    ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same with the Fourier clock. Every start is
+    served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is that of starts a rounding away,
+    and grows like e^(rate·t); near one sums by ``nufft`` cancel, which is in their error.
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
     ``solution``: that of the problem in double precision, where it is known already.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer,
@@ -166,7 +167,7 @@ def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[A
             if with_coordinates:
                 further = (solution.spheroconic(attitude),)
         rate, *series = solution.states(attitude)
-        pace = solution.rate_at(z, route) if route == "theta" and not solution.is_even else 1 / rate
+        pace = solution.rate_at(z, route) if route in ("theta", "products") and not solution.is_even else 1 / rate
         return pace, (*series, *further)
 
     along = windows.along(clock, solution.in_tau1.rates, evaluation)

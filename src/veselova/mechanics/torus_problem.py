@@ -31,7 +31,7 @@ class TorusProblem(Problem):
     exact: ExactState
     axes: Array | None = None
 
-    engines: ClassVar = {"analytic": ("theta", "nufft", "angles"), "numeric": ("dop853", "taylor")}
+    engines: ClassVar = {"analytic": ("theta", "products", "nufft", "angles"), "numeric": ("dop853", "taylor")}
 
     @property
     @abstractmethod

@@ -57,7 +57,7 @@ class ComparisonRequest(TorusRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
 
     times: Annotated[Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
-    method: Annotated[str | None, Field(description="analytic: theta, nufft, angles; numeric: dop853, taylor")] = None
+    method: Annotated[str | None, Field(description="analytic: theta, products, nufft, angles; numeric: dop853, taylor")] = None
     formulation: Annotated[str | None, Field(description="numeric: which equations of the system are integrated")] = None
     outputs: Annotated[
         list[str] | None,
