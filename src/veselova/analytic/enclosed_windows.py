@@ -29,8 +29,9 @@ _SAMPLED, _FEW_TIMES = 40, 300
 #: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n = 3 to 6, 30 to 100 digits.
 _NODE, _TERM = 1.2, 1 / 600
 
-#: Nodes taken over those expected, for windows that were not looked at.
-_SPARE = 1.08
+#: Nodes taken over those expected: at so many digits, and more with the logarithm of more, since series fall more slowly than
+#: they begin. Of 330 random motions with n = 3 … 5 and 30 … 100 digits, 8 needed more, 1.22 times those expected at most.
+_SPARE, _SPARE_DIGITS, _SPARE_GROWTH = 1.08, 59, 0.13
 
 #: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
 _RECURRENCE_DIGITS = 6
@@ -58,10 +59,10 @@ class EnclosedWindows:
             return None
         xp = arithmetic
         first, last = (float(x) for x in (times[0], times[-1]))
-        choices = {}
+        spare, choices = _SPARE + _SPARE_GROWTH * math.log(xp.digits / _SPARE_DIGITS), {}
         for length in (2.0, 1.0, 0.5, 0.25):
             count = max(1, math.ceil(cycles / length))
-            nodes = math.ceil(_SPARE * expected_terms(_samples(first, last, count, sampled), xp.digits))
+            nodes = math.ceil(spare * expected_terms(_samples(first, last, count, sampled), xp.digits))
             choices[len(times) * nodes * _TERM + count * nodes * _NODE] = count, nodes
         cost = min(choices)
         if not cost < len(times):
@@ -96,10 +97,11 @@ class EnclosedWindows:
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
         slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
         shape = (self.count, columns)
+        halves, slack = _by_parity(series).reshape(2, *shape, -1), slack.reshape(shape)
         for w, rows in self._rows(times):
-            waves = self._waves((self._centres[w] - times[rows]) / self.half)
-            sums = xp.product(waves.T, series.reshape(*shape, self.nodes)[w].T)
-            result[rows] = xp.widened(sums, slack.reshape(shape)[w])
+            x = (self._centres[w] - times[rows]) / self.half
+            sums = xp.product(self._waves(2 * x * x - 1), np.concatenate(halves[:, w]).T)
+            result[rows] = xp.widened(sums[:, :columns] + x[:, None] * sums[:, columns:], slack[w])
         return result
 
     def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:
@@ -110,16 +112,31 @@ class EnclosedWindows:
             if first < last:
                 yield w, slice(first, last)
 
-    def _waves(self, x: Values) -> Values:
-        """Return T_0 … T_{nodes−1} at x (N,), shape (nodes, N), by T_{j+k} = 2T_jT_k − T_{j−k}."""
-        xp = self.arithmetic
+    def _waves(self, y: Values) -> Values:
+        """Return T_0 … of half as many terms as there are nodes at y (N,), shape (N, terms), by T_{j+k} = 2T_jT_k − T_{j−k}."""
+        xp, count = self.arithmetic, (self.nodes + 1) // 2
         with xp.at(xp.digits + _RECURRENCE_DIGITS):
-            waves, twice = [1 + 0 * x, x], [None, 2 * x]
-            for m in range(2, self.nodes):
+            waves, twice = [1 + 0 * y, y], [None, 2 * y]
+            for m in range(2, count):
                 waves.append(twice[m // 2] * waves[m - m // 2] - waves[m % 2])
-                if 2 * m <= self.nodes:
+                if 2 * m <= count:
                     twice.append(2 * waves[m])
-        return np.stack(waves[: self.nodes])
+        return np.stack(waves[:count], axis=1)
+
+
+def _by_parity(series: Values) -> Values:
+    """Return the e and d with Σ c_m T_m(x) = Σ e_j T_j(y) + x Σ d_j T_j(y), y = 2x²−1, (2, K, terms), from c (K, M).
+
+    T_2j(x) = T_j(y), and T_2j+1(x) = x (2T_j(y) − 2T_j−1(y) + … ± T_0): d_j = 2c_2j+1 − d_j+1, d_0 half of that.
+    """
+    terms = (series.shape[1] + 1) // 2
+    halves = np.zeros((2, series.shape[0], terms), dtype=object)
+    halves[0] = series[:, ::2]
+    above: Any = 0
+    for j in reversed(range(series.shape[1] // 2)):
+        above = halves[1, :, j] = 2 * series[:, 2 * j + 1] - above
+    halves[1, :, 0] = halves[1, :, 0] / 2
+    return halves
 
 
 def _samples(first: float, last: float, count: int, sampled: Callable[[Array], Array]) -> Array:
