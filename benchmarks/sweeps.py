@@ -2,8 +2,8 @@
 
     python benchmarks/sweeps.py [PROBLEMS [ROUNDS]]
 
-Torus summaries of PROBLEMS (10 000) bodies with n = 3 and random A, q and q_dot, by one worker process and by two, in turn,
-ROUNDS (5) times over. The time is that from the first chunk to the last, so the start of the processes does not count.
+Torus summaries of PROBLEMS (40 000, no fewer than 20 000) bodies with n = 3 and random A, q and q_dot, by one worker process and
+by two, in turn, ROUNDS (5) times over. The rate is that of chunks of 2000 that are done, without the start of the processes.
 
 The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that neither keep a chunk nor know
 of another job: two processors may give less than twice one, or more where somebody else takes part of them at times, and the pool
@@ -22,6 +22,8 @@ from multiprocessing import get_context
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import numpy as np
+
 from veselova.service.local_sweep import local_settings, run_sweep
 from veselova.service.schemas import read_request
 from veselova.service.summaries import computed_chunk
@@ -32,10 +34,13 @@ BASE = {"system": "veselova", "A": [1, 1, 1], "q": [1, 0, 0], "q_dot": [0, 1, 0]
 VARY = {"/A": {"uniform": [1, 3]}, "/q": {"normal": [0, 1]}, "/q_dot": {"normal": [0, 1]}}
 
 
-def between(seen: list[tuple[float, int]]) -> float:
-    """Return problems per second from the first chunk to the last but one: at the end some of the processes have no work left."""
-    (began, first), (ended, last) = seen[0], seen[-2 if len(seen) > 2 else -1]
-    return (last - first) / (ended - began)
+def slope(seen: list[tuple[float, int]]) -> float:
+    """Return problems per second: the slope of how many were done against the time.
+
+    From the first chunk to the last would count one chunk too many for processes that go in step.
+    """
+    times, done = np.array(seen).T
+    return float(np.polyfit(times - times[0], done, 1)[0])
 
 
 def swept(sweep: SweepRequest, workers: int) -> float:
@@ -48,7 +53,7 @@ def swept(sweep: SweepRequest, workers: int) -> float:
 
     with tempfile.TemporaryDirectory() as folder:
         run_sweep(sweep, local_settings(folder, workers), note)
-    return between(seen)
+    return slope(seen)
 
 
 def chunk(work: tuple[bytes, int, int]) -> int:
@@ -67,7 +72,7 @@ def pooled(sweep: SweepRequest, processes: int) -> float:
         for rows in pool.imap_unordered(chunk, work):
             done += rows
             seen.append((time.perf_counter(), done))
-    return between(seen)
+    return slope(seen)
 
 
 def counted(seconds: float) -> float:
@@ -98,7 +103,7 @@ def rounds(problems: int, count: int) -> Iterator[dict[tuple[str, int], float]]:
 
 
 def main() -> None:
-    problems = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
+    problems = max(20_000, int(sys.argv[1]) if len(sys.argv) > 1 else 40_000)
     count = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     ratios: dict[str, list[float]] = {"sweep": [], "pool": [], "loop": []}
     for found in rounds(problems, count):

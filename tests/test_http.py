@@ -7,6 +7,8 @@ import os
 import select
 import signal
 import socket
+import subprocess
+import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -357,6 +359,24 @@ def test_the_interrupt_of_a_terminal_finds_a_worker_that_still_starts(tmp_path: 
         assert own.process.wait(PATIENCE) == 0
         assert "Traceback" not in own.log.read_text()
         assert "Application shutdown complete" in own.log.read_text()
+
+
+def test_an_interrupt_that_workers_do_not_hear_wakes_the_main_thread() -> None:
+    program = f"""
+import time
+from veselova.service.interrupts import keep_from_children
+keep_from_children()
+print(flush=True)
+try:
+    time.sleep({2 * PATIENCE})
+except KeyboardInterrupt:
+    print("awake")
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=PATIENCE)[0] == "awake\n"
 
 
 def test_the_server_stays_small(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from test_theta import all_characteristics, as_flint_orders
 from veselova.analytic.balls import balls
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosed_windows import EnclosedWindows
-from veselova.analytic.enclosure import spheroconic
+from veselova.analytic.enclosure import _quadratic_zeros, spheroconic
 from veselova.analytic.precision import Arithmetic, Decimals, extended
 from veselova.analytic.secular import zeros_between_poles
 from veselova.mechanics.veselova import Veselova
@@ -116,6 +116,20 @@ def test_lambdas_of_many_positions_hold_those_of_each(size: int, digits: int, rn
             for ball, zero in zip(balls_of_row, zeros, strict=True):
                 assert abs(xp.rational(ball) - Fraction(zero)) <= xp.rational(ball.rad()) + Fraction(1, 10 ** (2 * digits))
                 assert float(ball.rad()) < 10.0 ** (3 - digits)
+
+
+@pytest.mark.parametrize("A", [("2", "2.002", "2.005"), ("2", "2.2", "2.4"), ("1", "3", "1000")])
+def test_three_lambdas_that_do_not_meet_are_found_all_at_once(A: tuple[str, ...], rng: np.random.Generator) -> None:
+    """However near the A's are to one another: about as well as the positions are known."""
+    inverse = sorted(1 / Fraction(a) for a in A)
+    with balls(60, False) as xp:
+        q = xp.array(rng.normal(size=(50, 3)))
+        q = q / xp.sqrt(np.sum(q * q, axis=1))[:, None]
+        spread = 1 / xp.number(10) ** 50
+        room = np.array([50 * spread * xp.number(inverse[-1])] * 50)
+        zeros, shown = _quadratic_zeros(xp.widened(q, spread), xp.array(inverse), room, xp)
+        assert np.all(shown)
+        assert np.array_equal(np.argsort(zeros.astype(float), axis=1), np.tile([0, 1], (50, 1)))
 
 
 def test_decimals_cover_their_balls() -> None:

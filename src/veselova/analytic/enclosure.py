@@ -68,12 +68,16 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
 
 
 def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, NDArray[np.bool_]]:
-    """Return balls around the zeros for m = 3, (N, 2), and which positions have theirs within the room; others nearly meet."""
+    """Return balls around the zeros for m = 3, (N, 2), and where both are within the room, as all that do not nearly meet are."""
     squares, (first, second, third) = q * q, inverse
-    leading, half = np.sum(squares, axis=1), squares @ np.array([second + third, first + third, first + second]) / 2
-    constant = squares @ np.array([second * third, first * third, first * second])
-    larger = half + xp.sqrt(half * half - leading * constant)  # the smaller one as half − √ would cancel
-    zeros = np.stack([constant / larger, larger / leading], axis=1)
+    below, above = first - second, third - second
+    # In λ − I_2 nothing cancels where the poles are near each other: the constant is not positive, and the radicand a sum.
+    leading, half = np.sum(squares, axis=1), squares @ np.array([above, below + above, below]) / 2
+    constant = squares[:, 1] * (below * above)
+    root, up = xp.sqrt(half * half - leading * constant), np.array([bool(x.mid() >= 0) for x in half])
+    far = np.where(up, half + root, half - root)
+    of_far, of_near = second + far / leading, second + constant / far
+    zeros = np.stack([np.where(up, of_near, of_far), np.where(up, of_far, of_near)], axis=1)
     around = xp.midpoints(zeros) + xp.around_zero(room)[:, None]
     return zeros, np.array([xp.inside(*pair) for pair in zip(zeros, around, strict=True)])
 

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, nullcontext
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -70,7 +70,7 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
     with dask.config.set(_configuration(niceness if processes and hasattr(os, "setpriority") else 0)):
         starting = asyncio.ensure_future(LocalCluster(**_machine(settings, processes)))
         try:
-            with children_deaf():
+            with children_deaf() if processes else nullcontext():
                 cluster = await asyncio.shield(starting)
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error

@@ -18,9 +18,11 @@ def keep_from_children() -> None:
     """Let no process that the main thread starts from now on receive SIGINT; this process goes on receiving it.
 
     A process inherits the signals that are blocked in the thread that starts it, and there is no other way to reach one that is
-    still loading its interpreter. Blocked here, SIGINT is awaited by a thread and handed to the main one.
+    still loading its interpreter. Blocked here, SIGINT is awaited by a thread and handed to the main one, which SIGURG, otherwise
+    ignored, wakes from what it waits for. Call it in the main thread.
     """
     if _MASKS:
+        signal.signal(signal.SIGURG, lambda *_: None)
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         threading.Thread(target=_hand_on, name="interrupts", daemon=True).start()
 
@@ -29,13 +31,14 @@ def _hand_on() -> None:
     while True:
         signal.sigwait({signal.SIGINT})
         _thread.interrupt_main()
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGURG)
 
 
 @contextmanager
 def children_deaf() -> Iterator[None]:
     """Let no process that this thread, or one that it starts, starts within the block receive SIGINT.
 
-    An interrupt of this thread comes after the block.
+    Interrupts of this thread mostly come after the block.
     """
     if not _MASKS:
         yield
