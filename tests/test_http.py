@@ -366,8 +366,8 @@ def test_an_interrupt_that_workers_do_not_hear_wakes_the_main_thread() -> None:
 import time
 from veselova.service.interrupts import keep_from_children
 keep_from_children()
-print(flush=True)
 try:
+    print(flush=True)
     time.sleep({2 * PATIENCE})
 except KeyboardInterrupt:
     print("awake")
