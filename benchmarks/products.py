@@ -18,13 +18,11 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
-import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from nufft import problem
+from nufft import best, problem
 
 import veselova as vs
 from veselova.analytic.characteristic import Characteristic
@@ -33,16 +31,6 @@ from veselova.analytic.solution import Solution
 
 #: Points at which functions are summed one by one.
 _SCATTERED = 20_000
-
-
-def least(call: Callable[[], Any]) -> tuple[float, Any]:
-    seconds, answer = np.inf, None
-    for _ in range(3):
-        answer = None
-        began = time.process_time()
-        answer = call()
-        seconds = min(seconds, time.process_time() - began)
-    return seconds, answer
 
 
 def on_grid(
@@ -75,11 +63,11 @@ def compare(n: int, count: int) -> str:
     solution = Solution(body)
     T, functions, flow = np.asarray(solution.periods.riemann_matrix, float), solution.quotients.functions, solution.in_tau1
     side, step = round(count**0.5) // (4 if n == 6 else 1), 1000 / count
-    of_grid, values = least(lambda: on_grid(T, functions, flow.start, flow.rates, step, side))
+    of_grid, values = best(lambda: on_grid(T, functions, flow.start, flow.rates, step, side))
     some = np.arange(0, side * side, max(1, side * side // _SCATTERED))
-    of_sums, sums = least(lambda: solution.quotients.theta.values(flow.start + np.outer(some * step, flow.rates), functions))
-    of_products = least(lambda: vs.solve(body, np.linspace(0, 100, count // 10), method="products"))[0]
-    chosen = least(lambda: vs.solve(body, np.linspace(0, 1000, count)))[0]
+    of_sums, sums = best(lambda: solution.quotients.theta.values(flow.start + np.outer(some * step, flow.rates), functions))
+    of_products = best(lambda: vs.solve(body, np.linspace(0, 100, count // 10), method="products"))[0]
+    chosen = best(lambda: vs.solve(body, np.linspace(0, 1000, count)))[0]
     difference = np.max(np.abs(values[:, some].T - sums)) / np.max(np.abs(sums))
     taken = (of_grid / side**2, of_sums / some.size, of_products / (count // 10), chosen / count)
     return f"{n}   {len(functions):9d}   {'   '.join(f'{1e6 * seconds:8.3f} µs' for seconds in taken)}   {difference:.1e}"

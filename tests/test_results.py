@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from problems import tagged
+from test_engines import METHODS
 from veselova import BackendMissing, Comparison, Trajectory, Unsolved, compare, solve, torus
 from veselova.mechanics.archive import read_archive
 from veselova.mechanics.trajectory import Provenance
@@ -64,17 +65,7 @@ def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
     assert np.allclose(trajectory.integrals["energy"], trajectory.problem.energy, rtol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("engine", "method"),
-    [
-        ("analytic", "theta"),
-        ("analytic", "products"),
-        ("analytic", "nufft"),
-        ("analytic", "angles"),
-        ("numeric", "dop853"),
-        ("numeric", "taylor"),
-    ],
-)
+@pytest.mark.parametrize(("engine", "method"), METHODS)
 def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -> None:
     problem = tagged("generic")[1].problem()
     first = solve(problem, [0.0, 1.0], engine, method)

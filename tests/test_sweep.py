@@ -33,6 +33,8 @@ def test_true_errors_never_exceed_reported_ones_on_random_problems(n: int) -> No
         problem = random_problem(rng, n)
         times = np.sort(rng.uniform(-50, 50, 8))
         frame = true_motion(problem, times)[0]
-        for engine, method in METHODS if n < 7 else [METHODS[1], *METHODS[2:]]:
+        for engine, method in METHODS:
+            if n > 6 and method in ("theta", "products"):  # their sums are too long for so many problems
+                continue
             found = solve(problem, times, engine, method)
             assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)

@@ -267,7 +267,7 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     if not isinstance(x, flint.arb):
         x = flint.arb(x)
     if not x.is_finite():
-        return Decimal(0), Decimal("Infinity")
+        return _ZERO, Decimal("Infinity")
     middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
     rounded, rest = divmod(middle + _HALF, _UNASKED)
     radius += abs(rest - _HALF)

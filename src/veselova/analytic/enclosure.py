@@ -7,7 +7,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.precision import Decimals, Values
@@ -59,16 +58,16 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     them, as they cannot where two nearly meet, they are found one position at a time.
     """
     room = _ROOM * (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
-    found, shown = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
-    for row in np.flatnonzero(~shown):
+    found, around = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
+    for row in [row for row in range(len(q)) if not xp.inside(found[row], around[row])]:
         poles = [xp.rational(x) for x in inverse]
         middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
         found[row] = xp.widened(xp.array(middle), room[row] / _ROOM)
     return found
 
 
-def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, NDArray[np.bool_]]:
-    """Return balls around the zeros for m = 3, (N, 2), and where both are within the room, as all that do not nearly meet are."""
+def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, Values]:
+    """Return balls around the zeros for m = 3, (N, 2), and those of the room, which they are inside unless they nearly meet."""
     squares, (first, second, third) = q * q, inverse
     below, above = first - second, third - second
     # In λ − I_2 nothing cancels where the poles are near each other: the constant is not positive, and the radicand a sum.
@@ -78,12 +77,11 @@ def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple
     far = np.where(up, half + root, half - root)
     of_far, of_near = second + far / leading, second + constant / far
     zeros = np.stack([np.where(up, of_near, of_far), np.where(up, of_far, of_near)], axis=1)
-    around = xp.midpoints(zeros) + xp.around_zero(room)[:, None]
-    return zeros, np.array([xp.inside(*pair) for pair in zip(zeros, around, strict=True)])
+    return zeros, xp.midpoints(zeros) + xp.around_zero(room)[:, None]
 
 
-def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, NDArray[np.bool_]]:
-    """Return the zeros for any m by Newton steps, (N, m−1), and where one in intervals of the room showed that they hold them."""
+def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, Values]:
+    """Return a Newton step in balls of the room for any m, (N, m−1), and these balls: inside them the step holds the zeros."""
     weights = (q * q)[:, :, None]
     zeros = xp.array(to_spheroconic(1 / inverse.astype(float), q.astype(float)))
 
@@ -101,8 +99,7 @@ def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tupl
         value, slope = polynomial(zeros)
         zeros, digits = xp.midpoints(zeros - xp.midpoints(value) / xp.midpoints(slope)), 2 * digits
     around = zeros + xp.around_zero(room)[:, None]
-    step = zeros - polynomial(zeros)[0] / polynomial(around)[1]
-    return np.asarray(step), np.array([xp.inside(*pair) for pair in zip(step, around, strict=True)])
+    return np.asarray(zeros - polynomial(zeros)[0] / polynomial(around)[1]), around
 
 
 def resting_spheroconic(moving: Moving, xp: Balls) -> Values:
