@@ -18,6 +18,9 @@ from veselova.analytic.precision import Arithmetic, Values
 
 __all__ = ["Jacobi"]
 
+#: Of many moduli, which have as many terms as the largest nome takes, e^{2y} stops here: its terms are below e^−200 of the first.
+_LARGEST_EXPONENT = 200.0
+
 
 @dataclass(frozen=True)
 class Jacobi:
@@ -79,15 +82,16 @@ class Jacobi:
 
     @cached_property
     def _terms(self) -> int:
-        """Number of terms m ≥ 1 with nome^(m²−m) above the precision; the exponent is what is left after growth to v = K/2."""
+        """Number of terms m ≥ 1: the least M with nome^(M²+M), which bounds what is left out, at the precision or below."""
         decay = math.pi if self._stacked else -float(self._log_nome)
-        return int(np.ceil(0.5 + np.sqrt(0.25 + self.arithmetic.nats / decay)))
+        return max(1, math.ceil(math.sqrt(0.25 + self.arithmetic.nats / decay) - 0.5))
 
     @cached_property
     def _powers(self) -> list[tuple[int, Any, Any]]:
         """Return m, q^{m²+m} and q^{m²} for the nome q, m = 1…_terms."""
         exp, q = self.arithmetic.exp, self._log_nome
-        return [(m, exp(q * (m * m + m)), exp(q * (m * m))) for m in range(1, self._terms + 1)]
+        number = np.asarray if self._stacked else self.arithmetic.number  # a float times an array takes half of a NumPy scalar
+        return [(m, number(exp(q * (m * m + m))), number(exp(q * (m * m)))) for m in range(1, self._terms + 1)]
 
     @cached_property
     def _constants(self) -> tuple[Any, Any, Any]:
@@ -99,15 +103,15 @@ class Jacobi:
         return self._truncated(t2, t3, t4)
 
     def _truncated(self, *sums: Any) -> tuple[Any, ...]:
-        """Return sums over m ≤ M = _terms with what they leave out.
+        """Return sums over m ≤ M = _terms with what they leave out, at most nome^(M²+M).
 
-        Omitted terms are at most 4 nome^(m²+m/2), all that y ≤ ¼|log nome| adds included, and those over sine, cosine or 1 − D at
-        most (2m+1) times that, so together below nome^(M²−M).
+        With y ≤ ¼|log nome| the first omitted term, m = M+1, is at most (2m+1) nome^(m²+m/2) in z1 and z2, 2 nome^(m²−(2m−1)/4)
+        in z3 and z4, less at real z and at zero, and the others are below a tenth of it, for a nome of at most e^(−π).
         """
         xp = self.arithmetic
         if not xp.has_radii:
             return sums
-        bound = xp.exp(self._log_nome * (self._terms**2 - self._terms))
+        bound = xp.exp(self._log_nome * (self._terms**2 + self._terms))
         return tuple(xp.widened(value, bound) for value in sums)
 
     def _trigonometric(self, psi: Values) -> tuple[Values, Values, Values]:
@@ -121,15 +125,19 @@ class Jacobi:
         if not self._stacked and self.k_squared == 0:
             return sine, cosine, 0 * psi + 1
         t2, t3, t4 = self._constants
-        before, wave = 0 * psi + 1, 1 - 2 * sine * sine
-        twice, sum_, alternating = 2 * wave, before, before
-        z1, z2, z3, z4 = 2 * before, 2 * before, before, before
+        before, wave = 0 * psi + 2, 2 - 4 * sine * sine  # 2C_m
+        factor, sum_, alternating = wave, 1, 1
+        z1 = z2 = z3 = z4 = 1
         for m, odd, even in self._powers:
-            sign = (-1) ** m
-            sum_, alternating = sum_ + 2 * wave, alternating + 2 * sign * wave
-            z1, z2 = z1 + 2 * sign * odd * sum_, z2 + 2 * sign * odd * alternating
-            z3, z4 = z3 + 2 * even * wave, z4 + 2 * sign * even * wave
-            before, wave = wave, twice * wave - before
+            term = even * wave
+            if m % 2:
+                sum_, alternating = sum_ + wave, alternating - wave
+                z1, z2, z3, z4 = z1 - odd * sum_, z2 - odd * alternating, z3 + term, z4 - term
+            else:
+                sum_, alternating = sum_ + wave, alternating + wave
+                z1, z2, z3, z4 = z1 + odd * sum_, z2 + odd * alternating, z3 + term, z4 + term
+            before, wave = wave, factor * wave - before
+        z1, z2 = 2 * z1, 2 * z2
         z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
         z1, z2 = z1 * sine, z2 * cosine
         return (t3 / t2) * z1 / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
@@ -137,27 +145,28 @@ class Jacobi:
     def _hyperbolic(self, psi: Values) -> tuple[Values, Values, Values]:
         """Jacobi's imaginary transformation: sn = (θ3/θ4) (θ1/i)/θ2, cn = (θ2/θ4) θ4/θ2, dn = (θ2/θ3) θ3/θ2 at iy, y = πv/2K'.
 
-        All four sums are divided by e^y. With the nome q and D = e^{−2y} their terms are q^{m²+m} e^{2my} (1 ∓ D^{2m+1}) and
-        q^{m²} e^{(2m−1)y} (1 + D^{2m}). Each follows from the one before by factors below one, as y ≤ |log q|/4: whatever K/K',
-        nothing overflows. 1 − D^{2m+1} = (1 − D)(1 + D + … + D^{2m}) keeps its accuracy relative to itself.
+        All four sums are divided by e^y. With the nome q, E = e^{2y} and D = 1/E their terms are q^{m²+m} (E^m ∓ D^{m+1}) and
+        q^{m²} e^{−y} (E^m + D^m); as y ≤ |log q|/4, and M is small where q is, nothing overflows. E^m − D^{m+1} is
+        (1 − D)(1 + Σ_{j≤m} (E^j + D^j)), which keeps its accuracy relative to itself.
         """
         xp = self.arithmetic
         y = psi / 2 * (self.quarter / self.conjugate_quarter)
         t2, t3, t4 = self._constants
-        rise, D = -xp.expm1(-2 * y), xp.exp(-2 * y)
-        nome, step = xp.exp(self._log_nome), xp.exp(self._log_nome + 2 * y)
-        growth = power = 0 * y + 1
-        wave = even = xp.exp(-y)
-        z1, z2, z3, z4, sum_, factor = growth, 1 + D, even, even, growth, growth
-        for m in range(1, self._terms + 1):
-            sign, wave = (-1) ** m, wave * (factor * step)
-            growth, factor = growth * (factor * nome * step), factor * nome * nome
-            square = power * D
-            power = square * D
-            sum_ = sum_ + square + power
-            z1, z2 = z1 + sign * growth * sum_, z2 + growth * (1 + power * D)
-            even = wave * (1 + power)
-            z3, z4 = z3 + even, z4 + sign * even
+        twice = 2 * y
+        rise, D = -xp.expm1(-twice), xp.exp(-twice)
+        E = xp.exp(np.minimum(twice, _LARGEST_EXPONENT) if self._stacked else twice)
+        up, down = E, D
+        z1, z2, z3, z4, sum_ = 1, 1 + D, 1, 1, 1
+        for m, odd, even in self._powers:
+            if m > 1:
+                up, down = up * E, down * D
+            both = up + down
+            sum_ = sum_ + both
+            term = even * both
+            z1, z4 = (z1 - odd * sum_, z4 - term) if m % 2 else (z1 + odd * sum_, z4 + term)
+            z2, z3 = z2 + odd * (up + down * D), z3 + term
+        first = xp.exp(-y)
+        z3, z4 = first * z3, first * z4
         z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)
         z1 = z1 * rise
         return (t3 / t4) * z1 / z2, (t2 / t4) * z4 / z2, (t2 / t3) * z3 / z2

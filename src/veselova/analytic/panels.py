@@ -99,5 +99,12 @@ def _summed(over_panels: Array, zero: int) -> Array:
 
 
 def _integrated(coefficients: Array) -> Array:
-    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1)."""
-    return np.asarray(np.polynomial.chebyshev.chebint(coefficients, lbnd=-1, axis=1), dtype=np.float64)
+    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} − c_{k+1})/2k, c_0 doubled."""
+    count = coefficients.shape[1]
+    padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)
+    padded[:, 0] *= 2
+    orders = np.arange(1, count + 1)
+    result = np.empty((len(coefficients), count + 1))
+    result[:, 1:] = (padded[:, :-2] - padded[:, 2:]) / (2 * orders)
+    result[:, 0] = result[:, 1:] @ (2.0 * (orders % 2) - 1)  # zero at −1, where T_k is (−1)^k
+    return result

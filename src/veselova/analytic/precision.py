@@ -16,10 +16,11 @@ from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
+from mpmath.libmp import from_rational
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprf
 
-from veselova.analytic.waves import cosine_sums, sine_sums
+from veselova.analytic.waves import cosine_series, cosine_sums, midpoints, sine_sums
 
 __all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
 
@@ -59,10 +60,9 @@ class Arithmetic(ABC):
     def array(self, values: Any) -> Values:
         """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
         given = np.array(values, dtype=object)
-        result = np.empty(given.shape, dtype=object)
-        for index, value in np.ndenumerate(given):
-            result[index] = self.number(value)
-        return result
+        result = np.empty(given.size, dtype=object)
+        result[:] = [self.number(value) for value in given.ravel().tolist()]
+        return result.reshape(given.shape)
 
     @abstractmethod
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
@@ -157,6 +157,8 @@ class Double(Arithmetic):
     floor = staticmethod(np.floor)
     sine_sums = staticmethod(sine_sums)
     cosine_sums = staticmethod(cosine_sums)
+    cosine_series = staticmethod(cosine_series)
+    nodes = staticmethod(midpoints)
 
     def number(self, value: Any) -> float:
         """Return the nearest double."""
@@ -247,8 +249,7 @@ class Extended(Arithmetic):
     def number(self, value: Any) -> Any:
         """Return one number, rounded to this precision."""
         if isinstance(value, (Fraction, decimal.Decimal)):
-            numerator, denominator = value.as_integer_ratio()
-            return self._context.mpf(numerator) / denominator
+            return self._context.make_mpf(from_rational(*value.as_integer_ratio(), self._context.prec, "n"))
         if isinstance(value, np.generic):
             value = value.item()
         return self._context.mpf(value)

@@ -104,8 +104,9 @@ class ThetaQuotients:
     def position(self, z: Array) -> Array:
         """Return q along sorted axes at points z of shape (N, g), modulo 2."""
         n = self.theta.genus + 1
+        constants = self.constants[:n]  # first: theta then has the tables of all functions, and these from them
         values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *self._characteristics[:n]])
-        return np.asarray(values[:, 1:] / values[:, :1] * self.constants[:n])
+        return np.asarray(values[:, 1:] / values[:, :1] * constants)
 
     def slopes(self, z: Array) -> Array:
         """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-8."""

@@ -24,7 +24,7 @@ from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
-from veselova.analytic.steepness import Steepness
+from veselova.analytic.steepness import Steepness, drawn_angles
 from veselova.analytic.transforms import Transforms
 from veselova.analytic.trial import NODES
 from veselova.analytic.windows import Windows
@@ -209,7 +209,7 @@ class Solution:
     def steepness(self) -> Steepness:
         """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
         genus, rates = self.curve.genus, self.in_tau1.rates
-        sample = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (_SAMPLES if genus <= _FEW else _FEW_SAMPLES, genus))
+        sample = drawn_angles(genus, _SAMPLES if genus <= _FEW else _FEW_SAMPLES)
         if self.near_separatrix:
             return self.steepness_at(np.concatenate([sample / np.pi, self._origin[None, :]]))
         psi = np.concatenate([sample, self.start.angles[None, :]])

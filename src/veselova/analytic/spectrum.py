@@ -15,16 +15,19 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from veselova.analytic.precision import Arithmetic, Decimals, Extended, Values, extended
+from veselova.analytic.precision import Arithmetic, Decimals, Values, extended
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
 
 __all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
+
+#: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
+_Decimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
 #: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to hold their differences, and
 #: squares of roots of them.
@@ -126,17 +129,22 @@ def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectr
     most = wanted + coinciding
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
-        found = _spectrum(moving, extended(working), digits)
-        narrowest = min(found.widths) if found is not None else 0
-        if found is None or narrowest < found.arithmetic.number(10) ** -(working - _SPARE):
-            needed = 2 * working  # nothing can be said of that width but that it is small
-        else:
-            needed = wanted + math.ceil(-float(found.arithmetic.log(narrowest)) / math.log(10))
+        found = _values(moving, working, digits)
+        narrowest = _narrowest(found, working) if found is not None else Decimal(0)
+        known = narrowest >= Decimal((0, (1,), _SPARE - working))  # otherwise nothing can be said of it but that it is small
+        needed = wanted - narrowest.adjusted() if known else 2 * working
         if found is not None and working >= min(needed, most):
-            return found
+            return Spectrum.of(extended(working), found)
         if working > _MOST_ROUNDS * most:
             raise InternalContradiction("the spectra do not settle")
         working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
+
+
+def _narrowest(values: _Decimals, digits: int) -> Decimal:
+    """Return the least difference of neighbours among the branch points."""
+    with Decimals(digits):
+        points = sorted([*values[0], *values[3]])
+        return min(b - a for a, b in itertools.pairwise(points))
 
 
 def _digits_between(moving: Moving) -> int:
@@ -153,9 +161,12 @@ def _digits_of_speed(moving: Moving) -> int:
     return max(0, math.ceil(square)).bit_length() * 3 // 10
 
 
-def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | None:
-    """Return the spectra at one precision; None where it is too low for iterations to settle, or for c_1 = 0 to come out."""
-    with Decimals(arithmetic.digits) as xp:
+def _values(moving: Moving, working: int, digits: int) -> _Decimals | None:
+    """Return the values of the spectra with ``working`` digits, of which c_1 = 0 is to come out to ``digits``.
+
+    None where they are too few for that, or for iterations to settle.
+    """
+    with Decimals(working) as xp:
         q, v, rate = tangent(moving, xp)
         inverse = xp.array([1 / a for a in moving.A])
         try:
@@ -173,7 +184,7 @@ def _spectrum(moving: Moving, arithmetic: Extended, digits: int) -> Spectrum | N
             return None
         else:
             constants = [Decimal(0), *constants]
-    return Spectrum.of(arithmetic, (inverse, q, v, constants, spheroconic, rate))
+    return inverse, q, v, constants, spheroconic, rate
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:

@@ -14,7 +14,7 @@ which the sum is short (analytic.lattice).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,6 +50,16 @@ class _Family:
     orders: NDArray[np.int64]
     tables: Array
 
+    @property
+    def size(self) -> int:
+        """Return M."""
+        return len(self.tables) // max(1, 2 * len(self.orders) * bool(self.orders.shape[1]))
+
+    def of(self, members: list[int]) -> _Family:
+        """Return the family of some members."""
+        lattice = self.tables.shape[1]
+        return _Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
+
     def sums(self, bells: Array, turned: NDArray[np.complex128]) -> Array:
         """Return the sums without their signs, shape (M, N)."""
         weighted = self.tables @ bells.T
@@ -73,6 +83,19 @@ class _Group:
     places: list[int]
     parities: Array
     signs: Array
+
+    def of(self, places: Mapping[int, int]) -> _Group | None:
+        """Return the group of the members at some places, the keys, with their new places; None where it has none of them."""
+        kept = [i for i, place in enumerate(self.places) if place in places]
+        if not kept:
+            return None
+        families, first = [], 0
+        for family, size in ((family, family.size) for family in self.families):
+            members = [i - first for i in kept if first <= i < first + size]
+            families += [family.of(members)] if members else []
+            first += size
+        new = [places[self.places[i]] for i in kept]
+        return _Group(self.delta_G, families, new, self.parities[:, kept], self.signs[kept])
 
     @cached_property
     def highest(self) -> int:
@@ -165,11 +188,16 @@ class Theta:
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
-        groups = self._grouped.get(characteristics)
-        if groups is None:
-            families = self._coordinates.families(characteristics).items()
-            groups = self._grouped[characteristics] = [self._group(delta_G, list(of.values())) for delta_G, of in families]
-        return groups
+        if characteristics not in self._grouped:
+            more = next((known for known in self._grouped if set(characteristics) <= set(known)), None)
+            if more is not None and len(set(characteristics)) == len(characteristics):
+                places = {more.index(c): place for place, c in enumerate(characteristics)}
+                groups = [group for known in self._grouped[more] if (group := known.of(places)) is not None]
+            else:
+                families = self._coordinates.families(characteristics).items()
+                groups = [self._group(delta_G, list(of.values())) for delta_G, of in families]
+            self._grouped[characteristics] = groups
+        return self._grouped[characteristics]
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
