@@ -26,7 +26,7 @@ from veselova.analytic.curve import Curve, Layout
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import Arithmetic, Values
 
-__all__ = ["Attitude", "Frame", "slopes"]
+__all__ = ["Attitude", "Differences", "Frame", "slopes"]
 
 #: Step of the difference quotients: truncation and rounding both near 1e-8.
 _STEP = 1e-6
@@ -71,21 +71,53 @@ class Frame:
         blocks = [_attitude(self, psi[first : first + size]) for first in range(0, max(psi.shape[0], 1), size)]
         return blocks[0] if len(blocks) == 1 else Attitude.joined(blocks)
 
+    def at_each(self, *sets: Values) -> list[Attitude]:
+        """Return the attitudes at sets of angles, in one evaluation."""
+        ends = np.cumsum([len(psi) for psi in sets])[:-1]
+        at = self.at(np.concatenate(sets))
+        parts = zip(*(np.split(getattr(at, f.name), ends) for f in fields(at)), strict=True)
+        return [Attitude(*part) for part in parts]
+
+    @cached_property
+    def half_periods(self) -> Values:
+        """Return ν ∈ {0, 1}^g, (2^g, g): at the angles πν, the half periods z = ½ν, every λ_s is a branch point."""
+        genus = self.periods.genus
+        return self.periods.arithmetic.array(np.arange(2**genus)[:, None] >> np.arange(genus)[::-1] & 1)
+
     def slopes(self, psi: Values, directions: Values) -> Values:
         """Return the derivatives of all frame entries along directions (N, g, d) of the angles, shape (N, n², d)."""
         return slopes(self.at, psi, directions)
 
 
+@dataclass(frozen=True)
+class Differences:
+    """Difference quotients of the frame along directions (N, g, d) at points (N, g)."""
+
+    points: Values
+    directions: Values
+
+    @cached_property
+    def _lengths(self) -> Values:
+        # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
+        return np.asarray(_STEP / np.maximum(1.0, np.max(np.abs(self.directions), axis=1)))
+
+    @property
+    def ends(self) -> Values:
+        """Return the points between which differences are taken, shape (2dN, g)."""
+        steps = np.moveaxis(self.directions * (self._lengths[:, None, :] / 2), 2, 0)
+        return np.concatenate([self.points + steps, self.points - steps]).reshape(-1, self.points.shape[1])
+
+    def slopes(self, at: Attitude) -> Values:
+        """Return the derivatives of all frame entries, to about 1e-8, shape (N, n², d), from the attitudes at the ends."""
+        count, _, number = self.directions.shape
+        entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(2, number, count, -1)
+        return np.asarray(np.moveaxis(entries[0] - entries[1], 0, 2) / self._lengths[:, None, :])
+
+
 def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
     """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-8, (N, n², d)."""
-    count, genus, number = directions.shape
-    # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
-    length = _STEP / np.maximum(1.0, np.max(np.abs(directions), axis=1))
-    steps = np.moveaxis(directions * (length[:, None, :] / 2), 2, 0)
-    ends = np.concatenate([points + steps, points - steps]).reshape(-1, genus)
-    at = attitude(ends)
-    entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(2, number, count, -1)
-    return np.asarray(np.moveaxis(entries[0] - entries[1], 0, 2) / length[:, None, :])
+    differences = Differences(points, directions)
+    return differences.slopes(attitude(differences.ends))
 
 
 @dataclass(frozen=True)

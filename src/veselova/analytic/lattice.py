@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -58,10 +58,12 @@ class Coordinates:
         Gaussians are the shortest vectors of a basis reduced in T, or what the shortest of one reduced in T⁻¹ leave.
         """
         genus = len(T)
-        primal, dual = _reduced(T), np.rint(np.linalg.inv(_reduced(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)
-        choices = [cls(primal, tuple(range(m, genus))) for m in range(genus + 1)]
-        choices += [cls(dual, tuple(range(m))) for m in range(1, genus)]
-        return min(choices, key=lambda choice: choice.cost(T))
+        primal, dual = _reduced(T), np.rint(np.linalg.inv(_reduced(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)[::-1]
+        choices = []
+        for U, counts in ((primal, range(genus + 1)), (dual, range(1, genus))):
+            factors = _Factors.of(U @ T @ U.T)
+            choices += [(factors.cost(m), cls(U, tuple(range(m, genus)))) for m in counts]
+        return min(choices, key=lambda choice: choice[0])[1]
 
     @classmethod
     def given(cls, genus: int, waves: tuple[int, ...]) -> Coordinates:
@@ -75,12 +77,8 @@ class Coordinates:
 
     def cost(self, T: Array) -> float:
         """Return the terms of a value, by volume, with what Gaussians and waves take; infinite where waves cancel."""
-        F, G = list(self.waves), self.gaussians
-        S, _, inverse = schur(np.asarray(self.form(T)), F, G)
-        if F and np.linalg.eigvalsh(S)[0] < _WAVE_FLOOR:
-            return math.inf
-        bells, waves = points_within(inverse, _spreads(inverse)), points_within(S, np.full(len(F), RADIUS))
-        return bells * waves + _BELL * bells + (_WAVE * waves if F else 0.0)
+        order = [*self.gaussians, *self.waves]
+        return _Factors.of(np.asarray(self.form(T))[np.ix_(order, order)]).cost(len(self.gaussians))
 
     def form(self, T: Any) -> Any:
         """Return UTUᵀ."""
@@ -127,17 +125,51 @@ def _reduced(form: Array) -> Integers:
     return U[np.argsort(np.diag(gram), kind="stable")]
 
 
-def points_within(form: Array, radii: Array) -> float:
-    """Return about how many points of Z^d an ellipsoid with these half axes has, in the norm of the form: its volume, or one."""
-    dimension = len(form)
-    ball = math.pi ** (dimension / 2) / math.gamma(dimension / 2 + 1)
-    return max(1.0, float(ball * np.prod(radii) / np.sqrt(np.linalg.det(form))))
+@dataclass(frozen=True)
+class _Factors:
+    """A form as LLᵀ, and L⁻¹: of its first m coordinates, which may have Gaussians, the leading blocks of both; S of the others
+    has what is left of L."""
+
+    lower: Array
+    inverse: Array
+
+    @classmethod
+    def of(cls, form: Array) -> _Factors:
+        """Return the factors of a form."""
+        lower = np.asarray(np.linalg.cholesky(form))
+        return cls(lower, np.asarray(np.linalg.inv(lower)))
+
+    @cached_property
+    def _lengths(self) -> list[float]:
+        return [float(x) for x in np.diag(self.lower)]
+
+    @cached_property
+    def _spreads(self) -> list[float]:
+        """Return how far centred points reach along each Gram–Schmidt vector, along which r of the cell reaches ``half``."""
+        half = np.sum(np.abs(self.inverse), axis=1) / 2
+        return [float(x) for x in half + np.sqrt(half**2 + RADIUS**2)]
+
+    def cost(self, m: int) -> float:
+        """Return the terms of a value with Gaussians in the first m coordinates; infinite where the waves cancel."""
+        rest, of_waves = self.lower[m:, m:], self._lengths[m:]
+        least = of_waves[0] ** 2 if len(of_waves) == 1 else float(np.linalg.eigvalsh(rest @ rest.T)[0]) if of_waves else math.inf
+        if least < _WAVE_FLOOR:
+            return math.inf
+        bells = _points(spread * x for spread, x in zip(self._spreads[:m], self._lengths[:m], strict=True))
+        waves = _points(RADIUS / x for x in of_waves)
+        return bells * waves + _BELL * bells + (_WAVE * waves if of_waves else 0.0)
 
 
-def _spreads(form: Array) -> Array:
-    """Return how far centred points reach along each Gram–Schmidt vector, along which r of the cell reaches ``half``."""
-    half = np.sum(np.abs(np.linalg.cholesky(form)), axis=0) / 2 if len(form) else np.empty(0)
-    return np.asarray(half + np.sqrt(half**2 + RADIUS**2))
+def points_within(form: Array, radius: float) -> float:
+    """Return about how many points of Z^d lie within a radius of zero in the norm of the form."""
+    return _points(radius / x for x in np.diag(np.linalg.cholesky(form)).tolist())
+
+
+def _points(half_axes: Iterable[float]) -> float:
+    """Return about how many points of Z^d an ellipsoid with these half axes, in cells, has: its volume, or one."""
+    axes = list(half_axes)
+    dimension = len(axes)
+    return max(1.0, math.exp(dimension / 2 * math.log(math.pi) - math.lgamma(dimension / 2 + 1)) * math.prod(axes))
 
 
 def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:
@@ -154,7 +186,7 @@ def _largest_corner(form: Array) -> float:
     size = form.shape[0]
     if size == 0:
         return 0.0
-    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * size, indexing="ij")).reshape(size, -1).T
+    corners = (np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5
     return float(np.max(np.sum((corners @ form) * corners, axis=1)))
 
 

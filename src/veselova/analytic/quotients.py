@@ -37,10 +37,11 @@ class ThetaQuotients:
 
     theta: Theta | EnclosedTheta
     frame: Frame
+    at_half_periods: Attitude | None = None
 
     @classmethod
-    def of(cls, T: Array, frame: Frame) -> ThetaQuotients:
-        """Return the route in double precision.
+    def of(cls, T: Array, frame: Frame, at_half_periods: Attitude | None) -> ThetaQuotients:
+        """Return the route in double precision; attitudes at the half periods of the frame may be known already.
 
         Raises Unsolved where its tables would fill the memory (``too-many-terms``), or where T leaves the range of floats.
         """
@@ -51,7 +52,7 @@ class ThetaQuotients:
         if not terms * functions <= _MOST_TERMS:
             wanted = f"n = {len(T) + 1} takes {functions} theta functions of {min(terms, 1e11):.1e} terms or more"
             raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
-        return cls(theta, frame)
+        return cls(theta, frame, at_half_periods)
 
     @cached_property
     def _characteristics(self) -> list[Characteristic]:
@@ -79,10 +80,8 @@ class ThetaQuotients:
     @cached_property
     def constants(self) -> Array:
         """Return the κ's in the order of the functions."""
-        g = self.theta.genus
-        xp = self.frame.periods.arithmetic
-        half_periods = xp.array(np.array(np.meshgrid(*[[0.0, 1.0]] * g, indexing="ij")).reshape(g, -1).T)
-        attitude = self.frame.at(xp.pi * half_periods)
+        half_periods = self.frame.half_periods
+        attitude = self.at_half_periods or self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
         raw = self._raw(self.theta.values(half_periods / 2, self.functions))
         best = np.argmax(np.abs(raw.astype(float)), axis=0)

@@ -24,7 +24,8 @@ from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.spectrum import resolved
 from veselova.analytic.start import Start, start
-from veselova.analytic.steepness import Steepness, drawn_angles
+from veselova.analytic.steepness import Steepness
+from veselova.analytic.survey import FEW, Survey, drawn_phases
 from veselova.analytic.transforms import Transforms
 from veselova.analytic.trial import NODES
 from veselova.analytic.windows import Windows
@@ -61,9 +62,6 @@ _WIDEST_RATE = 1e10
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
-
-#: Points at which the steepness of the attitude is sampled; beyond a genus of _FEW, at fewer points in as many directions.
-_SAMPLES, _FEW, _FEW_SAMPLES = 48, 16, 4
 
 
 class Solution:
@@ -206,21 +204,16 @@ class Solution:
         return float(np.max(np.abs(self.in_time.rates)))
 
     @cached_property
+    def _survey(self) -> Survey:
+        half_periods, steep = self.default_method() == "theta", not self.near_separatrix
+        return Survey(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep)
+
+    @cached_property
     def steepness(self) -> Steepness:
         """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
-        genus, rates = self.curve.genus, self.in_tau1.rates
-        sample = drawn_angles(genus, _SAMPLES if genus <= _FEW else _FEW_SAMPLES)
-        if self.near_separatrix:
-            return self.steepness_at(np.concatenate([sample / np.pi, self._origin[None, :]]))
-        psi = np.concatenate([sample, self.start.angles[None, :]])
-        to_angles = np.linalg.inv(self.inversion.jacobian(psi))
-        if genus <= _FEW:
-            return Steepness.of(2 * self.frame.slopes(psi, to_angles), rates)
-        # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
-        signs = np.sign(np.random.default_rng(genus).normal(size=(genus, _FEW)))
-        slopes = 2 * self.frame.slopes(psi, to_angles @ np.column_stack([signs, rates]))
-        spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
-        return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
+        if not self.near_separatrix:
+            return self._survey.steepness
+        return self.steepness_at(np.concatenate([drawn_phases(self.curve.genus), self._origin[None, :]]))
 
     def steepness_at(self, z: Array) -> Steepness:
         """Return the same at phases z (N, g), doubled too."""
@@ -232,7 +225,8 @@ class Solution:
     @cached_property
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
-        return ThetaQuotients.of(np.asarray(self.periods.riemann_matrix, dtype=np.float64), self.frame)
+        T = np.asarray(self.periods.riemann_matrix, dtype=np.float64)
+        return ThetaQuotients.of(T, self.frame, self._survey.at_half_periods)
 
     @cached_property
     def transforms(self) -> Transforms:
@@ -246,8 +240,8 @@ class Solution:
 
     @cached_property
     def is_even(self) -> bool:
-        """Return whether neither narrow cuts nor wide A's give the phases very different weights; not asked beyond _FEW."""
-        if self.curve.genus > _FEW:
+        """Return whether neither narrow cuts nor wide A's give the phases very different weights; not asked beyond FEW."""
+        if self.curve.genus > FEW:
             return True
         return bool(self.largest_period < _LARGE_PERIOD and np.max(self.periods.cancellation) < _LARGE_CANCELLATION)
 
@@ -267,7 +261,7 @@ class Solution:
 
         For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of that.
         """
-        normals = self.frame.at(self.start.angles[None, :]).normals[0]
+        normals = self._survey.start.normals[0]
         along = normals.T @ self.moving.directions.T
         if self.problem.exact.natural and along.shape[0] == self.problem.n - 1:
             # The last bits of the frame are asked for only where those of a double leave a doubt.

@@ -143,7 +143,7 @@ def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectr
 def _narrowest(values: _Decimals, digits: int) -> Decimal:
     """Return the least difference of neighbours among the branch points."""
     with Decimals(digits):
-        points = sorted([*values[0], *values[3]])
+        points: list[Decimal] = sorted([*values[0], *values[3]])
         return min(b - a for a, b in itertools.pairwise(points))
 
 

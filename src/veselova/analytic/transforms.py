@@ -101,7 +101,7 @@ class Transforms:
         self._transform = _transform()
         self._quotients, self._rates, self._fastest = quotients, rates, int(np.argmax(np.abs(rates)))
         T = np.asarray(quotients.frame.periods.riemann_matrix, dtype=np.float64)
-        expected = points_within(T, np.full(len(T), RADIUS)) * len(quotients.functions)
+        expected = points_within(T, RADIUS) * len(quotients.functions)
         if not expected <= _MOST_WAVES:
             raise Unsolved("too-many-terms", f"{expected:.1e} waves of all theta functions over Z^g; angles serve at any n")
         members = defaultdict(list)

@@ -1,0 +1,81 @@
+"""What every motion asks of the frame, in one evaluation: a call costs what hundreds of points do.
+
+These are the attitude at the start, those at half periods, from which theta quotients have their constants, and the difference
+quotients that say how steep the frame is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.abel_jacobi import AbelJacobi
+from veselova.analytic.frame import Attitude, Differences, Frame
+from veselova.analytic.periods import Periods
+from veselova.analytic.steepness import Steepness, drawn_angles
+
+__all__ = ["FEW", "Survey", "drawn_phases"]
+
+Array = NDArray[np.float64]
+
+#: Points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer points in as many directions.
+_SAMPLES, FEW, _FEW_SAMPLES = 48, 16, 4
+
+
+def drawn_phases(genus: int) -> Array:
+    """Return phases at which the steepness is sampled where angles do not serve, (N, g)."""
+    return drawn_angles(genus, _SAMPLES) / np.pi
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The frame around a torus, from the angles (g,) of its start.
+
+    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether these are wanted
+    """
+
+    frame: Frame
+    inversion: AbelJacobi[Periods]
+    angles: Array
+    rates: Array
+    half_periods: bool
+    steep: bool
+
+    @cached_property
+    def _parts(self) -> list[Attitude]:
+        half_periods = np.pi * self.frame.half_periods if self.half_periods else self.angles[None, :][:0]
+        ends = self._differences.ends if self.steep else self.angles[None, :][:0]
+        return self.frame.at_each(self.angles[None, :], half_periods, ends)
+
+    @property
+    def start(self) -> Attitude:
+        """Return the attitude at the start."""
+        return self._parts[0]
+
+    @property
+    def at_half_periods(self) -> Attitude | None:
+        """Return the attitudes at the half periods of the frame; None where they are not wanted."""
+        return self._parts[1] if self.half_periods else None
+
+    @cached_property
+    def _differences(self) -> Differences:
+        genus = self.rates.size
+        psi = np.concatenate([drawn_angles(genus, _SAMPLES if genus <= FEW else _FEW_SAMPLES), self.angles[None, :]])
+        to_angles = np.linalg.inv(self.inversion.jacobian(psi))
+        if genus > FEW:
+            signs = np.sign(np.random.default_rng(genus).normal(size=(genus, FEW)))
+            to_angles = to_angles @ np.column_stack([signs, self.rates])
+        return Differences(psi, to_angles)
+
+    @cached_property
+    def steepness(self) -> Steepness:
+        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
+        slopes, genus = 2 * self._differences.slopes(self._parts[2]), self.rates.size
+        if genus <= FEW:
+            return Steepness.of(slopes, self.rates)
+        # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
+        spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
+        return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
