@@ -60,9 +60,12 @@ class Curve:
     def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
-        differences = points[None, :] - points[:, None]
+        rows, columns = np.triu_indices(points.size, 1)
+        upwards = arithmetic.array(points[columns] - points[rows])
+        differences = np.full((points.size, points.size), arithmetic.number(0))
+        differences[rows, columns], differences[columns, rows] = upwards, -upwards
         origins = tuple(BranchPoint(kind, index) for _, kind, index in spectrum.branch_points)
-        return cls(arithmetic, arithmetic.array(points), arithmetic.array(differences), origins)
+        return cls(arithmetic, arithmetic.array(points), differences, origins)
 
     @property
     def genus(self) -> int:

@@ -52,6 +52,10 @@ class Attitude:
         """Return q' = dq/dτ₁ = Σ_k v_k n_k, shape (N, n)."""
         return np.asarray(np.sum(self.normals * self.components[:, None, :], axis=2))
 
+    def __getitem__(self, rows: slice) -> Attitude:
+        """Return the attitudes of some points."""
+        return Attitude(self.q[rows], self.normals[rows], self.components[rows], self.spheroconic[rows])
+
     @classmethod
     def joined(cls, parts: list[Attitude]) -> Attitude:
         """Return the attitudes one after the other."""
@@ -73,10 +77,11 @@ class Frame:
 
     def at_each(self, *sets: Values) -> list[Attitude]:
         """Return the attitudes at sets of angles, in one evaluation."""
-        ends = np.cumsum([len(psi) for psi in sets])[:-1]
-        at = self.at(np.concatenate(sets))
-        parts = zip(*(np.split(getattr(at, f.name), ends) for f in fields(at)), strict=True)
-        return [Attitude(*part) for part in parts]
+        at, first, parts = self.at(np.concatenate(sets)), 0, []
+        for psi in sets:
+            parts.append(at[first : first + len(psi)])
+            first += len(psi)
+        return parts
 
     @cached_property
     def half_periods(self) -> Values:

@@ -14,7 +14,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -168,8 +168,12 @@ def points_within(form: Array, radius: float) -> float:
 def _points(half_axes: Iterable[float]) -> float:
     """Return about how many points of Z^d an ellipsoid with these half axes, in cells, has: its volume, or one."""
     axes = list(half_axes)
-    dimension = len(axes)
-    return max(1.0, math.exp(dimension / 2 * math.log(math.pi) - math.lgamma(dimension / 2 + 1)) * math.prod(axes))
+    return max(1.0, _unit_ball(len(axes)) * math.prod(axes))
+
+
+@lru_cache
+def _unit_ball(dimension: int) -> float:
+    return math.exp(dimension / 2 * math.log(math.pi) - math.lgamma(dimension / 2 + 1))
 
 
 def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:

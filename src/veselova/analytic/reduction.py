@@ -75,6 +75,8 @@ class Moving:
         for i in range(1, len(A)):
             if A[i] > A[i - 1] * (1 - closeness):  # or above it, where the one before has just moved
                 A[i] = A[i - 1] * (1 - distance)
+        if tuple(A) == self.A:
+            return self
         unit = A[-1]
         return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
 
@@ -166,6 +168,8 @@ def _turned(
     q: Sequence[Fraction], velocity: Sequence[Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]]:
     """Return (q², q̇², qq̇) and a vector along each moving direction of one group: q first, then q̇ across it."""
+    if len(q) == 1 and q[0]:
+        return [((q[0] * q[0], velocity[0] * velocity[0], q[0] * velocity[0]), q)]
     qq, qv, vv = _dot(q, q), _dot(q, velocity), _dot(velocity, velocity)
     zero = Fraction()
     if qq == 0:
