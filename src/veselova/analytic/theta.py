@@ -163,25 +163,36 @@ class Theta:
         result = np.empty((len(characteristics), z.shape[0]))
         groups, y = self._groups(tuple(characteristics)), self._coordinates.points(z - 2 * np.rint(z / 2))
         block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
+        at_once = max(1, block // max(len(z), 1))  # groups, of few points
         for first in range(0, z.shape[0], block):
             rows = slice(first, first + block)
-            for group in groups:
-                bells, r, nearest = self._bells(y[rows], group.delta_G)
-                turned = turns(np.pi * (y[rows][:, self._split[0]] - r @ self._parts[1].T), group.highest)
-                sums = np.concatenate([family.sums(bells, turned) for family in group.families])
-                half_turns = group.parities.T @ nearest.T
-                sums *= group.signs[:, None] * (1 - 2 * (half_turns - 2 * np.floor(half_turns / 2)))  # fmod is slow
-                result[group.places, rows] = sums
+            for k in range(0, len(groups), at_once):
+                self._fill(groups[k : k + at_once], y[rows], result[:, rows])
         return result.T
 
-    def _bells(self, y: Array, delta_G: Array) -> tuple[Array, Array, Array]:
-        """Return (e^{−π|k−r|²}, r, n) with y_G = n + r reduced to the unit cell around zero, k on the Gaussian lattice."""
-        y_G = y[:, self._split[1]] + delta_G
+    def _fill(self, groups: list[_Group], y: Array, result: Array) -> None:
+        """Write the values of some groups at points (N, g) of our coordinates to their places, the rows of the result."""
+        bells, r, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
+        y_F = np.tile(y[:, self._split[0]], (len(groups), 1))
+        turned = turns(np.pi * (y_F - r @ self._parts[1].T), max(group.highest for group in groups))
+        for k, group in enumerate(groups):
+            own = slice(k * len(y), (k + 1) * len(y))
+            sums = np.concatenate([family.sums(bells[own], turned[:, :, own]) for family in group.families])
+            half_turns = group.parities.T @ nearest[own].T
+            sums *= group.signs[:, None] * (1 - 2 * (half_turns - 2 * np.floor(half_turns / 2)))  # fmod is slow
+            result[group.places] = sums
+
+    def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
+        """Return (e^{−π|k−r|²}, r, n), k on the Gaussian lattice, with y_G + δ_G = n + r reduced to the unit cell around zero.
+
+        ``shifts`` (P, |G|) are the δ_G; the results have all points of the first, then those of the second, and so on.
+        """
+        y_G = (y[:, self._split[1]] + shifts[:, None, :]).reshape(len(shifts) * len(y), shifts.shape[1])
         nearest = np.rint(y_G)
         r = y_G - nearest
         inverse, k = self._parts[2], self._gaussian_lattice
         if k.shape[1] == 0:
-            return np.ones((y.shape[0], 1)), r, nearest
+            return np.ones((len(y_G), 1)), r, nearest
         projected = r @ inverse
         quadratic = self._gaussian_norms - (2 * projected) @ k.T + np.sum(projected * r, axis=1)[:, None]
         return np.exp(-np.pi * np.where(quadratic < _VANISHING, quadratic, np.inf)), r, nearest
