@@ -27,19 +27,18 @@ class BranchPoint:
 class Layout:
     """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
 
-    places (m,) their indices j · own_cut (m,) the cut (from 0) that each ends, −1 for b_0, which ends none
-    is_own (g, m) whether b_k ends cut s · mate (m,) the number of the cut's other end, −1 where that is of the other kind
+    places (m,) their indices j · sides (g, m) the sign of λ_s − b_k
     beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k (m where there is none)
-    ends the k that end a cut · sides (g, m) the sign of λ_s − b_k
+    partners (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with those below, the others with those
+    above
+    ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1 where that is of the other kind
     """
 
     places: NDArray[np.intp]
-    own_cut: NDArray[np.intp]
-    is_own: NDArray[np.bool_]
-    mate: NDArray[np.intp]
-    beyond: NDArray[np.intp]
-    ends: NDArray[np.intp]
     sides: NDArray[np.intp]
+    beyond: NDArray[np.intp]
+    partners: NDArray[np.intp]
+    ends: tuple[tuple[int, int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -87,25 +86,31 @@ class Curve:
 
     def _layout(self, kind: Literal["I", "c"]) -> Layout:
         count = self.genus + 1 if kind == "I" else self.genus
-        places = np.array([self.place[kind, index] for index in range(count)])
-        own_cut, cuts = self.cut_of(places) - 1, np.arange(self.genus)[:, None]
-        others = [self.origins[j + 1 if j % 2 == 1 else j - 1] if j > 0 else None for j in places]
-        mate = np.array([other.index if other is not None and other.kind == kind else -1 for other in others])
+        places, cuts, inner = (
+            [self.place[kind, i] for i in range(count)],
+            np.arange(self.genus)[:, None],
+            np.arange(1, self.genus),
+        )
+        ends = []
+        for k, j in enumerate(places):
+            if j > 0:
+                other = self.origins[j + 1 if j % 2 == 1 else j - 1]
+                ends.append((k, self.cut_of(j) - 1, other.index if other.kind == kind else -1))
         beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
-        ends, sides = np.flatnonzero(own_cut >= 0), np.where(places <= 2 * cuts + 1, 1, -1)
-        return Layout(places, own_cut, cuts == own_cut, mate, beyond, ends, sides)
+        sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
+        return Layout(np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner), tuple(ends))
 
-    def stretches(self, kind: Literal["I", "c"]) -> Values:
-        """Return the distances of the branch points of one kind from those beyond each cut, (g, m); one where there is none."""
-        return self._stretches[kind]
+    def root_stretches(self, kind: Literal["I", "c"]) -> Values:
+        """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m); one where there is none."""
+        return self._root_stretches[kind]
 
     @cached_property
-    def _stretches(self) -> dict[Literal["I", "c"], Values]:
+    def _root_stretches(self) -> dict[Literal["I", "c"], Values]:
         result: dict[Literal["I", "c"], Values] = {}
         for kind, layout in self._layouts.items():
             inside = layout.beyond < layout.places.size
             distances = abs(self.differences[layout.places, layout.places[np.where(inside, layout.beyond, 0)]])
-            result[kind] = np.where(inside, distances, self.arithmetic.number(1))
+            result[kind] = self.arithmetic.sqrt(np.where(inside, distances, self.arithmetic.number(1)))
         return result
 
     def width(self, j: int) -> Any:

@@ -22,9 +22,9 @@ from typing import Literal
 
 import numpy as np
 
-from veselova.analytic.curve import Curve, Layout
+from veselova.analytic.curve import Curve
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import Arithmetic, Values
+from veselova.analytic.precision import Values
 
 __all__ = ["Attitude", "Differences", "Frame", "slopes"]
 
@@ -139,25 +139,28 @@ class _Point:
 
     @cached_property
     def own_roots(self) -> Values:
-        """Return the signed root of |λ_s−b_i| at each end b_i, i = 1…2g, of its cut s: along sn or cn, (N, 2g)."""
+        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one for b_0, (N, 2g+1)."""
         of_cuts = [cut.roots(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
-        return np.stack([root for roots in of_cuts for root in roots], axis=1)
+        return np.stack([np.ones_like(of_cuts[0][0]), *(root for roots in of_cuts for root in roots)], axis=1)
 
     @cached_property
     def on_cuts(self) -> tuple[Values, Values]:
         """Return λ_s−b_{2s−1} and b_{2s}−λ_s, each (N, g)."""
         squares = self.own_roots * self.own_roots
-        return squares[:, ::2], squares[:, 1::2]
+        return squares[:, 1::2], squares[:, 2::2]
 
     @cached_property
-    def to_points(self) -> Values:
-        """Return |λ_s−b_i|, (N, g, 2g+1)."""
-        below, above = self.on_cuts
-        return np.stack([cut.to_branch_points(below[:, s], above[:, s]) for s, cut in enumerate(self.frame.periods.cuts)], axis=1)
+    def roots(self) -> Values:
+        """Return √|λ_s−b_i|, (N, g, 2g+1), one where b_i ends cut s."""
+        (below, above), cuts = self.on_cuts, self.frame.periods.cuts
+        distances = np.stack([cut.to_branch_points(below[:, s], above[:, s]) for s, cut in enumerate(cuts)], axis=1)
+        for s in range(len(cuts)):
+            distances[:, s, 2 * s + 1 : 2 * s + 3] = self.curve.arithmetic.number(1)
+        return np.asarray(self.curve.arithmetic.sqrt(distances))
 
     @cached_property
-    def between(self) -> Values:
-        """Return |λ_s−λ_j|, (N, g, g), one for s = j: what is above λ_s on its cut, the stretch between, what is below λ_j."""
+    def roots_between(self) -> Values:
+        """Return √|λ_s−λ_j|, (N, g, g), one for s = j: of what is above λ_s on its cut, the stretch between, and below λ_j."""
         below, above = self.on_cuts
         g = self.curve.genus
         stretch = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
@@ -165,7 +168,7 @@ class _Point:
         lower = np.arange(g)[:, None] < np.arange(g)
         result = np.where(lower, forward, np.swapaxes(forward, 1, 2))
         result[:, np.arange(g), np.arange(g)] = self.curve.arithmetic.number(1)
-        return result
+        return np.asarray(self.curve.arithmetic.sqrt(result))
 
 
 def _attitude(frame: Frame, psi: Values) -> Attitude:
@@ -181,42 +184,22 @@ def _attitude(frame: Frame, psi: Values) -> Attitude:
 
 def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) -> tuple[Values, Values]:
     """Return the signed column values (q_i or v_k), (N, m), and the matrix column·row/(λ_s−b), (N, g, m), for one kind of b."""
-    curve, xp, g = point.curve, point.curve.arithmetic, point.curve.genus
-    layout = curve.layout(kind)
-    to_own_kind = point.to_points[:, :, layout.places]
-    columns = _columns(to_own_kind, layout.is_own, curve.stretches(kind), xp)
+    curve, layout = point.curve, point.curve.layout(kind)
+    near, own = point.roots[:, :, layout.places], point.own_roots[:, layout.places]
+    # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond each λ_s.
+    columns = np.prod(near / curve.root_stretches(kind), axis=1)
     if signs is not None:
         columns = columns * signs
-    rows = _rows(to_own_kind, point.between, layout, g, xp)
-    own = np.ones_like(columns)
-    own[:, layout.ends] = point.own_roots[:, layout.places[layout.ends] - 1]
+    # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or I_1 and I_n) have no partner.
+    ratios, cuts = near.copy(), np.arange(curve.genus)[:, None]
+    ratios[:, :, 1 : curve.genus] /= point.roots_between[:, cuts, layout.partners]
+    rows = np.prod(ratios, axis=2)
     whole_rows = rows.copy()
-    for k in layout.ends:
-        whole_rows[:, layout.own_cut[k]] = whole_rows[:, layout.own_cut[k]] * own[:, k]
-    near = xp.sqrt(np.where(layout.is_own, xp.number(1), to_own_kind))
+    for k, s, _ in layout.ends:
+        whole_rows[:, s] *= own[:, k]
     matrix = layout.sides * ((columns * own)[:, None, :] / near) * (whole_rows[:, :, None] / near)
     # The root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays.
-    for k in layout.ends:
-        s, mate = layout.own_cut[k], layout.mate[k]
+    for k, s, mate in layout.ends:
         entry = layout.sides[s, k] * columns[:, k] * rows[:, s]
         matrix[:, s, k] = entry if mate < 0 else entry * own[:, mate]
     return columns * own, matrix
-
-
-def _columns(to_own_kind: Values, is_own: Values, stretches: Values, xp: Arithmetic) -> Values:
-    """Return √(|U(b)/Φ'(b)|) without the factor of b's own cut, (N, m): ratios to the b of the same kind beyond each λ_s."""
-    distances = np.where(is_own, xp.number(1), to_own_kind)
-    return np.asarray(np.prod(xp.sqrt(distances / stretches), axis=1))
-
-
-def _rows(to_own_kind: Values, between: Values, layout: Layout, g: int, xp: Arithmetic) -> Values:
-    """Return √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b of one kind that are not ends of cut s, (N, g).
-
-    b_2 … b_s pair with the λ_j below, b_{s+1} … b_g with those above; the outermost (c_1, or I_1 and I_n) are left over.
-    """
-    cuts = np.arange(g)[:, None]
-    ratios = np.where(layout.is_own, xp.number(1), to_own_kind)
-    inner = np.arange(1, g)
-    partners = np.where(inner <= cuts, inner - 1, inner)
-    ratios[:, :, 1:g] = ratios[:, :, 1:g] / between[:, cuts, partners]
-    return np.asarray(np.prod(xp.sqrt(ratios), axis=2))

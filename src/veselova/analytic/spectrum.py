@@ -193,27 +193,32 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
     With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose tangent is along Aw, (dτ₁/ds)²
     = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q| = 1.
     """
-    triples = list(zip(moving.q_squared, moving.v_squared, moving.qv, strict=True))
-    qq = sum(moving.q_squared, Fraction())
-    along = sum(moving.qv, Fraction()) / qq
-    qAq = sum((a * x for a, x in zip(moving.A, moving.q_squared, strict=True)), Fraction())
-    vAv = sum((a * x for a, x in zip(moving.A, moving.v_squared, strict=True)), Fraction())
-    qAv = sum((a * x for a, x in zip(moving.A, moving.qv, strict=True)), Fraction())
-    speed = 1 / moving.unit if moving.time == "tau1" else (vAv * qAq - qAv * qAv) / qAq
+    # Over common denominators: sums of fractions would look for common factors at every step.
+    A, A_unit = _over_common(moving.A)
+    squares, square_unit = _over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
+    m = moving.size
+    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
+    qq, along = sum(q2), sum(qv)
+    qAq, vAv, qAv = (sum(a * x for a, x in zip(A, values, strict=True)) for values in (q2, v2, qv))
+    speed = 1 / moving.unit if moving.time == "tau1" else Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
     rate = speed
     if moving.time == "s":
-        r = qAv / qAq
-        squares = [a * a * (v2 - 2 * r * qv + r * r * q2) for a, (q2, v2, qv) in zip(moving.A, triples, strict=True)]
-        tangent_squared = sum(squares, Fraction())
-        rate = speed * qAq / (qq * tangent_squared * moving.unit)
-    q = arithmetic.sqrt(arithmetic.array([q2 / qq for q2, _, _ in triples]))
-    v = [
-        arithmetic.number(qv - along * q2) / arithmetic.sqrt(arithmetic.number(q2))
-        if q2
-        else arithmetic.sqrt(arithmetic.number(v2))
-        for q2, v2, qv in triples
+        scaled = ((a * a) * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in zip(A, q2, v2, qv, strict=True))
+        rate = speed * Fraction(qAq**3 * A_unit * square_unit, qq * sum(scaled)) / moving.unit
+    q = arithmetic.sqrt(arithmetic.array([Fraction(x, qq) for x in q2]))
+    w = [
+        arithmetic.number(Fraction(x * qq - along * own, qq * square_unit)) / _root(Fraction(own, square_unit), arithmetic)
+        if own
+        else _root(Fraction(other, square_unit), arithmetic)
+        for own, other, x in zip(q2, v2, qv, strict=True)
     ]
-    return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
+    return q, arithmetic.array(w) / _root(speed, arithmetic), _root(rate, arithmetic)
+
+
+def _over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:
+    """Return numerators over the least common denominator, and that."""
+    unit = math.lcm(*(value.denominator for value in values))
+    return [value.numerator * (unit // value.denominator) for value in values], unit
 
 
 def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
@@ -224,7 +229,6 @@ def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithm
     """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or too small for the digits)."""
     on_plane = {I: i for i, I in enumerate(inverse) if not q[i] > 0}
     live = {I: i for i, I in enumerate(inverse) if q[i] > 0}
-    axes = list(live.values())
     components = []
     for point in points:
         if point in on_plane:
@@ -232,6 +236,6 @@ def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithm
         elif point in live:
             components.append(v[live[point]])
         else:
-            row = q[axes] / (point - inverse[axes])
-            components.append(np.sum(row * v[axes]) / arithmetic.sqrt(np.sum(row * row)))
+            row = [(q[i] / (point - I), v[i]) for I, i in live.items()]
+            components.append(sum(x * y for x, y in row) / arithmetic.sqrt(sum(x * x for x, _ in row)))
     return components
