@@ -542,6 +542,22 @@ def test_a_worker_that_does_not_come_back_holds_up_no_cancellation(tmp_path: Pat
     asyncio.run(run())
 
 
+def test_a_worker_that_replaces_another_leaves_interrupts_to_its_parent(tmp_path: Path) -> None:
+    async def run() -> None:
+        async with open_cluster(local_settings(tmp_path, 1)) as client:
+            (first,) = (await client.run(os.getpid)).values()
+            os.kill(first, signal.SIGKILL)
+            async with asyncio.timeout(60):
+                while not (found := await client.run(os.getpid, on_error="ignore")) or first in found.values():
+                    await asyncio.sleep(0.05)
+            (second,) = found.values()
+            os.kill(second, signal.SIGINT)
+            await asyncio.sleep(0.5)
+            assert (await client.run(os.getpid)).popitem()[1] == second
+
+    asyncio.run(run())
+
+
 async def cancelled_once(client: Any, job: Job, stage: str) -> None:
     """Ask for the first problems, and give up when the one worker is so far with them."""
     waiting = asyncio.create_task(answers(client, job, 0, 5, lambda: False))

@@ -67,7 +67,7 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
         async with Client(settings.dask_scheduler, **options) as client:
             yield client
         return
-    with dask.config.set(_configuration(niceness if processes and hasattr(os, "setpriority") else 0)):
+    with dask.config.set(_configuration(_preload(niceness) if processes else [])):
         starting = asyncio.ensure_future(LocalCluster(**_machine(settings, processes)))
         try:
             with children_deaf() if processes else nullcontext():
@@ -81,7 +81,15 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
             yield client
 
 
-def _configuration(niceness: int) -> dict[str, Any]:
+def _preload(niceness: int) -> list[str]:
+    """Return what a worker process runs first; one that replaces another starts outside ``children_deaf``, and hears SIGINT."""
+    code = ["import os, signal", "signal.signal(signal.SIGINT, signal.SIG_IGN)"]
+    if niceness and hasattr(os, "setpriority"):
+        code.append(f"os.setpriority(os.PRIO_PROCESS, 0, {niceness})")
+    return ["\n".join(code)]
+
+
+def _configuration(preload: list[str]) -> dict[str, Any]:
     """Return what Dask is to do otherwise than by default."""
     return {
         # A worker at its limit is ended. Paused, as Dask would have it before that, it would never go on.
@@ -96,8 +104,7 @@ def _configuration(niceness: int) -> dict[str, Any]:
         "distributed.worker.memory.monitor-interval": "500ms",
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.worker.profile.enabled": False,
-        # A worker that replaces another is started in the same way.
-        "distributed.worker.preload": [f"import os\nos.setpriority(os.PRIO_PROCESS, 0, {niceness})"] if niceness else [],
+        "distributed.worker.preload": preload,
         "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
     }
 
