@@ -669,6 +669,30 @@ def test_the_command_line_sweeps(tmp_path: Path) -> None:
     assert "--output: required a file in an existing folder" in refused.stderr
 
 
+def test_an_interrupt_ends_a_sweep_in_a_notebook(tmp_path: Path) -> None:
+    """The thread of a notebook runs a loop already, which does not take interrupts as ``asyncio.run`` does."""
+    script = f"""
+import asyncio, veselova
+async def cell():
+    report = lambda done, total: print(done, flush=True)
+    vary = {{"/A/0": {{"start": 2, "stop": 3, "count": 100_000}}}}
+    veselova.sweep({BASE!r}, vary, workers=1, folder={str(tmp_path)!r}, progress=report)
+if __name__ == "__main__":
+    try:
+        asyncio.new_event_loop().run_until_complete(cell())
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+    (tmp_path / "cell.py").write_text(script)
+    command = [sys.executable, str(tmp_path / "cell.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()  # the first report
+        os.killpg(process.pid, signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, output.split()[-1]) == (0, "interrupted")
+
+
 def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback(tmp_path: Path) -> None:
     file = tmp_path / "sweep.json"
     file.write_text(json.dumps({"problem": BASE, "vary": {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}}))

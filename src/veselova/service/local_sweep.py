@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,5 +133,7 @@ def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
     except RuntimeError:
         asyncio.run(run())
         return
-    with ThreadPoolExecutor(1, thread_name_prefix="veselova sweep") as thread:
-        thread.submit(asyncio.run, run()).result()
+    from anyio.from_thread import start_blocking_portal
+
+    with start_blocking_portal() as portal:  # an interrupt of this thread cancels what the other one runs
+        portal.call(run)
