@@ -86,16 +86,12 @@ class Curve:
 
     def _layout(self, kind: Literal["I", "c"]) -> Layout:
         count = self.genus + 1 if kind == "I" else self.genus
-        places, cuts, inner = (
-            [self.place[kind, i] for i in range(count)],
-            np.arange(self.genus)[:, None],
-            np.arange(1, self.genus),
-        )
-        ends = []
+        places, ends = [self.place[kind, index] for index in range(count)], list[tuple[int, int, int]]()
         for k, j in enumerate(places):
             if j > 0:
                 other = self.origins[j + 1 if j % 2 == 1 else j - 1]
                 ends.append((k, self.cut_of(j) - 1, other.index if other.kind == kind else -1))
+        cuts, inner = np.arange(self.genus)[:, None], np.arange(1, self.genus)
         beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
         sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
         return Layout(np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner), tuple(ends))
