@@ -90,7 +90,9 @@ class Jacobi:
     def _powers(self) -> list[tuple[int, Any, Any]]:
         """Return m, q^{m²+m} and q^{m²} for the nome q, m = 1…_terms."""
         exp, q = self.arithmetic.exp, self._log_nome
-        number = np.asarray if self._stacked else self.arithmetic.number  # a float times an array takes half of a NumPy scalar
+        number = (
+            np.asarray if self._stacked else self.arithmetic.number
+        )  # a float times an array takes half as long as a NumPy scalar does
         return [(m, number(exp(q * (m * m + m))), number(exp(q * (m * m)))) for m in range(1, self._terms + 1)]
 
     @cached_property
@@ -146,7 +148,7 @@ class Jacobi:
         """Jacobi's imaginary transformation: sn = (θ3/θ4) (θ1/i)/θ2, cn = (θ2/θ4) θ4/θ2, dn = (θ2/θ3) θ3/θ2 at iy, y = πv/2K'.
 
         All four sums are divided by e^y. With the nome q, E = e^{2y} and D = 1/E their terms are q^{m²+m} (E^m ∓ D^{m+1}) and
-        q^{m²} e^{−y} (E^m + D^m); as y ≤ |log q|/4, and M is small where q is, nothing overflows. E^m − D^{m+1} is
+        q^{m²} e^{−y} (E^m + D^m); as y ≤ |log q|/4, and M is small where q is (or E is cut), nothing overflows. E^m − D^{m+1} is
         (1 − D)(1 + Σ_{j≤m} (E^j + D^j)), which keeps its accuracy relative to itself.
         """
         xp = self.arithmetic

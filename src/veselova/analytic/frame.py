@@ -52,9 +52,9 @@ class Attitude:
         """Return q' = dq/dτ₁ = Σ_k v_k n_k, shape (N, n)."""
         return np.asarray(np.sum(self.normals * self.components[:, None, :], axis=2))
 
-    def __getitem__(self, rows: slice) -> Attitude:
-        """Return the attitudes of some points."""
-        return Attitude(self.q[rows], self.normals[rows], self.components[rows], self.spheroconic[rows])
+    def part(self, rows: slice) -> Attitude:
+        """Return copies of the attitudes of some points."""
+        return Attitude(*(array[rows].copy() for array in (self.q, self.normals, self.components, self.spheroconic)))
 
     @classmethod
     def joined(cls, parts: list[Attitude]) -> Attitude:
@@ -79,7 +79,7 @@ class Frame:
         """Return the attitudes at sets of angles, in one evaluation."""
         at, first, parts = self.at(np.concatenate(sets)), 0, []
         for psi in sets:
-            parts.append(at[first : first + len(psi)])
+            parts.append(at.part(slice(first, first + len(psi))))
             first += len(psi)
         return parts
 

@@ -127,8 +127,10 @@ def _reduced(form: Array) -> Integers:
 
 @dataclass(frozen=True)
 class _Factors:
-    """A form as LLᵀ, and L⁻¹: of its first m coordinates, which may have Gaussians, the leading blocks of both; S of the others
-    has what is left of L."""
+    """A form as LLᵀ, and L⁻¹, for Gaussians in its first m coordinates and waves in the others, with any m.
+
+    The leading blocks of both are those of the first; the last block of L is a factor of S, the Schur complement.
+    """
 
     lower: Array
     inverse: Array
@@ -161,7 +163,7 @@ class _Factors:
 
 
 def points_within(form: Array, radius: float) -> float:
-    """Return about how many points of Z^d lie within a radius of zero in the norm of the form."""
+    """Return about how many points of Z^d lie in a ball of this radius in the norm of the form."""
     return _points(radius / x for x in np.diag(np.linalg.cholesky(form)).tolist())
 
 

@@ -33,15 +33,18 @@ _LARGEST_GENUS = 18
 
 @dataclass(frozen=True)
 class ThetaQuotients:
-    """The theta route to the attitude of one torus; agrees with Frame after Abel–Jacobi inversion, and shares only κ with it."""
+    """The theta route to the attitude of one torus; agrees with Frame after Abel–Jacobi inversion, and shares only κ with it.
+
+    ``at_half_periods``: the attitudes at the frame's half periods, where they are known already.
+    """
 
     theta: Theta | EnclosedTheta
     frame: Frame
     at_half_periods: Attitude | None = None
 
     @classmethod
-    def of(cls, T: Array, frame: Frame, at_half_periods: Attitude | None) -> ThetaQuotients:
-        """Return the route in double precision; attitudes at the half periods of the frame may be known already.
+    def of(cls, T: Array, frame: Frame) -> ThetaQuotients:
+        """Return the route in double precision.
 
         Raises Unsolved where its tables would fill the memory (``too-many-terms``), or where T leaves the range of floats.
         """
@@ -52,7 +55,7 @@ class ThetaQuotients:
         if not terms * functions <= _MOST_TERMS:
             wanted = f"n = {len(T) + 1} takes {functions} theta functions of {min(terms, 1e11):.1e} terms or more"
             raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
-        return cls(theta, frame, at_half_periods)
+        return cls(theta, frame)
 
     @cached_property
     def _characteristics(self) -> list[Characteristic]:
@@ -81,7 +84,9 @@ class ThetaQuotients:
     def constants(self) -> Array:
         """Return the κ's in the order of the functions."""
         half_periods = self.frame.half_periods
-        attitude = self.at_half_periods or self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
+        attitude = self.at_half_periods
+        if attitude is None:
+            attitude = self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
         raw = self._raw(self.theta.values(half_periods / 2, self.functions))
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
@@ -103,7 +108,7 @@ class ThetaQuotients:
     def position(self, z: Array) -> Array:
         """Return q along sorted axes at points z of shape (N, g), modulo 2."""
         n = self.theta.genus + 1
-        constants = self.constants[:n]  # first: theta then has the tables of all functions, and these from them
+        constants = self.constants[:n]  # first: it makes the tables of all functions, of which those of q are rows
         values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *self._characteristics[:n]])
         return np.asarray(values[:, 1:] / values[:, :1] * constants)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
 
@@ -211,7 +212,7 @@ class Solution:
     @cached_property
     def steepness(self) -> Steepness:
         """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
-        if not self.near_separatrix:
+        if self._survey.steepness is not None:
             return self._survey.steepness
         return self.steepness_at(np.concatenate([drawn_phases(self.curve.genus), self._origin[None, :]]))
 
@@ -226,7 +227,7 @@ class Solution:
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
         T = np.asarray(self.periods.riemann_matrix, dtype=np.float64)
-        return ThetaQuotients.of(T, self.frame, self._survey.at_half_periods)
+        return replace(ThetaQuotients.of(T, self.frame), at_half_periods=self._survey.at_half_periods)
 
     @cached_property
     def transforms(self) -> Transforms:

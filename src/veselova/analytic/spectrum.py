@@ -27,7 +27,7 @@ from veselova.mechanics.errors import InternalContradiction
 __all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
 
 #: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
-_Decimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
+_InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
 #: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to hold their differences, and
 #: squares of roots of them.
@@ -57,7 +57,7 @@ class Spectrum:
     clock_rate: Any
 
     @classmethod
-    def of(cls, arithmetic: Arithmetic, values: tuple[Any, Any, Any, Any, Any, Any]) -> Spectrum:
+    def of(cls, arithmetic: Arithmetic, values: _InDecimals) -> Spectrum:
         """Return the spectrum with its values, in the order above, taken into an arithmetic."""
         inverse, q, q_prime, constants, spheroconic = map(arithmetic.array, values[:5])
         return cls(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(values[5]))
@@ -140,7 +140,7 @@ def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectr
         working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
 
 
-def _narrowest(values: _Decimals, digits: int) -> Decimal:
+def _narrowest(values: _InDecimals, digits: int) -> Decimal:
     """Return the least difference of neighbours among the branch points."""
     with Decimals(digits):
         points: list[Decimal] = sorted([*values[0], *values[3]])
@@ -161,7 +161,7 @@ def _digits_of_speed(moving: Moving) -> int:
     return max(0, math.ceil(square)).bit_length() * 3 // 10
 
 
-def _values(moving: Moving, working: int, digits: int) -> _Decimals | None:
+def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
     """Return the values of the spectra with ``working`` digits, of which c_1 = 0 is to come out to ``digits``.
 
     None where they are too few for that, or for iterations to settle.
@@ -203,16 +203,17 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
     speed = 1 / moving.unit if moving.time == "tau1" else Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
     rate = speed
     if moving.time == "s":
-        scaled = ((a * a) * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in zip(A, q2, v2, qv, strict=True))
+        terms = zip(A, q2, v2, qv, strict=True)
+        scaled = (a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms)
         rate = speed * Fraction(qAq**3 * A_unit * square_unit, qq * sum(scaled)) / moving.unit
     q = arithmetic.sqrt(arithmetic.array([Fraction(x, qq) for x in q2]))
-    w = [
+    v = [
         arithmetic.number(Fraction(x * qq - along * own, qq * square_unit)) / _root(Fraction(own, square_unit), arithmetic)
         if own
         else _root(Fraction(other, square_unit), arithmetic)
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
-    return q, arithmetic.array(w) / _root(speed, arithmetic), _root(rate, arithmetic)
+    return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
 
 
 def _over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:

@@ -34,7 +34,8 @@ def drawn_phases(genus: int) -> Array:
 class Survey:
     """The frame around a torus, from the angles (g,) of its start.
 
-    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether these are wanted
+    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half periods, and the steepness, are
+    wanted
     """
 
     frame: Frame
@@ -45,22 +46,30 @@ class Survey:
     steep: bool
 
     @cached_property
-    def _parts(self) -> list[Attitude]:
-        half_periods = np.pi * self.frame.half_periods if self.half_periods else self.angles[None, :][:0]
-        ends = self._differences.ends if self.steep else self.angles[None, :][:0]
-        return self.frame.at_each(self.angles[None, :], half_periods, ends)
+    def _found(self) -> tuple[Attitude, Attitude | None, Steepness | None]:
+        start = self.angles[None, :]
+        differences = self._differences() if self.steep else None
+        half_periods = np.pi * self.frame.half_periods if self.half_periods else start[:0]
+        ends = start[:0] if differences is None else differences.ends
+        at_start, at_half_periods, at_ends = self.frame.at_each(start, half_periods, ends)
+        steepness = None if differences is None else self._steepness(2 * differences.slopes(at_ends))
+        return at_start, at_half_periods if self.half_periods else None, steepness
 
     @property
     def start(self) -> Attitude:
         """Return the attitude at the start."""
-        return self._parts[0]
+        return self._found[0]
 
     @property
     def at_half_periods(self) -> Attitude | None:
         """Return the attitudes at the half periods of the frame; None where they are not wanted."""
-        return self._parts[1] if self.half_periods else None
+        return self._found[1]
 
-    @cached_property
+    @property
+    def steepness(self) -> Steepness | None:
+        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points; None as above."""
+        return self._found[2]
+
     def _differences(self) -> Differences:
         genus = self.rates.size
         psi = np.concatenate([drawn_angles(genus, _SAMPLES if genus <= FEW else _FEW_SAMPLES), self.angles[None, :]])
@@ -70,10 +79,8 @@ class Survey:
             to_angles = to_angles @ np.column_stack([signs, self.rates])
         return Differences(psi, to_angles)
 
-    @cached_property
-    def steepness(self) -> Steepness:
-        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
-        slopes, genus = 2 * self._differences.slopes(self._parts[2]), self.rates.size
+    def _steepness(self, slopes: Array) -> Steepness:
+        genus = self.rates.size
         if genus <= FEW:
             return Steepness.of(slopes, self.rates)
         # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².

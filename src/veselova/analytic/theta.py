@@ -200,7 +200,7 @@ class Theta:
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
         if characteristics not in self._grouped:
-            more = next((known for known in self._grouped if set(characteristics) <= set(known)), None)
+            more = next((known for known in list(self._grouped) if set(characteristics) <= set(known)), None)
             if more is not None and len(set(characteristics)) == len(characteristics):
                 places = {more.index(c): place for place, c in enumerate(characteristics)}
                 groups = [group for known in self._grouped[more] if (group := known.of(places)) is not None]

@@ -82,7 +82,7 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
 
 
 def _preload(niceness: int) -> list[str]:
-    """Return what a worker process runs first; one that replaces another starts outside ``children_deaf``, and hears SIGINT."""
+    """Return what a worker runs once Dask is loaded; one that replaces another starts outside ``children_deaf``."""
     code = ["import os, signal", "signal.signal(signal.SIGINT, signal.SIG_IGN)"]
     if niceness and hasattr(os, "setpriority"):
         code.append(f"os.setpriority(os.PRIO_PROCESS, 0, {niceness})")

@@ -9,6 +9,9 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import anyio
+from anyio.from_thread import start_blocking_portal
+
 from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Problem
 from veselova.service.schemas import read_request
@@ -113,7 +116,8 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
                 if progress := sweeps.progress(job.id):
                     report(progress.done, request.total)
         finally:
-            await sweeps.close()
+            with anyio.CancelScope(shield=True):  # a portal cancels again whatever is awaited after it has cancelled
+                await sweeps.close()
 
     with closing(jobs):
         job = jobs.submit(request)
@@ -133,7 +137,5 @@ def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
     except RuntimeError:
         asyncio.run(run())
         return
-    from anyio.from_thread import start_blocking_portal
-
     with start_blocking_portal() as portal:  # an interrupt of this thread cancels what the other one runs
         portal.call(run)
