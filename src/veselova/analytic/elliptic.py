@@ -90,9 +90,8 @@ class Jacobi:
     def _powers(self) -> list[tuple[int, Any, Any]]:
         """Return m, q^{m²+m} and q^{m²} for the nome q, m = 1…_terms."""
         exp, q = self.arithmetic.exp, self._log_nome
-        number = (
-            np.asarray if self._stacked else self.arithmetic.number
-        )  # a float times an array takes half as long as a NumPy scalar does
+        # A float times an array takes half as long as a NumPy scalar does.
+        number = np.asarray if self._stacked else self.arithmetic.number
         return [(m, number(exp(q * (m * m + m))), number(exp(q * (m * m)))) for m in range(1, self._terms + 1)]
 
     @cached_property
@@ -131,13 +130,10 @@ class Jacobi:
         factor, sum_, alternating = wave, 1, 1
         z1 = z2 = z3 = z4 = 1
         for m, odd, even in self._powers:
-            term = even * wave
-            if m % 2:
-                sum_, alternating = sum_ + wave, alternating - wave
-                z1, z2, z3, z4 = z1 - odd * sum_, z2 - odd * alternating, z3 + term, z4 - term
-            else:
-                sum_, alternating = sum_ + wave, alternating + wave
-                z1, z2, z3, z4 = z1 + odd * sum_, z2 + odd * alternating, z3 + term, z4 + term
+            term, sum_ = even * wave, sum_ + wave
+            alternating, z4 = (alternating - wave, z4 - term) if m % 2 else (alternating + wave, z4 + term)
+            weight = -odd if m % 2 else odd
+            z1, z2, z3 = z1 + weight * sum_, z2 + weight * alternating, z3 + term
             before, wave = wave, factor * wave - before
         z1, z2 = 2 * z1, 2 * z2
         z1, z2, z3, z4 = self._truncated(z1, z2, z3, z4)

@@ -54,7 +54,7 @@ class Attitude:
 
     def part(self, rows: slice) -> Attitude:
         """Return copies of the attitudes of some points."""
-        return Attitude(*(array[rows].copy() for array in (self.q, self.normals, self.components, self.spheroconic)))
+        return Attitude(*(getattr(self, f.name)[rows].copy() for f in fields(self)))
 
     @classmethod
     def joined(cls, parts: list[Attitude]) -> Attitude:

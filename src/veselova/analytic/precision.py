@@ -12,6 +12,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import mpmath
@@ -20,7 +21,7 @@ from mpmath.libmp import from_rational
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprf
 
-from veselova.analytic.waves import cosine_series, cosine_sums, midpoints, sine_sums
+from veselova.analytic.waves import cosine_sums, sine_sums
 
 __all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
 
@@ -29,6 +30,9 @@ Values = NDArray[Any]
 
 #: A sum of waves as a function of angles.
 Sums = Callable[[Values], Values]
+
+#: Tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at most.
+_MOST_KEPT, _LARGEST_KEPT = 64, 256
 
 #: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is taken for what it leaves out
 #: where that is not bounded.
@@ -87,7 +91,7 @@ class Arithmetic(ABC):
 
     def nodes(self, count: int) -> Values:
         """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
-        return self.array([self.pi * (2 * i + 1) / (2 * count) for i in range(count)])
+        return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
 
     def sine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
@@ -108,11 +112,14 @@ class Arithmetic(ABC):
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
         count = values.shape[-1]
-        table = self.cos(self.array(list(range(4 * count))) * (self.pi / (2 * count)))
-        waves = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)]
-        coefficients = self.product(values, waves) * 2 / count
+        coefficients = self.product(values, self._waves(count)) * 2 / count
         coefficients[..., 0] = coefficients[..., 0] / 2
         return np.asarray(coefficients)
+
+    def _waves(self, count: int) -> Values:
+        """Return cos mψ at the N nodes, shape (N, N)."""
+        table = self.cos(np.arange(4 * count) * (self.pi / (2 * count)))
+        return np.asarray(table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)])
 
     @staticmethod
     def bounded_tail(largest: Any, decay: Any, count: int) -> Any:
@@ -157,8 +164,9 @@ class Double(Arithmetic):
     floor = staticmethod(np.floor)
     sine_sums = staticmethod(sine_sums)
     cosine_sums = staticmethod(cosine_sums)
-    cosine_series = staticmethod(cosine_series)
-    nodes = staticmethod(midpoints)
+
+    def _waves(self, count: int) -> Values:
+        return _kept_waves(count) if count <= _LARGEST_KEPT else super()._waves(count)
 
     def number(self, value: Any) -> float:
         """Return the nearest double."""
@@ -260,18 +268,11 @@ class Extended(Arithmetic):
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""
-        return self._from_matrix(self._context.inverse(self._context.matrix(matrix.tolist())))
+        return np.array(self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object)
 
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
         return self._context.det(self._context.matrix(matrix.tolist()))
-
-    def _from_matrix(self, matrix: Any) -> Values:
-        result = np.empty((matrix.rows, matrix.cols), dtype=object)
-        for i in range(matrix.rows):
-            for j in range(matrix.cols):
-                result[i, j] = matrix[i, j]
-        return result
 
 
 class _ExtendedOfThread(threading.local):
@@ -294,3 +295,5 @@ def extended(digits: int) -> Extended:
 
 #: The double-precision arithmetic; it has no state, so one serves all.
 DOUBLE = Double()
+
+_kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._waves, DOUBLE))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Steepness", "drawn_angles"]
+__all__ = ["Steepness"]
 
 Array = NDArray[np.float64]
 
@@ -28,11 +27,3 @@ class Steepness:
     def joined(self, other: Steepness) -> Steepness:
         """Return the larger of both."""
         return Steepness(np.maximum(self.by_phase, other.by_phase), max(self.along_flow, other.along_flow))
-
-
-@lru_cache
-def drawn_angles(genus: int, count: int) -> Array:
-    """Return ``count`` points of the torus, shape (count, g), always the same ones, read-only."""
-    result = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (count, genus))
-    result.flags.writeable = False
-    return np.asarray(result)

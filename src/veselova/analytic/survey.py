@@ -7,7 +7,7 @@ quotients that say how steep the frame is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.frame import Attitude, Differences, Frame
 from veselova.analytic.periods import Periods
-from veselova.analytic.steepness import Steepness, drawn_angles
+from veselova.analytic.steepness import Steepness
 
 __all__ = ["FEW", "Survey", "drawn_phases"]
 
@@ -25,9 +25,18 @@ Array = NDArray[np.float64]
 _SAMPLES, FEW, _FEW_SAMPLES = 48, 16, 4
 
 
+@lru_cache
+def _drawn_angles(genus: int) -> Array:
+    """Return the points of the torus at which the steepness is sampled, (N, g), always the same ones, read-only."""
+    count = _SAMPLES if genus <= FEW else _FEW_SAMPLES
+    result = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (count, genus))
+    result.flags.writeable = False
+    return np.asarray(result)
+
+
 def drawn_phases(genus: int) -> Array:
     """Return phases at which the steepness is sampled where angles do not serve, (N, g)."""
-    return drawn_angles(genus, _SAMPLES) / np.pi
+    return _drawn_angles(genus) / np.pi
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,7 @@ class Survey:
 
     def _differences(self) -> Differences:
         genus = self.rates.size
-        psi = np.concatenate([drawn_angles(genus, _SAMPLES if genus <= FEW else _FEW_SAMPLES), self.angles[None, :]])
+        psi = np.concatenate([_drawn_angles(genus), self.angles[None, :]])
         to_angles = np.linalg.inv(self.inversion.jacobian(psi))
         if genus > FEW:
             signs = np.sign(np.random.default_rng(genus).normal(size=(genus, FEW)))

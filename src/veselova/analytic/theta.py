@@ -53,7 +53,7 @@ class _Family:
     @property
     def size(self) -> int:
         """Return M."""
-        return len(self.tables) // max(1, 2 * len(self.orders) * bool(self.orders.shape[1]))
+        return len(self.tables) // (2 * len(self.orders) if self.orders.shape[1] else 1)
 
     def of(self, members: list[int]) -> _Family:
         """Return the family of some members."""
@@ -90,10 +90,11 @@ class _Group:
         if not kept:
             return None
         families, first = [], 0
-        for family, size in ((family, family.size) for family in self.families):
-            members = [i - first for i in kept if first <= i < first + size]
+        for family in self.families:
+            last = first + family.size
+            members = [i - first for i in kept if first <= i < last]
             families += [family.of(members)] if members else []
-            first += size
+            first = last
         new = [places[self.places[i]] for i in kept]
         return _Group(self.delta_G, families, new, self.parities[:, kept], self.signs[kept])
 
@@ -200,8 +201,9 @@ class Theta:
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
         if characteristics not in self._grouped:
-            more = next((known for known in list(self._grouped) if set(characteristics) <= set(known)), None)
-            if more is not None and len(set(characteristics)) == len(characteristics):
+            wanted = set(characteristics)  # a copy of the known ones: another thread may add to them
+            more = next((known for known in list(self._grouped) if wanted <= set(known)), None)
+            if more is not None and len(wanted) == len(characteristics):
                 places = {more.index(c): place for place, c in enumerate(characteristics)}
                 groups = [group for known in self._grouped[more] if (group := known.of(places)) is not None]
             else:

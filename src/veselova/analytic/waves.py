@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cosine_series", "cosine_sums", "midpoints", "powers", "sine_sums", "turns", "waves"]
+__all__ = ["cosine_sums", "powers", "sine_sums", "turns", "waves"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
-
-#: Matrices of cosine series to this size are kept, so many of them: 32 MB at most.
-_LARGEST_KEPT, _MOST_KEPT = 256, 64
 
 
 def powers(angles: Array, count: int) -> Complex:
@@ -64,28 +60,3 @@ def cosine_sums(coefficients: Array) -> Callable[[Array], Array]:
         return np.stack([cosines[:, s].T @ coefficients[s] for s in range(psi.shape[1])], axis=2)
 
     return sums
-
-
-@lru_cache(_MOST_KEPT)
-def midpoints(count: int) -> Array:
-    """Return the midpoints π(2i+1)/2N of (0, π), read-only."""
-    result = np.pi * (2 * np.arange(count) + 1) / (2 * count)
-    result.flags.writeable = False
-    return np.asarray(result)
-
-
-def cosine_series(values: Array) -> Array:
-    """Return the c_km with Σ_m c_km cos mψ = value at the N midpoints ψ, shape (..., K, N) as values."""
-    count = values.shape[-1]
-    return np.asarray(values @ (_kept_matrix(count) if count <= _LARGEST_KEPT else _to_coefficients(count)))
-
-
-def _to_coefficients(count: int) -> Array:
-    """Return the matrix (N, N) from values at the midpoints to coefficients: 2 cos(mψ_i)/N, half of that for m = 0."""
-    table = np.cos(np.arange(4 * count) * (np.pi / (2 * count)))
-    result = table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)] * (2 / count)
-    result[:, 0] /= 2
-    return np.asarray(result)
-
-
-_kept_matrix = lru_cache(_MOST_KEPT)(_to_coefficients)
