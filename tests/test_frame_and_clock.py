@@ -126,6 +126,11 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.clock_rate)
     assert np.allclose(series, expected, rtol=1e-12)
     assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
+    # What makes a step of the inverse clock one of Halley's: the derivative of the rate along the flow.
+    step = 1e-5 / np.max(np.abs(solution.in_tau1.rates))
+    advance, curvature = z - solution.in_tau1.start, clock._periodic(z - solution.in_tau1.start, clock.size)[2]
+    before, after = (clock._periodic(advance + x * solution.in_tau1.rates, clock.size)[1] for x in (-step, step))
+    assert np.allclose((after - before) / (2 * step), curvature, rtol=0, atol=1e-6 * np.max(np.abs(curvature)))
 
 
 def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
@@ -167,6 +172,8 @@ def test_inversion_of_an_increasing_function_needs_no_good_guess() -> None:
 
     roots = increasing_root(steep, np.array([-4.0, 0.31, 4.0]), np.full(3, -5.0), np.full(3, 5.0), 1e-9)
     assert np.allclose(roots, 0.3, atol=1e-15)
+    flat = increasing_root(lambda x: (x, np.where(np.abs(x) > 0.5, -1.0, 1.0)), np.full(1, 0.9), -np.ones(1), np.ones(1), 1e-9)
+    assert flat == 0  # a slope that is wrong, or none, is not followed
     with pytest.raises(InternalContradiction):
         increasing_root(lambda x: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from veselova.analytic.precision import DOUBLE, Arithmetic
-from veselova.analytic.waves import powers, turns, waves
+from veselova.analytic.waves import powers, turns, waves, waves_at
 
 
 def test_powers_are_as_exact_as_multiples_of_the_angle(rng: np.random.Generator) -> None:
@@ -21,6 +21,14 @@ def test_waves_are_products_of_powers(dimension: int, rng: np.random.Generator) 
     found = waves(turns(angles, 9), orders)
     assert found.shape == (50, 30)
     assert np.max(np.abs(found - np.exp(1j * (orders @ angles.T)))) < 3e-14
+
+
+@pytest.mark.parametrize("count", [1, 300])
+def test_few_waves_are_those_of_many(count: int, rng: np.random.Generator) -> None:
+    angles, orders = rng.uniform(-6, 6, (count, 3)), rng.integers(-9, 10, (50, 3))
+    found = waves_at(angles, orders, 9)
+    assert found.shape == (50, count)
+    assert np.max(np.abs(found - np.exp(1j * (orders @ angles.T)))) < 6e-14
 
 
 def test_no_order_but_zero_is_a_constant(rng: np.random.Generator) -> None:

@@ -17,7 +17,7 @@ from veselova.analytic.clock import Clock, Rate
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
-from veselova.analytic.waves import turns, waves
+from veselova.analytic.waves import waves_at
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["ColumnsForModes", "FourierClock", "grown"]
@@ -36,13 +36,13 @@ _SPARE_NODES = 32
 #: Modes that bring the inverse clock near its answer before all of them are summed.
 _FIRST_MODES = 64
 
-#: Smallest dt/dτ₁, as a part of its mean, that a Newton step of the inverse clock divides by.
+#: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse clock divides by.
 _LEAST_SLOPE = 0.05
 
 #: Entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 50_000
 
-#: A Newton step of this many cycles leaves an error of its square.
+#: A step of this many cycles leaves an error of its square.
 _SETTLED = 1e-9
 
 
@@ -58,11 +58,12 @@ class FourierClock(Clock):
         self._modes, coefficients = modes[order], coefficients[order]
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
         self._amplitudes = coefficients / (np.pi * (self._modes @ in_tau1.rates))
-        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h and cos(2πm·z⁰+2h), of sin h cos h and sin²h.
-        offset, both = 2 * np.pi * (self._modes @ in_tau1.start), 2 * np.stack([self._amplitudes, 2 * coefficients], axis=1)
-        wave = np.stack([np.cos(offset), np.sin(offset)], axis=1)
-        self._weights = both * np.stack([wave[:, 0], -wave[:, 1]], axis=1), both * wave[:, ::-1]
-        self._at_start = np.cumsum(np.append(0.0, self._weights[1][:, 1])) / 2
+        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h), of sin h cos h and sin²h.
+        offset, pace = 2 * np.pi * (self._modes @ in_tau1.start), 2 * np.pi * (self._modes @ in_tau1.rates)
+        cosine, sine = np.cos(offset), np.sin(offset)
+        sizes = 2 * np.stack([self._amplitudes, 2 * coefficients, -2 * coefficients * pace], axis=1)
+        self._weights = sizes * np.stack([cosine, -sine, cosine], axis=1), sizes * np.stack([sine, cosine, sine], axis=1)
+        self._at_start = np.cumsum(np.vstack([np.zeros(2), self._weights[1][:, 1:]]), axis=0) / 2
         self._highest = int(np.max(np.abs(self._modes), initial=0))
         self._reach = 2 * float(np.sum(np.abs(self._amplitudes))) / mean
         self._longest, self._fastest = 1 / (np.pi * np.abs(modes @ in_tau1.rates)), float(np.max(np.abs(in_tau1.rates)))
@@ -95,38 +96,36 @@ class FourierClock(Clock):
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
         return self._mean * tau1 + self._periodic(self._in_tau1.advance(tau1), self.size)[0]
 
-    def _periodic(self, advance: Array, size: int) -> tuple[Array, Array]:
-        """Return the sum over the first ``size`` modes at z = z⁰ + advance, and its derivative in τ₁.
+    def _periodic(self, advance: Array, size: int) -> tuple[Array, Array, Array]:
+        """Return the sum over the first ``size`` modes at z = z⁰ + advance, and its first two derivatives in τ₁.
 
         The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
         """
-        result = np.empty((advance.shape[0], 2))
+        result = np.empty((advance.shape[0], 3))
         modes, block = self._modes[:size], max(1, _BLOCK // max(size, 1))
         of_products, of_squares = self._weights[0][:size], self._weights[1][:size]
         for first in range(0, advance.shape[0], block):
             rows = slice(first, first + block)
-            half = waves(turns(np.pi * advance[rows], self._highest), modes)
+            half = waves_at(np.pi * advance[rows], modes, self._highest)
             result[rows] = (half.imag * half.real).T @ of_products - np.square(half.imag).T @ of_squares
-        result[:, 1] += self._at_start[size]
-        return result[:, 0], result[:, 1]
+        result[:, 1:] += self._at_start[size]
+        return result[:, 0], result[:, 1], result[:, 2]
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
-        """Return (τ₁, z): Newton's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
-        uniform = self._in_time.advance(times)
-        delta, reach = np.zeros_like(times), np.full_like(times, self._reach)
-        for size in sorted({min(self.size, _FIRST_MODES), self.size}):
+        """Return (τ₁, z) by Halley's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
+        uniform, delta = self._in_time.advance(times), np.zeros_like(times)
+        reach, least = np.full_like(times, self._reach), _LEAST_SLOPE * self._mean
 
-            def excess(delta: Array, size: int = size) -> tuple[Array, Array]:
-                periodic, slope = self._periodic(uniform + delta[:, None] * self._in_tau1.rates, size)
-                return self._mean * delta + periodic, self._mean + slope
+        def excess(delta: Array, size: int = self.size) -> tuple[Array, Array]:
+            periodic, slope, curvature = self._periodic(uniform + delta[:, None] * self._in_tau1.rates, size)
+            value, slope = self._mean * delta + periodic, self._mean + slope
+            # A step of Halley's is one of Newton's with this in place of the slope.
+            return value, slope - value * curvature / (2 * np.maximum(slope, least))
 
-            if size < self.size:  # a truncated sum need not increase: two plain steps towards it are all it is good for
-                for _ in range(2):
-                    value, slope = excess(delta)
-                    newton = delta - value / np.maximum(slope, _LEAST_SLOPE * self._mean)
-                    delta = np.maximum(np.minimum(newton, self._reach), -self._reach)
-            else:
-                delta = increasing_root(excess, delta, -reach, reach, _SETTLED / self._fastest)
+        if self.size > _FIRST_MODES:  # a truncated sum need not increase: one plain step towards it is all it is good for
+            value, slope = excess(delta, _FIRST_MODES)
+            delta = np.maximum(np.minimum(-value / np.maximum(slope, least), reach), -reach)
+        delta = increasing_root(excess, delta, -reach, reach, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
         return times / self._mean + delta, z
 

@@ -25,14 +25,16 @@ def increasing_root(
     ``function`` gives values and slopes. Iteration ends when every Newton step is below ``settled``: the error left is of the
     order of its square, so choose it near the root of the wanted accuracy.
     """
-    x, low, high = guess, low.copy(), high.copy()
-    for _ in range(_MOST_STEPS):
-        value, slope = function(x)
-        low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-        newton = x - value / np.where(slope > 0, slope, np.nan)
-        inside = (newton >= low) & (newton <= high)
-        trial = np.where(inside, newton, (low + high) / 2)
-        step, x = np.abs(trial - x), trial
-        if np.all((step <= settled) & (inside | (high - low <= settled))):
-            return x
+    x = guess
+    with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken
+        for _ in range(_MOST_STEPS):
+            value, slope = function(x)
+            low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
+            trial = x - value / slope
+            outside = ~((trial >= low) & (trial <= high))
+            if bisected := outside.any():
+                trial = np.where(outside, (low + high) / 2, trial)
+            step, x = np.abs(trial - x), trial
+            if (step <= settled).all() and not (bisected and (outside & (high - low > settled)).any()):
+                return x
     raise InternalContradiction("inversion of an increasing function did not settle")

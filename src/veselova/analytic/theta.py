@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, half_of, lattice_points, schur, small_norm
-from veselova.analytic.waves import turns, waves
+from veselova.analytic.waves import waves_at
 
 __all__ = ["Theta"]
 
@@ -44,7 +44,7 @@ class _Family:
     """M characteristics with the same Gaussians and waves.
 
     orders (X, |F|): 2x of the waves
-    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
+    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M and each x, W = 2X; without waves the signs, W = 1
     """
 
     orders: NDArray[np.int64]
@@ -60,15 +60,13 @@ class _Family:
         lattice = self.tables.shape[1]
         return _Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
 
-    def sums(self, bells: Array, turned: NDArray[np.complex128]) -> Array:
-        """Return the sums without their signs, shape (M, N)."""
+    def sums(self, bells: Array, along: Array) -> Array:
+        """Return the sums without their signs, shape (M, N); ``along`` (W, N) are the waves, of each x a cosine and a sine."""
         weighted = self.tables @ bells.T
         if not self.orders.shape[1]:
             return np.asarray(weighted)
-        along = waves(turned, self.orders)
-        parts = np.concatenate([along.real, along.imag])
-        weighted = weighted.reshape(-1, *parts.shape)
-        return np.asarray(np.sum(np.multiply(weighted, parts, out=weighted), axis=1))
+        weighted = weighted.reshape(-1, *along.shape)
+        return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
 
 
 @dataclass(frozen=True)
@@ -99,9 +97,25 @@ class _Group:
         return _Group(self.delta_G, families, new, self.parities[:, kept], self.signs[kept])
 
     @cached_property
-    def highest(self) -> int:
-        """Return the largest 2|x_i| of the waves."""
-        return max(int(np.max(np.abs(family.orders), initial=0)) for family in self.families)
+    def _orders(self) -> NDArray[np.int64]:
+        return np.concatenate([family.orders for family in self.families])
+
+    @cached_property
+    def _highest(self) -> int:
+        return int(np.max(np.abs(self._orders), initial=0))
+
+    def sums(self, bells: Array, angles: Array) -> Array:
+        """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
+        if not angles.shape[1]:
+            return np.concatenate([family.sums(bells, angles.T) for family in self.families])
+        turned = waves_at(angles, self._orders, self._highest)
+        along = turned.view(np.float64).reshape(*turned.shape, 2).swapaxes(1, 2).reshape(-1, len(angles))
+        result, first = [], 0
+        for family in self.families:
+            last = first + 2 * len(family.orders)
+            result.append(family.sums(bells, along[first:last]))
+            first = last
+        return np.concatenate(result)
 
 
 @dataclass(frozen=True)
@@ -174,33 +188,30 @@ class Theta:
     def _fill(self, groups: list[_Group], y: Array, result: Array) -> None:
         """Write the values of some groups at points (N, g) of our coordinates to their places, the rows of the result."""
         bells, r, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
-        y_F = np.tile(y[:, self._split[0]], (len(groups), 1))
-        turned = turns(np.pi * (y_F - r @ self._parts[1].T), max(group.highest for group in groups))
+        angles = np.pi * (y[:, self._split[0]] - r @ self._parts[1].T)
         for k, group in enumerate(groups):
-            own = slice(k * len(y), (k + 1) * len(y))
-            sums = np.concatenate([family.sums(bells[own], turned[:, :, own]) for family in group.families])
-            half_turns = group.parities.T @ nearest[own].T
-            sums *= group.signs[:, None] * (1 - 2 * (half_turns - 2 * np.floor(half_turns / 2)))  # fmod is slow
-            result[group.places] = sums
+            half_turns = group.parities.T @ nearest[k].T
+            signs = group.signs[:, None] * (1 - 2 * (half_turns - 2 * np.floor(half_turns / 2)))  # fmod is slow
+            result[group.places] = group.sums(bells[k], angles[k]) * signs
 
     def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
         """Return (e^{−π|k−r|²}, r, n), k on the Gaussian lattice, with y_G + δ_G = n + r reduced to the unit cell around zero.
 
-        ``shifts`` (P, |G|) are the δ_G; the results have all points of the first, then those of the second, and so on.
+        ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |G|) and the same.
         """
-        y_G = (y[:, self._split[1]] + shifts[:, None, :]).reshape(len(shifts) * len(y), shifts.shape[1])
+        y_G = y[:, self._split[1]] + shifts[:, None, :]
         nearest = np.rint(y_G)
         r = y_G - nearest
         inverse, k = self._parts[2], self._gaussian_lattice
         if k.shape[1] == 0:
-            return np.ones((len(y_G), 1)), r, nearest
+            return np.ones((*y_G.shape[:2], 1)), r, nearest
         projected = r @ inverse
-        quadratic = self._gaussian_norms - (2 * projected) @ k.T + np.sum(projected * r, axis=1)[:, None]
+        quadratic = self._gaussian_norms - (2 * projected) @ k.T + (projected * r).sum(axis=2)[:, :, None]
         return np.exp(-np.pi * np.where(quadratic < _VANISHING, quadratic, np.inf)), r, nearest
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
-        if characteristics not in self._grouped:
+        if (groups := self._grouped.get(characteristics)) is None:
             wanted = set(characteristics)  # a copy of the known ones: another thread may add to them
             more = next((known for known in list(self._grouped) if wanted <= set(known)), None)
             if more is not None and len(wanted) == len(characteristics):
@@ -210,7 +221,7 @@ class Theta:
                 families = self._coordinates.families(characteristics).items()
                 groups = [self._group(delta_G, list(of.values())) for delta_G, of in families]
             self._grouped[characteristics] = groups
-        return self._grouped[characteristics]
+        return groups
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
@@ -233,7 +244,7 @@ class Theta:
         if F:
             quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
             turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
-            tables = (tables[:, :, None] * np.concatenate([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
+            tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=3)).reshape(len(tables), -1)
         return _Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
 
     def _crossing(self, epsilon: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:

@@ -7,11 +7,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cosine_sums", "powers", "sine_sums", "turns", "waves"]
+__all__ = ["cosine_sums", "powers", "sine_sums", "turns", "waves", "waves_at"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
+
+#: Waves of which each takes its own sine and cosine: the fewer calls are worth more than what they cost.
+_FEW = 600
 
 
 def powers(angles: Array, count: int) -> Complex:
@@ -42,6 +45,17 @@ def waves(turns: Complex, orders: Integers) -> Complex:
     result: Complex = turns[orders[:, 0], 0]
     for j in range(1, orders.shape[1]):
         result *= turns[orders[:, j], j]
+    return result
+
+
+def waves_at(angles: Array, orders: Integers, largest: int) -> Complex:
+    """Return e^{i k·φ} for angles (N, d) and orders (K, d) of entries to ``largest``, shape (K, N)."""
+    if angles.shape[0] * orders.shape[0] > _FEW:
+        return waves(turns(angles, largest), orders)
+    phases = orders @ angles.T
+    result = np.empty(phases.shape, dtype=np.complex128)
+    np.cos(phases, out=result.real)
+    np.sin(phases, out=result.imag)
     return result
 
 
