@@ -57,16 +57,17 @@ class FourierClock(Clock):
         order = np.argsort(-np.abs(coefficients))
         self._modes, coefficients = modes[order], coefficients[order]
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
-        self._amplitudes = coefficients / (np.pi * (self._modes @ in_tau1.rates))
+        pace = 2 * np.pi * (self._modes @ in_tau1.rates)
+        amplitudes = 2 * coefficients / pace
         # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h), of sin h cos h and sin²h.
-        offset, pace = 2 * np.pi * (self._modes @ in_tau1.start), 2 * np.pi * (self._modes @ in_tau1.rates)
+        offset = 2 * np.pi * (self._modes @ in_tau1.start)
         cosine, sine = np.cos(offset), np.sin(offset)
-        sizes = 2 * np.stack([self._amplitudes, 2 * coefficients, -2 * coefficients * pace], axis=1)
+        sizes = 2 * np.stack([amplitudes, 2 * coefficients, -2 * coefficients * pace], axis=1)
         self._weights = sizes * np.stack([cosine, -sine, cosine], axis=1), sizes * np.stack([sine, cosine, sine], axis=1)
         self._at_start = np.cumsum(np.vstack([np.zeros(2), self._weights[1][:, 1:]]), axis=0) / 2
         self._highest = int(np.max(np.abs(self._modes), initial=0))
-        self._reach = 2 * float(np.sum(np.abs(self._amplitudes))) / mean
-        self._longest, self._fastest = 1 / (np.pi * np.abs(modes @ in_tau1.rates)), float(np.max(np.abs(in_tau1.rates)))
+        self._reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
+        self._longest, self._fastest = 2 / np.abs(pace), float(np.max(np.abs(in_tau1.rates)))
 
     @property
     def size(self) -> int:

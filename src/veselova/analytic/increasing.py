@@ -22,8 +22,8 @@ def increasing_root(
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
 
-    ``function`` gives values and slopes. Iteration ends when every Newton step is below ``settled``: the error left is of the
-    order of its square, so choose it near the root of the wanted accuracy.
+    ``function`` gives values and slopes, or what else a step divides a value by (Halley's method). Iteration ends when every
+    step is below ``settled``: the error left is of the order of its square, so choose it near the root of the wanted accuracy.
     """
     x = guess
     with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken

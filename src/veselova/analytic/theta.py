@@ -62,10 +62,7 @@ class _Family:
 
     def sums(self, bells: Array, along: Array) -> Array:
         """Return the sums without their signs, shape (M, N); ``along`` (W, N) are the waves, of each x a cosine and a sine."""
-        weighted = self.tables @ bells.T
-        if not self.orders.shape[1]:
-            return np.asarray(weighted)
-        weighted = weighted.reshape(-1, *along.shape)
+        weighted = (self.tables @ bells.T).reshape(-1, *along.shape)
         return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
 
 
@@ -107,7 +104,7 @@ class _Group:
     def sums(self, bells: Array, angles: Array) -> Array:
         """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
         if not angles.shape[1]:
-            return np.concatenate([family.sums(bells, angles.T) for family in self.families])
+            return np.concatenate([family.tables @ bells.T for family in self.families])
         turned = waves_at(angles, self._orders, self._highest)
         along = turned.view(np.float64).reshape(*turned.shape, 2).swapaxes(1, 2).reshape(-1, len(angles))
         result, first = [], 0
