@@ -1,7 +1,9 @@
 """How many instructions does the processor need from a problem to its first attitude, and to one more at t = 10⁶?
 
     python benchmarks/instructions.py [n ...]
+    python benchmarks/instructions.py calls [n ...]
 
+"calls" takes callgrind instead, and tells how many calls of NumPy's universal functions there are, and what they take of it all.
 Needs valgrind. What other processes do on the machine changes times, but hardly these counts: two runs agree to a percent. So
 they tell versions apart where times do not. A process solves ten random problems (as in setup.py) once, then 0 or 2 times more
 with nothing kept of the solutions before; the difference of the two counts belongs to the solutions alone. Takes two minutes for
@@ -14,6 +16,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -29,6 +32,9 @@ PROBLEMS, ROUNDS = 10, 2
 
 #: Counts instructions without a model of the caches, and leaves no file.
 COUNTED = ["valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"]
+
+#: What a call of a universal function goes through, operators too.
+UNIVERSAL = "ufunc_generic_fastcall"
 
 
 def work(what: str, n: int, rounds: int) -> None:
@@ -59,6 +65,31 @@ def each(what: str, n: int) -> float:
     return (instructions(what, n, ROUNDS) - instructions(what, n, 0)) / (ROUNDS * PROBLEMS) / 1e6
 
 
+def universal(what: str, n: int, rounds: int) -> tuple[int, int]:
+    """Return the calls of universal functions in a whole process, and the instructions within them."""
+    names, called, calls, within = dict[str, str](), "", 0, 0
+    with tempfile.NamedTemporaryFile("r") as profile:
+        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile.name}", sys.executable, __file__, "work"]
+        environment = {**os.environ, "PYTHONHASHSEED": "0"}
+        subprocess.run([*command, what, str(n), str(rounds)], env=environment, capture_output=True, check=True)
+        lines = iter(profile)
+        for line in lines:
+            if found := re.match(r"(c?)fn=\((\d+)\)(?: (.*))?", line):
+                names.setdefault(found[2], found[3])  # a name stands where it is met first
+                called = names[found[2]] if found[1] else called
+            elif line.startswith("calls=") and called == UNIVERSAL:
+                calls += int(line[6:].split()[0])
+                within += int(next(lines).split()[1])  # the cost of the calls is on the line after them
+    return calls, within
+
+
+def each_universal(what: str, n: int) -> str:
+    """Return the calls in one solution or one attitude, and the millions of instructions within them."""
+    some, none = universal(what, n, ROUNDS), universal(what, n, 0)
+    calls, within = ((x - y) / (ROUNDS * PROBLEMS) for x, y in zip(some, none, strict=True))
+    return f"{calls:.0f} calls, {within / 1e6:.2f} million"
+
+
 def main(sizes: list[int]) -> None:
     print("| n | first attitude | attitude at t = 10⁶, set up |\n|---|---|---|")
     for n in sizes:
@@ -68,5 +99,9 @@ def main(sizes: list[int]) -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["work"]:
         work(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+    elif sys.argv[1:2] == ["calls"]:
+        for n in sys.argv[2:] or ["3"]:
+            first, later = (each_universal(what, int(n)) for what in ("first", "later"))
+            print(f"n = {n}: first attitude {first}; attitude at t = 10⁶ {later}", flush=True)
     else:
         main([int(n) for n in sys.argv[1:]] or [2, 3, 4, 5, 6])
