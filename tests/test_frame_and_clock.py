@@ -119,18 +119,22 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     clock = solution.clock(np.array([1.0]), "fourier")
     assert isinstance(clock, FourierClock)
     z = rng.uniform(-1, 1, (40, n - 1))
-    series = solution.mean_rate + clock._periodic(z - solution.in_tau1.start, clock.size)[1]
+    series = clock._periodic(z - solution.in_tau1.start, clock.size)[1]
     q = solution.attitude(z, "angles").q
     A = np.array([float(a) for a in solution.moving.A])
     start = np.array([float(x) for x in solution.spectrum.q]) ** 2 @ A
     expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.clock_rate)
     assert np.allclose(series, expected, rtol=1e-12)
     assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
-    # What makes a step of the inverse clock one of Halley's: the derivative of the rate along the flow.
-    step = 1e-5 / np.max(np.abs(solution.in_tau1.rates))
-    advance, curvature = z - solution.in_tau1.start, clock._periodic(z - solution.in_tau1.start, clock.size)[2]
-    before, after = (clock._periodic(advance + x * solution.in_tau1.rates, clock.size)[1] for x in (-step, step))
-    assert np.allclose((after - before) / (2 * step), curvature, rtol=0, atol=1e-6 * np.max(np.abs(curvature)))
+    # What makes a step of the inverse clock one of fourth order: the derivatives of the rate along the flow.
+    step = 1e-4 / np.max(np.abs(solution.in_tau1.rates))
+    advance = z - solution.in_tau1.start
+    coefficients = clock._periodic(advance, clock.size)
+    before, after = (clock._periodic(advance + x * solution.in_tau1.rates, clock.size) for x in (-step, step))
+    for k in (1, 2, 3):
+        slope = (after - before)[k - 1] / (2 * step) + (solution.mean_rate if k == 1 else 0)
+        size = np.max(np.abs(coefficients[k]))
+        assert np.allclose(slope, k * coefficients[k], rtol=0, atol=1e-5 * size)
 
 
 def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
@@ -167,15 +171,58 @@ def test_phases_far_out_are_reduced_without_losing_digits() -> None:
 
 
 def test_inversion_of_an_increasing_function_needs_no_good_guess() -> None:
-    def steep(x: Any) -> Any:
+    def steep(x: Any, _: Any) -> Any:
         return np.tanh(50 * (x - 0.3)) + 0.01 * (x - 0.3), 50 / np.cosh(50 * (x - 0.3)) ** 2 + 0.01
 
     roots = increasing_root(steep, np.array([-4.0, 0.31, 4.0]), np.full(3, -5.0), np.full(3, 5.0), 1e-9)
     assert np.allclose(roots, 0.3, atol=1e-15)
-    flat = increasing_root(lambda x: (x, np.where(np.abs(x) > 0.5, -1.0, 1.0)), np.full(1, 0.9), -np.ones(1), np.ones(1), 1e-9)
+    flat = increasing_root(lambda x, _: (x, np.where(np.abs(x) > 0.5, -1.0, 1.0)), np.full(1, 0.9), -np.ones(1), np.ones(1), 1e-9)
     assert flat == 0  # a slope that is wrong, or none, is not followed
     with pytest.raises(InternalContradiction):
-        increasing_root(lambda x: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)
+        increasing_root(lambda x, _: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)
+
+
+def test_settled_roots_are_left_alone() -> None:
+    """Of a thousand entries that one step settles and one that takes several, the thousand are not looked at again."""
+    exponents, looked_at = np.append(np.ones(1000), 9.0), []
+
+    def power(x: Any, rows: Any) -> Any:
+        looked_at.append(x.size)
+        k = exponents[rows]
+        return x**k - 0.5, k * x ** (k - 1)
+
+    roots = increasing_root(power, np.ones(1001), np.zeros(1001), np.full(1001, 2.0), 1e-8)
+    assert np.allclose(roots, 0.5 ** (1 / exponents), rtol=0, atol=1e-15)
+    assert looked_at[:2] == [1001, 1001]
+    assert set(looked_at[2:]) == {1}
+
+
+@pytest.mark.parametrize("spread", [5.0, 100.0])
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """t(τ₁(t)) = t to rounding wherever the last step was allowed to end, and A's within a factor of 5 take two sums."""
+    rng, sums, few = np.random.default_rng(8), [], 0
+    plain = FourierClock._periodic
+
+    def counted(clock: FourierClock, advance: Any, size: int) -> Any:
+        sums.append(size)
+        return plain(clock, advance, size)
+
+    for _ in range(12):
+        clock = Solution(random_problem(rng, n, spread)).clock(np.array([1.0]), "fourier")
+        assert isinstance(clock, FourierClock)
+        times = np.sort(rng.uniform(-20, 20, 40))
+        together, _ = clock.tau1(times)
+        off = clock.time(together) - times
+        assert np.max(np.abs(off)) < 40 * np.finfo(float).eps * (1 + np.max(np.abs(times)))
+        with monkeypatch.context() as patched:
+            patched.setattr(FourierClock, "_periodic", counted)
+            for time, tau1 in zip(times[:20], together, strict=False):
+                sums.clear()
+                alone, _ = clock.tau1(np.array([time]))
+                few += len(sums) <= 2
+                assert abs(alone[0] - tau1) < 40 * np.finfo(float).eps * (1 + abs(tau1))
+    assert few >= (0.9 if spread == 5.0 else 0.4) * 12 * 20
 
 
 @pytest.mark.slow

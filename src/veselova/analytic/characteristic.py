@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 __all__ = ["Characteristic"]
 
 
-@dataclass(frozen=True, order=True)
-class Characteristic:
+class Characteristic(NamedTuple):
     """[ε; δ] in halves: each entry is 0 or 1 and stands for 0 or ½. Addition is modulo one, which changes θ by a sign at most."""
 
     epsilon: tuple[int, ...]
@@ -27,7 +26,7 @@ class Characteristic:
         first = s if j % 2 == 1 else s + 1
         return cls(epsilon, tuple(int(i >= first) for i in range(1, genus + 1)))
 
-    def __add__(self, other: Characteristic) -> Characteristic:
+    def __add__(self, other: Characteristic) -> Characteristic:  # type: ignore[override]  # a characteristic is no list to go on
         """Return the sum modulo one, as in the two-index characteristics η(I_i) + η(c_k)."""
         return Characteristic(
             tuple((a + b) % 2 for a, b in zip(self.epsilon, other.epsilon, strict=True)),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.fourier_clock import ColumnsForModes, grown
-from veselova.analytic.increasing import increasing_root
+from veselova.analytic.increasing import Rows, increasing_root
 from veselova.analytic.precision import Values
 from veselova.analytic.strip import Orbit
 
@@ -114,8 +114,8 @@ class EnclosedFourier:
         begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
         reach = np.full(len(z), 2 * float(np.sum(np.abs(amplitudes))) / mean)
 
-        def excess(delta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            angles = 2 * np.pi * ((z + delta[:, None] * frequencies) @ modes.T)
+        def excess(delta: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            angles = 2 * np.pi * ((z[rows] + delta[:, None] * frequencies) @ modes.T)
             return mean * delta + np.sin(angles) @ amplitudes - begin, mean + np.cos(angles) @ slopes
 
         return increasing_root(excess, np.zeros(len(z)), -reach, reach, _SETTLED / float(np.max(np.abs(frequencies))))

@@ -47,9 +47,9 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
     # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
-    start = 0.0 if method == "angles" else solution.start_rounding
-    at_once = float(np.sum((_PHASE * _EPSILON + start) * steepness.by_phase))
-    at_once += 0.0 if method == "angles" else solution.quotients.rounding
+    at_once = _PHASE * _EPSILON * float(steepness.by_phase.sum())
+    if method != "angles":
+        at_once += float(solution.start_rounding @ steepness.by_phase) + solution.quotients.rounding
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
     evaluation = _EVALUATION[method] * (1.0 if method == "angles" else max(1.0, solution.largest_period))
     error = np.abs(tau1)  # in place from here on: fresh memory costs more than sums

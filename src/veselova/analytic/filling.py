@@ -51,7 +51,7 @@ class Filling:
 
     def completed(self) -> Along:
         """Return the answer, with what is still open evaluated time by time."""
-        if self._times.size <= _TIMES and np.all(self._open):
+        if self._times.size <= _TIMES and self._open.all():
             tau1, z = self._clock.tau1(self._times)
             return Along(tau1, self._evaluation(tau1, z)[1], self._error, int(tau1.size))
         rest = np.flatnonzero(self._open)

@@ -7,6 +7,7 @@ Any t costs the same; the number of modes grows with the genus (n = 3: hundreds,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock, Rate
-from veselova.analytic.increasing import increasing_root
+from veselova.analytic.increasing import Rows, increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
 from veselova.analytic.waves import waves_at
@@ -33,17 +34,18 @@ _MOST_MODES = 1_000_000
 #: Nodes beyond those that modes ask for: room for the next layers.
 _SPARE_NODES = 32
 
-#: Modes that bring the inverse clock near its answer before all of them are summed.
-_FIRST_MODES = 64
+#: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and their part.
+_FIRST_MODES, _FIRST_PART = 64, 1 / 16
 
 #: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse clock divides by.
 _LEAST_SLOPE = 0.05
 
 #: Entries of one block of (times × modes): temporaries that stay in the cache.
-_BLOCK = 50_000
+_BLOCK = 32_000
 
-#: A step of this many cycles leaves an error of its square.
-_SETTLED = 1e-9
+#: Cycles that the last step of the inverse clock may leave open; and a step that leaves so much where no slope is known to be
+#: the least, and the error is of the order of its square.
+_OPEN, _SETTLED = 1e-17, 1e-9
 
 
 class FourierClock(Clock):
@@ -59,15 +61,18 @@ class FourierClock(Clock):
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
         pace = 2 * np.pi * (self._modes @ in_tau1.rates)
         amplitudes = 2 * coefficients / pace
-        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h), of sin h cos h and sin²h.
+        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h) in turn, divided by k!:
+        # of sin h cos h and of sin²h.
         offset = 2 * np.pi * (self._modes @ in_tau1.start)
         cosine, sine = np.cos(offset), np.sin(offset)
-        sizes = 2 * np.stack([amplitudes, 2 * coefficients, -2 * coefficients * pace], axis=1)
-        self._weights = sizes * np.stack([cosine, -sine, cosine], axis=1), sizes * np.stack([sine, cosine, sine], axis=1)
-        self._at_start = np.cumsum(np.vstack([np.zeros(2), self._weights[1][:, 1:]]), axis=0) / 2
+        sizes = 2 * np.stack([amplitudes, 2 * coefficients, -coefficients * pace, -coefficients * pace**2 / 3], axis=1)
+        of_squares = -sizes * np.stack([sine, cosine, sine, cosine], axis=1)
+        self._weights = np.stack([sizes * np.stack([cosine, -sine, cosine, -sine], axis=1), of_squares])
+        self._at_start = np.cumsum(np.vstack([[mean, 0.0, 0.0], -of_squares[:, 1:] / 2]), axis=0)
         self._highest = int(np.max(np.abs(self._modes), initial=0))
         self._reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
         self._longest, self._fastest = 2 / np.abs(pace), float(np.max(np.abs(in_tau1.rates)))
+        self._settled = self._last_step(coefficients, pace)
 
     @property
     def size(self) -> int:
@@ -82,51 +87,65 @@ class FourierClock(Clock):
     def ahead(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
-        return self._periodic(advance, self.size)[0], self._in_time.start + advance
+        return np.asarray(self._periodic(advance, self.size)[0]), self._in_time.start + advance
 
     def error(self, tau1: Array) -> Array:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
 
         Modes left out are as small and hardly more numerous; independent errors add in squares.
         """
-        farthest = float(max(abs(tau1[0]), abs(tau1[-1])))
-        spread = np.sqrt(np.sum(np.minimum(self._longest, farthest) ** 2))
-        return np.full(1, 4 * _SMALLEST_MODE * (spread + 1 / self._fastest))
+        lengths = np.minimum(self._longest, max(abs(float(tau1[0])), abs(float(tau1[-1]))))
+        return np.full(1, 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest))
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
-        return self._mean * tau1 + self._periodic(self._in_tau1.advance(tau1), self.size)[0]
+        return np.asarray(self._mean * tau1 + self._periodic(self._in_tau1.advance(tau1), self.size)[0])
 
-    def _periodic(self, advance: Array, size: int) -> tuple[Array, Array, Array]:
-        """Return the sum over the first ``size`` modes at z = z⁰ + advance, and its first two derivatives in τ₁.
+    def _last_step(self, coefficients: Array, pace: Array) -> float:
+        """Return the step of τ₁ that leaves _OPEN: of s stays |a³ − 2ab + c| s⁴, with t(τ₁+x) − t(τ₁) ∝ x + ax² + bx³ + cx⁴ …"""
+        least = self._mean - 2 * float(np.sum(np.abs(coefficients)))
+        if least < _LEAST_SLOPE * self._mean:
+            return _SETTLED / self._fastest
+        a, b, c = (float(np.sum(np.abs(coefficients * pace**k))) / (least * d) for k, d in ((1, 1), (2, 3), (3, 12)))
+        return float((_OPEN / (self._fastest * (a**3 + 2 * a * b + c))) ** 0.25) if a else np.inf
+
+    def _periodic(self, advance: Array, size: int) -> Array:
+        """Return t − F_0τ₁, summed over the first ``size`` modes at z = z⁰ + advance, and t's Taylor coefficients in τ₁, (4, N).
 
         The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
         """
-        result = np.empty((advance.shape[0], 3))
-        modes, block = self._modes[:size], max(1, _BLOCK // max(size, 1))
-        of_products, of_squares = self._weights[0][:size], self._weights[1][:size]
+        result = np.empty((advance.shape[0], 4))
+        modes, weights = self._modes[:size], self._weights[:, :size].reshape(-1, 4)
+        block = min(advance.shape[0], max(1, _BLOCK // max(size, 1)))
+        room = np.empty((2, size, block))
         for first in range(0, advance.shape[0], block):
             rows = slice(first, first + block)
-            half = waves_at(np.pi * advance[rows], modes, self._highest)
-            result[rows] = (half.imag * half.real).T @ of_products - np.square(half.imag).T @ of_squares
+            half = waves_at(np.pi * advance[rows], modes, self._highest, room[:, :, : advance.shape[0] - first])
+            cosines, sines = half
+            cosines *= sines
+            sines *= sines
+            np.matmul(half.reshape(len(weights), half.shape[2]).T, weights, out=result[rows])
         result[:, 1:] += self._at_start[size]
-        return result[:, 0], result[:, 1], result[:, 2]
+        return result.T
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
-        """Return (τ₁, z) by Halley's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0, and large modes come first."""
+        """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0; large modes come first."""
         uniform, delta = self._in_time.advance(times), np.zeros_like(times)
         reach, least = np.full_like(times, self._reach), _LEAST_SLOPE * self._mean
 
-        def excess(delta: Array, size: int = self.size) -> tuple[Array, Array]:
-            periodic, slope, curvature = self._periodic(uniform + delta[:, None] * self._in_tau1.rates, size)
-            value, slope = self._mean * delta + periodic, self._mean + slope
-            # A step of Halley's is one of Newton's with this in place of the slope.
-            return value, slope - value * curvature / (2 * np.maximum(slope, least))
+        def excess(delta: Array, rows: Rows, size: int = self.size) -> tuple[Array, Array]:
+            value, slope, a, b = self._periodic(uniform[rows] + delta[:, None] * self._in_tau1.rates, size)
+            value += self._mean * delta
+            # A step of fourth order is one of Newton's with this in place of the slope; far away at most twice that, or half.
+            step = value / slope
+            bent = step * (a - b * step) / (slope - a * step)
+            return value, slope * (1 - np.minimum(np.maximum(bent, -1), 0.5))
 
-        if self.size > _FIRST_MODES:  # a truncated sum need not increase: one plain step towards it is all it is good for
-            value, slope = excess(delta, _FIRST_MODES)
+        first = max(_FIRST_MODES, int(_FIRST_PART * self.size))
+        if self.size > first:  # a truncated sum need not increase: one plain step towards it is all it is good for
+            value, slope = excess(delta, slice(None), first)
             delta = np.maximum(np.minimum(-value / np.maximum(slope, least), reach), -reach)
-        delta = increasing_root(excess, delta, -reach, reach, _SETTLED / self._fastest)
+        delta = increasing_root(excess, delta, -reach, reach, self._settled)
         z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
         return times / self._mean + delta, z
 

@@ -50,7 +50,7 @@ class Attitude:
     @property
     def q_prime(self) -> Values:
         """Return q' = dq/dτ₁ = Σ_k v_k n_k, shape (N, n)."""
-        return np.asarray(np.sum(self.normals * self.components[:, None, :], axis=2))
+        return np.asarray((self.normals * self.components[:, None, :]).sum(axis=2))
 
     def part(self, rows: slice) -> Attitude:
         """Return copies of the attitudes of some points."""

@@ -9,32 +9,50 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["increasing_root"]
+__all__ = ["Rows", "increasing_root"]
 
 Array = NDArray[np.float64]
+
+#: Entries along the first axis: all of them, or some by their places.
+Rows = slice | NDArray[np.intp]
 
 #: Bisection alone needs 53 steps from any bracket to one rounding.
 _MOST_STEPS = 80
 
 
 def increasing_root(
-    function: Callable[[Array], tuple[Array, Array]], guess: Array, low: Array, high: Array, settled: float
+    function: Callable[[Array, Rows], tuple[Array, Array]], guess: Array, low: Array, high: Array, settled: float
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
 
-    ``function`` gives values and slopes, or what else a step divides a value by (Halley's method). Iteration ends when every
-    step is below ``settled``: the error left is of the order of its square, so choose it near the root of the wanted accuracy.
+    ``function`` gives values at entries, of rows along the first axis, and what a step divides them by: slopes (Newton's method),
+    or what another method has in their place. Iteration ends with steps of at most ``settled``, after which values are not formed
+    again: the error left is of the order of the method, so choose it near that root of the wanted accuracy.
     """
-    x = guess
+    rows: Rows = slice(None)
+    result, x, before = guess, guess, high - low
     with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken
         for _ in range(_MOST_STEPS):
-            value, slope = function(x)
+            value, slope = function(x, rows)
+            step = value / slope
+            small, found = np.asarray(np.abs(step) <= settled), np.minimum(np.maximum(x - step, low), high)
+            if small.all():
+                return _with(result, rows, found)
             low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-            trial = x - value / slope
-            outside = ~((trial >= low) & (trial <= high))
-            if bisected := outside.any():
-                trial = np.where(outside, (low + high) / 2, trial)
-            step, x = np.abs(trial - x), trial
-            if (step <= settled).all() and not (bisected and (outside & (high - low > settled)).any()):
-                return x
+            trial = np.where(2 * np.abs(step) <= before, x - step, np.nan)  # steps that do not shrink may go in circles
+            trial = np.where((trial >= low) & (trial <= high), trial, (low + high) / 2)
+            before, x = np.maximum(np.abs(trial - x), 2 * settled), np.where(small, found, trial)
+            open_ = ~small.reshape(len(small), -1).all(axis=1)
+            if 2 * np.count_nonzero(open_) <= len(open_):  # those that are settled are left, when that saves more than it costs
+                result = _with(result, rows, x)
+                rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]
+                low, high, before, x = low[open_], high[open_], before[open_], x[open_]
     raise InternalContradiction("inversion of an increasing function did not settle")
+
+
+def _with(result: Array, rows: Rows, found: Array) -> Array:
+    """Return the result with what was found for some rows."""
+    if isinstance(rows, slice):
+        return found
+    result[rows] = found
+    return result

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.precision import Values
-from veselova.analytic.twofold import exact_product
+from veselova.analytic.twofold import exact_product, halves
 
 __all__ = ["LinearFlow"]
 
@@ -33,12 +34,16 @@ class LinearFlow:
         rests = np.array([float(rate - head) for rate, head in zip(rates, leading.tolist(), strict=True)])
         return cls(start, leading, rests)
 
+    @cached_property
+    def _halves(self) -> tuple[Array, Array]:
+        return halves(self.rates)
+
     def advance(self, x: Array) -> Array:
         """Return x·(rates + rests) modulo 2, shape (N, g), to one rounding of the reduced value.
 
         x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
         """
-        product, error = exact_product(x[:, None], self.rates)
+        product, error = exact_product(x[:, None], self.rates, self._halves)
         return np.asarray(np.fmod(product, 2.0) + (error + x[:, None] * self.rests))
 
     def phases(self, x: Array) -> Array:

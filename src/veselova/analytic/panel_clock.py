@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
-from veselova.analytic.increasing import increasing_root
+from veselova.analytic.increasing import Rows, increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_integral import integrated
 from veselova.analytic.panels import Panels
@@ -84,9 +84,9 @@ class PanelClock(Clock):
         target = times - panels.values[panel]
         x = 2 * target / (panels.values[panel + 1] - panels.values[panel]) - 1
 
-        def excess(x: Array) -> tuple[Array, Array]:
-            value, slope = panels.within(panel, x)
-            return value - target, slope
+        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
+            value, slope = panels.within(panel[rows], x)
+            return value - target[rows], slope
 
         x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _SETTLED)
         offset = (x + 1) * (panels.lengths[panel] / 2)

@@ -68,6 +68,11 @@ class Periods(AngleSeries):
         """Return the curve's narrowest gap."""
         return self.curve.narrowest_gap
 
+    @cached_property
+    def quadrature_nodes(self) -> int:
+        """Return the number of nodes on all cuts."""
+        return sum(self.node_count(cut) for cut in self.cuts)
+
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to the working precision.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import NDArray
 
-from veselova.analytic.increasing import increasing_root
+from veselova.analytic.increasing import Rows, increasing_root
 from veselova.analytic.precision import DOUBLE
 
 __all__ = ["ORDER", "Pieces"]
@@ -70,9 +70,9 @@ class Pieces:
         # Axes: the pieces of all windows, the points in time, the columns.
         target = durations[:, None] * ((_X + 1) / 2)
 
-        def excess(x: Array) -> tuple[Array, Array]:
-            value, rise = (polynomial.polyval(x, c[:, :, None], tensor=False) for c in (elapsed, slope))
-            return np.asarray(value - target), np.asarray(rise)
+        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
+            value, rise = (polynomial.polyval(x, c[:, rows, None], tensor=False) for c in (elapsed, slope))
+            return np.asarray(value - target[rows]), np.asarray(rise)
 
         one = np.ones_like(target)
         with np.errstate(all="ignore"):  # a first step of Newton's from the same points everywhere is a product of matrices

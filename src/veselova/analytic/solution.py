@@ -29,7 +29,7 @@ from veselova.analytic.steepness import Steepness
 from veselova.analytic.survey import FEW, Survey, drawn_phases
 from veselova.analytic.transforms import Transforms
 from veselova.analytic.trial import NODES
-from veselova.analytic.windows import Windows
+from veselova.analytic.windows import FEW_TIMES, Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
 from veselova.mechanics.torus_problem import TorusProblem
@@ -148,14 +148,15 @@ class Solution:
 
         Panels take dt/dτ₁ along the orbit by ``method``, the route to the attitude.
         """
-        cycles, guarded = self.cycles(times), self.is_guarded(times)
+        cycles = self.cycles(times)
+        guarded = cycles > GUARDED_FROM
         if not cycles <= _MOST_CYCLES:
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {GUARD_DIGITS} digits")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
         if name is None and (self.near_separatrix or self.moving.rate_variation > _WIDEST_RATE):
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
-        if (name or self.costs(times).cheaper_clock(self.windows(times, "fourier", method).inversions)) == "fourier":
+        if (name or self.costs(times).cheaper_clock(self.inversions(times, method))) == "fourier":
             return self._fourier(guarded)
         if cycles > PANEL_CYCLES:
             reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
@@ -193,8 +194,12 @@ class Solution:
 
     def windows(self, times: Array, clock: str, method: str | None) -> Windows:
         """Return the windows in which many times are interpolated where that is cheaper with the clock and the method has any."""
-        fewest = times.size + 1 if method in ("products", "nufft") else self.costs(times).fewest_in_window(NODES, clock)
-        return Windows(times, self._fastest, fewest)
+        none = times.size < FEW_TIMES or method in ("products", "nufft")
+        return Windows(times, self._fastest, times.size + 1 if none else self.costs(times).fewest_in_window(NODES, clock))
+
+    def inversions(self, times: Array, method: str | None) -> int:
+        """Return how often a Fourier clock is asked at least: at every time, or at the starts of windows."""
+        return times.size if times.size < FEW_TIMES else self.windows(times, "fourier", method).inversions
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times, which increase."""

@@ -126,21 +126,21 @@ class _TorusMotion(Motion[TorusProblem]):
         for neighbour in self._neighbours:
             other = _along(neighbour, neighbour.clock(grid, self.clock, route), grid, route)[0]
             error = np.maximum(error, np.max(np.abs(other.series[1] - along.series[1]), axis=(1, 2)))
-        lost = np.flatnonzero(~(error <= _NO_DIGIT))
-        if lost.size:
-            first = grid[lost[np.argmin(np.abs(grid[lost]))]]
+        if not (settled := error <= _NO_DIGIT).all():
+            lost = grid[~settled]
+            first = lost[np.argmin(np.abs(lost))]
             cause = "the data determine no digit there" + _OR_CANCELLATION * (route == "nufft")
             raise Unsolved("no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
-        inversions = solution.windows(grid, "fourier", route).inversions
         sums = None if route == "angles" else solution.transforms if route == "nufft" else solution.quotients.theta
+        costs = solution.costs(grid).estimates(solution.inversions(grid, route)) if clock.name != "uniform" else {}
         details = {
             "regime": solution.regime,
             "clock": clock.name,
             "clock_size": clock.size,
             "evaluations": along.evaluations,
-            "clock_estimates": solution.costs(grid).estimates(inversions) if clock.name != "uniform" else {},
+            "clock_estimates": costs,
             "guard_digits": solution.is_guarded(grid),
-            "quadrature_nodes": sum(solution.periods.node_count(cut) for cut in solution.periods.cuts),
+            "quadrature_nodes": solution.periods.quadrature_nodes,
             "theta_terms": sums.size if sums else 0,
         }
         states = (along.tau1 * solution.tau1_unit, *along.series)

@@ -29,11 +29,14 @@ __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
 
-#: e^(−π·200) = 1e-273: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
-_VANISHING = 200.0
+#: The least exponent, e^−630 = 1e-274: smaller Gaussians are taken for that, since subnormal numbers are a hundred times slower.
+_VANISHING = -630.0
 
 #: i^m.
 _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
+
+#: (−1)^m by m modulo two.
+_SIGNS = np.array([1.0, -1.0])
 
 #: Entries of one block of (points × lattice): temporaries that stay in the cache.
 _BLOCK = 100_000
@@ -44,7 +47,7 @@ class _Family:
     """M characteristics with the same Gaussians and waves.
 
     orders (X, |F|): 2x of the waves
-    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M and each x, W = 2X; without waves the signs, W = 1
+    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
     """
 
     orders: NDArray[np.int64]
@@ -61,7 +64,7 @@ class _Family:
         return _Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
 
     def sums(self, bells: Array, along: Array) -> Array:
-        """Return the sums without their signs, shape (M, N); ``along`` (W, N) are the waves, of each x a cosine and a sine."""
+        """Return the sums without their signs, shape (M, N); ``along`` (W, N): cosines of each x, then sines."""
         weighted = (self.tables @ bells.T).reshape(-1, *along.shape)
         return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
 
@@ -105,12 +108,10 @@ class _Group:
         """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
         if not angles.shape[1]:
             return np.concatenate([family.tables @ bells.T for family in self.families])
-        turned = waves_at(angles, self._orders, self._highest)
-        along = turned.view(np.float64).reshape(*turned.shape, 2).swapaxes(1, 2).reshape(-1, len(angles))
-        result, first = [], 0
+        along, result, first = waves_at(angles, self._orders, self._highest), [], 0
         for family in self.families:
-            last = first + 2 * len(family.orders)
-            result.append(family.sums(bells, along[first:last]))
+            last = first + len(family.orders)
+            result.append(family.sums(bells, along[:, first:last].reshape(-1, len(angles))))
             first = last
         return np.concatenate(result)
 
@@ -147,9 +148,10 @@ class Theta:
         return centred_points(self._parts[2], RADIUS)
 
     @cached_property
-    def _gaussian_norms(self) -> Array:
-        k = self._gaussian_lattice
-        return np.asarray(np.sum((k @ self._parts[2]) * k, axis=1))
+    def _exponents(self) -> tuple[Array, Array, Array]:
+        """Return what −π(k−r)ᵀT_GG⁻¹(k−r) is made of, all k at once: −πkᵀT_GG⁻¹k, 2πT_GG⁻¹k, (|G|, K), and −πT_GG⁻¹."""
+        k, inverse = self._gaussian_lattice, -np.pi * self._parts[2]
+        return np.sum((k @ inverse) * k, axis=1), -2 * inverse @ k.T, inverse
 
     @property
     def cost(self) -> float:
@@ -187,8 +189,8 @@ class Theta:
         bells, r, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
         angles = np.pi * (y[:, self._split[0]] - r @ self._parts[1].T)
         for k, group in enumerate(groups):
-            half_turns = group.parities.T @ nearest[k].T
-            signs = group.signs[:, None] * (1 - 2 * (half_turns - 2 * np.floor(half_turns / 2)))  # fmod is slow
+            half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
+            signs = group.signs[:, None] * _SIGNS[half_turns & 1]
             result[group.places] = group.sums(bells[k], angles[k]) * signs
 
     def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
@@ -199,12 +201,11 @@ class Theta:
         y_G = y[:, self._split[1]] + shifts[:, None, :]
         nearest = np.rint(y_G)
         r = y_G - nearest
-        inverse, k = self._parts[2], self._gaussian_lattice
-        if k.shape[1] == 0:
+        if r.shape[2] == 0:
             return np.ones((*y_G.shape[:2], 1)), r, nearest
-        projected = r @ inverse
-        quadratic = self._gaussian_norms - (2 * projected) @ k.T + (projected * r).sum(axis=2)[:, :, None]
-        return np.exp(-np.pi * np.where(quadratic < _VANISHING, quadratic, np.inf)), r, nearest
+        constant, linear, quadratic = self._exponents
+        exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]
+        return np.exp(np.maximum(exponents, _VANISHING)), r, nearest
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
@@ -241,7 +242,7 @@ class Theta:
         if F:
             quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
             turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
-            tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=3)).reshape(len(tables), -1)
+            tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
         return _Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
 
     def _crossing(self, epsilon: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:

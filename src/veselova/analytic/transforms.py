@@ -26,7 +26,7 @@ from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.frame import Attitude
 from veselova.analytic.lattice import RADIUS, lattice_points, points_within, small_norm
 from veselova.analytic.quotients import ThetaQuotients
-from veselova.analytic.waves import waves_at
+from veselova.analytic.waves import turns, waves
 from veselova.mechanics.errors import BackendMissing, Unsolved
 
 __all__ = ["Transforms"]
@@ -84,7 +84,7 @@ class _Family:
 
     def along(self, z: Array) -> Complex:
         """Return e^{2πi x·z}, shape (X, N), at phases z (N, g)."""
-        return waves_at(np.pi * z, self.orders, int(np.max(np.abs(self.orders))))
+        return waves(turns(np.pi * z, int(np.max(np.abs(self.orders)))), self.orders)
 
     def values(self, sums: Complex) -> Array:
         """Return the functions, shape (N, len(places)), from their sums (M, N)."""

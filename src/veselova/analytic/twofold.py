@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Twofold", "exact_product", "stacked", "where"]
+__all__ = ["Twofold", "exact_product", "halves", "stacked", "where"]
 
 Array = NDArray[np.float64]
 
@@ -100,17 +100,18 @@ def where(condition: Any, chosen: Twofold, other: Twofold) -> Twofold:
     return Twofold(np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low))
 
 
-def exact_product(a: Array, b: Array) -> tuple[Array, Array]:
+def exact_product(a: Array, b: Array, halves_of_b: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
     """Return (p, e) with a·b = p + e exactly, p the rounded product."""
     product = a * b
-    a_high, b_high = _upper_half(a), _upper_half(b)
-    a_low, b_low = a - a_high, b - b_high
+    (a_high, a_low), (b_high, b_low) = halves(a), halves_of_b or halves(b)
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-def _upper_half(x: Array) -> Array:
+def halves(x: Array) -> tuple[Array, Array]:
+    """Return (h, l) with x = h + l exactly, h of half as many bits."""
     scaled = _SPLITTER * x
-    return np.asarray(scaled - (scaled - x))
+    high = scaled - (scaled - x)
+    return high, x - high
 
 
 def _exact_sum(a: Array, b: Array) -> tuple[Array, Array]:

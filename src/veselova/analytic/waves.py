@@ -48,14 +48,16 @@ def waves(turns: Complex, orders: Integers) -> Complex:
     return result
 
 
-def waves_at(angles: Array, orders: Integers, largest: int) -> Complex:
-    """Return e^{i k·φ} for angles (N, d) and orders (K, d) of entries to ``largest``, shape (K, N)."""
+def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = None) -> Array:
+    """Return cos k·φ and sin k·φ for angles (N, d) and orders (K, d) of entries to ``largest``, shape (2, K, N)."""
+    result = np.empty((2, orders.shape[0], angles.shape[0])) if out is None else out
     if angles.shape[0] * orders.shape[0] > _FEW:
-        return waves(turns(angles, largest), orders)
-    phases = orders @ angles.T
-    result = np.empty(phases.shape, dtype=np.complex128)
-    np.cos(phases, out=result.real)
-    np.sin(phases, out=result.imag)
+        found = waves(turns(angles, largest), orders)
+        result[0], result[1] = found.real, found.imag
+    else:
+        phases = orders @ angles.T
+        np.cos(phases, out=result[0])
+        np.sin(phases, out=result[1])
     return result
 
 

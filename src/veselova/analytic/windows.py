@@ -25,12 +25,12 @@ from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.track import Track
 from veselova.analytic.trial import MOST_HALVINGS, Cells, Evaluation, Trial
 
-__all__ = ["Windows"]
+__all__ = ["FEW_TIMES", "Windows"]
 
 Array = NDArray[np.float64]
 
 #: Times below which windows are not worth their overhead.
-_FEW_TIMES = 500
+FEW_TIMES = 500
 
 #: Cycles of the fastest phase in a window at first; lengths that are tried, and how many before they are halved.
 _CYCLES = 2.0
@@ -69,14 +69,17 @@ class Windows:
     """
 
     def __init__(self, times: Array, fastest: float, fewest: int) -> None:
-        self._times, self._fewest = times, fewest
-        self._length = _few_bits(_CYCLES / fastest)
+        self._times, self._fastest, self._fewest = times, fastest, fewest
+
+    @cached_property
+    def _length(self) -> float:
+        return _few_bits(_CYCLES / self._fastest)
 
     @cached_property
     def _stretches(self) -> _Stretches:
-        times, length = self._times, self._length
-        if times.size < _FEW_TIMES:
+        if self._times.size < FEW_TIMES:
             return _NONE
+        times, length = self._times, self._length
         low, high = np.floor(times[[0, -1]] / length)
         if high - low < times.size:
             keys = np.arange(low, high + 1)

@@ -21,14 +21,7 @@ MOST_TIMES = 10_000_000
 
 def validated_times(times: Any) -> Array:
     """Return the times as a read-only float64 array; raises InvalidInput unless finite and strictly increasing."""
-    if (
-        isinstance(times, np.ndarray)
-        and not isinstance(times, np.ma.MaskedArray)
-        and times.ndim == 1
-        and times.dtype == np.float64
-        and np.isfinite(times).all()
-    ):
-        array = np.array(times)
+    if _are_doubles(times) and np.isfinite(array := np.array(times)).all():
         array.setflags(write=False)
     else:
         array = to_float(exact_vector(times, ("times",)))
@@ -41,6 +34,13 @@ def validated_times(times: Any) -> Array:
             ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))
         )
     return array
+
+
+def _are_doubles(times: Any) -> bool:
+    """Return whether times are doubles as they stand, in an array or a list: they need no detour by rationals."""
+    if type(times) is list:
+        return all(type(time) is float for time in times)
+    return isinstance(times, np.ndarray) and not isinstance(times, np.ma.MaskedArray) and times.ndim == 1 and times.dtype == float
 
 
 def exact_times(times: Any) -> tuple[tuple[Fraction, ...], Array]:

@@ -121,7 +121,7 @@ class Veselova(TorusProblem):
     @property
     def moves(self) -> bool:
         """Return whether the body moves at all (q̇ ≠ 0)."""
-        return bool(np.any(self.q_dot))
+        return bool(self.q_dot.any())
 
     @cached_property
     def frame(self) -> Array:
