@@ -42,7 +42,7 @@ def increasing_root(
             trial = np.where(2 * np.abs(step) <= before, x - step, np.nan)  # steps that do not shrink may go in circles
             trial = np.where((trial >= low) & (trial <= high), trial, (low + high) / 2)
             before, x = np.maximum(np.abs(trial - x), 2 * settled), np.where(small, found, trial)
-            open_ = ~small.reshape(len(small), -1).all(axis=1)
+            open_ = np.asarray(~small.reshape(len(small), -1).all(axis=1))
             if 2 * np.count_nonzero(open_) <= len(open_):  # those that are settled are left, when that saves more than it costs
                 result = _with(result, rows, x)
                 rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]
