@@ -197,6 +197,27 @@ def test_settled_roots_are_left_alone() -> None:
     assert set(looked_at[2:]) == {1}
 
 
+def test_a_bracket_settles_what_no_step_does() -> None:
+    """Without a slope at the zero, at a jump, and where values are rough."""
+    one = np.ones(1)
+    assert increasing_root(lambda x, _: (x**3, 3 * x * x), np.zeros(1), -one, one, 1e-9) == 0
+    for scale in (1e-9, 1e-3):
+        jump = increasing_root(lambda x, _: (np.sign(x - 0.3), 0 * x), np.zeros(1), -one, one, scale, 1e-9)
+        assert abs(jump[0] - 0.3) <= 1e-9
+        rough = increasing_root(lambda x, _: (x - 0.3 + 1e-6 * np.sign(np.sin(1e9 * x)), 0 * x + 1), -one, -one, one, 1e-8, 1e-9)
+        assert abs(rough[0] - 0.3) <= 2e-6
+
+
+def test_times_far_apart_beside_a_resonance() -> None:
+    """Phases of nearly commensurable frequencies make the clock swing by thousands of cycles, and its values rough."""
+    body = Veselova([1.0, 1.6 * (2.584309800104662 + 1e-5), 30.0], [0.5, 0.6, 0.62], [0.9, -0.5, -0.24], normalize=True)
+    together, times = solve(body, [-1e7, 2e7]), (-1e7, 2e7)
+    for k, time in enumerate(times):
+        alone = solve(body, [time])
+        assert np.max(np.abs(alone.frame[0] - together.frame[k])) <= alone.error[0] + together.error[k]
+    assert np.max(together.error) < 1e-8
+
+
 @pytest.mark.parametrize("spread", [5.0, 100.0])
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,6 +96,12 @@ def test_theta_is_quasi_periodic_along_the_imaginary_periods(rng: np.random.Gene
             assert np.isclose(direct, Theta(T).values(z, [characteristic])[0, 0], rtol=1e-12)
 
 
+def test_values_below_the_smallest_double_are_zero() -> None:
+    """Between lattice points T = 1e-3 leaves e^−785; what is there taken for more would be a finite quotient of nothing."""
+    functions = [Characteristic((0,), (0,)), Characteristic((1,), (0,))]
+    assert np.array_equal(Theta(np.array([[1e-3]])).values(np.array([[0.5], [0.45]]), functions), np.zeros((2, 2)))
+
+
 def test_riemanns_quartic_relation(rng: np.random.Generator) -> None:
     """In genus one: θ3(0)⁴ = θ2(0)⁴ + θ4(0)⁴, and the two relations between squares at z and at zero."""
     theta = Theta(np.array([[0.8]]))

@@ -116,7 +116,7 @@ class FourierClock(Clock):
         """
         result = np.empty((advance.shape[0], 4))
         modes, weights = self._modes[:size], self._weights[:, :size].reshape(-1, 4)
-        block = min(advance.shape[0], max(1, _BLOCK // max(size, 1)))
+        block = max(1, min(advance.shape[0], _BLOCK // max(size, 1)))
         room = np.empty((2, size, block))
         for first in range(0, advance.shape[0], block):
             rows = slice(first, first + block)
@@ -145,7 +145,7 @@ class FourierClock(Clock):
         if self.size > first:  # a truncated sum need not increase: one plain step towards it is all it is good for
             value, slope = excess(delta, slice(None), first)
             delta = np.maximum(np.minimum(-value / np.maximum(slope, least), reach), -reach)
-        delta = increasing_root(excess, delta, -reach, reach, self._settled)
+        delta = increasing_root(excess, delta, -reach, reach, self._settled, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
         return times / self._mean + delta, z
 

@@ -21,28 +21,37 @@ _MOST_STEPS = 80
 
 
 def increasing_root(
-    function: Callable[[Array, Rows], tuple[Array, Array]], guess: Array, low: Array, high: Array, settled: float
+    function: Callable[[Array, Rows], tuple[Array, Array]],
+    guess: Array,
+    low: Array,
+    high: Array,
+    settled: float,
+    narrow: float | None = None,
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
 
     ``function`` gives values at entries, of rows along the first axis, and what a step divides them by: slopes (Newton's method),
     or what another method has in their place. Iteration ends with steps of at most ``settled``, after which values are not formed
-    again: the error left is of the order of the method, so choose it near that root of the wanted accuracy.
+    again: the error left is of the order of the method, so choose it near that root of the wanted accuracy. It ends with brackets
+    of at most ``narrow`` too (``settled`` without one), where values are too rough, or slopes too small, for such a step.
     """
+    narrow = settled if narrow is None else narrow
     rows: Rows = slice(None)
     result, x, before = guess, guess, high - low
     with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken
         for _ in range(_MOST_STEPS):
             value, slope = function(x, rows)
             step = value / slope
-            small, found = np.asarray(np.abs(step) <= settled), np.minimum(np.maximum(x - step, low), high)
+            small, found = np.abs(step) <= settled, np.minimum(np.maximum(x - step, low), high)
             if small.all():
                 return _with(result, rows, found)
             low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
             trial = np.where(2 * np.abs(step) <= before, x - step, np.nan)  # steps that do not shrink may go in circles
             trial = np.where((trial >= low) & (trial <= high), trial, (low + high) / 2)
             before, x = np.maximum(np.abs(trial - x), 2 * settled), np.where(small, found, trial)
-            open_ = np.asarray(~small.reshape(len(small), -1).all(axis=1))
+            open_ = np.asarray(~(small | (high - low <= narrow)).reshape(len(x), -1).all(axis=1))
+            if not open_.any():
+                return _with(result, rows, x)
             if 2 * np.count_nonzero(open_) <= len(open_):  # those that are settled are left, when that saves more than it costs
                 result = _with(result, rows, x)
                 rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]

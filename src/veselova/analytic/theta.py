@@ -29,7 +29,7 @@ __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
 
-#: The least exponent, e^−630 = 1e-274: smaller Gaussians are taken for that, since subnormal numbers are a hundred times slower.
+#: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
 _VANISHING = -630.0
 
 #: i^m.
@@ -205,7 +205,7 @@ class Theta:
             return np.ones((*y_G.shape[:2], 1)), r, nearest
         constant, linear, quadratic = self._exponents
         exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]
-        return np.exp(np.maximum(exponents, _VANISHING)), r, nearest
+        return np.exp(np.where(exponents > _VANISHING, exponents, -np.inf)), r, nearest
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
         """Return the families by δ_G."""
