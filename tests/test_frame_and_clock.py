@@ -208,16 +208,6 @@ def test_a_bracket_settles_what_no_step_does() -> None:
         assert abs(rough[0] - 0.3) <= 2e-6
 
 
-def test_times_far_apart_beside_a_resonance() -> None:
-    """Phases of nearly commensurable frequencies make the clock swing by thousands of cycles, and its values rough."""
-    body = Veselova([1.0, 1.6 * (2.584309800104662 + 1e-5), 30.0], [0.5, 0.6, 0.62], [0.9, -0.5, -0.24], normalize=True)
-    together, times = solve(body, [-1e7, 2e7]), (-1e7, 2e7)
-    for k, time in enumerate(times):
-        alone = solve(body, [time])
-        assert np.max(np.abs(alone.frame[0] - together.frame[k])) <= alone.error[0] + together.error[k]
-    assert np.max(together.error) < 1e-8
-
-
 @pytest.mark.parametrize("spread", [5.0, 100.0])
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,7 +279,7 @@ def test_no_mode_is_looked_at_twice() -> None:
         looked_at.extend(rows)
         return np.ones(len(rows)), np.array(large)
 
-    modes, _ = grown(2, coefficients, most=2000)
+    modes, _, _ = grown(2, coefficients, most=2000)
     assert len(set(looked_at)) == len(looked_at)
     assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5
 

@@ -177,8 +177,11 @@ class Clock(ABC):
         """Return t at Neumann times."""
 
     @abstractmethod
-    def error(self, tau1: Array) -> Array:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0 and f, (N,), or (1,) for all times."""
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0, (N,), or (1,) for all times.
+
+        of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some m·f nearly vanishes.
+        """
 
     @property
     @abstractmethod
@@ -211,7 +214,7 @@ class UniformClock(Clock):
         """Return τ₁ in the problem's unit."""
         return self._rate * tau1
 
-    def error(self, tau1: Array) -> Array:
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
         """Return zero: nothing is integrated."""
         return np.zeros(1)
 

@@ -30,7 +30,8 @@ _SETTLED = 1e-7
 #: Digits that Newton's method in balls starts from.
 _FIRST_DIGITS = 10
 
-#: What the modes left out add up to, in units of the smallest kept, each over 1/(π m·f): they fall off as fast as they came.
+#: What the modes left out add up to, in units of the smallest kept, each over 1/(π m·f), and what those next to them do: others
+#: fall off as fast as they came.
 _TAIL = 4
 
 
@@ -48,11 +49,12 @@ class EnclosedFourier:
         self._orbit = orbit
         self._xp: Any = orbit.rate.inversion.arithmetic
         self._mean = orbit.rate.mean
-        self._modes, coefficients = self._significant()
+        self._modes, coefficients, edge = self._significant()
         rates = self._modes @ orbit.frequencies
         self._amplitudes = coefficients / (self._xp.pi * rates)
         self._slopes = 2 * coefficients
-        self._tail = _TAIL * self._smallest * np.sqrt(float(np.sum(np.array(1 / rates, dtype=float) ** 2)))
+        slowness = np.array(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies), dtype=float)
+        self._tail = _TAIL * self._smallest * float(np.linalg.norm(slowness))
 
     @property
     def size(self) -> int:
@@ -63,8 +65,8 @@ class EnclosedFourier:
     def _smallest(self) -> Any:
         return self._mean * self._xp.epsilon
 
-    def _significant(self) -> tuple[NDArray[np.int64], Values]:
-        """Return the modes m with |F_m| above the precision, and F_m, the largest first."""
+    def _significant(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
+        """Return the modes m with |F_m| above the precision and F_m, the largest first, and the modes next to them."""
         rate, xp = self._orbit.rate, self._xp
         columns = ColumnsForModes(rate)
 
@@ -74,9 +76,9 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        modes, values = grown(rate.inversion.periods.genus, determinants, MOST_MODES)
+        modes, values, edge = grown(rate.inversion.periods.genus, determinants, MOST_MODES)
         order = np.argsort([-abs(float(value)) for value in values], kind="stable")
-        return modes[order], values[order]
+        return modes[order], values[order], edge
 
     def _periodic(self, z: Values) -> tuple[Values, Values]:
         """Return Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰) and its derivative in τ₁ at z (N, g)."""

@@ -46,15 +46,17 @@ def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock,
     frequencies = np.abs(solution.in_tau1.rates)
     rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
     # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
-    # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are.
+    # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are, and
+    # so does the clock.
     at_once = _PHASE * _EPSILON * float(steepness.by_phase.sum())
     if method != "angles":
         at_once += float(solution.start_rounding @ steepness.by_phase) + solution.quotients.rounding
     with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
+    of_clock = clock.error(tau1, _PHASE * _EPSILON + solution.start_rounding, rounding * frequencies)
     evaluation = _EVALUATION[method] * (1.0 if method == "angles" else max(1.0, solution.largest_period))
     error = np.abs(tau1)  # in place from here on: fresh memory costs more than sums
     error *= with_time
-    error += clock.error(tau1) * steepness.along_flow
+    error += of_clock * steepness.along_flow
     if (slowness := _slowness(solution, tau1)) is not None:
         error *= slowness
     error += evaluation * _EPSILON + at_once

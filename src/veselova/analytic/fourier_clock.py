@@ -2,6 +2,8 @@
 
     t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f)
 
+Near a resonance, where m·f is small, m·z is a phase of its own: made of the others, its rounding would be divided by m·f.
+
 Any t costs the same; the number of modes grows with the genus (n = 3: hundreds, n = 4: thousands, n = 5: ten thousands).
 """
 
@@ -9,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,6 +27,7 @@ from veselova.mechanics.errors import Unsolved
 __all__ = ["ColumnsForModes", "FourierClock", "grown"]
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 #: Modes below this fraction of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
@@ -40,6 +44,9 @@ _FIRST_MODES, _FIRST_PART = 64, 1 / 16
 #: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse clock divides by.
 _LEAST_SLOPE = 0.05
 
+#: Cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
+_SLOW = 4.0
+
 #: Entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
 
@@ -54,16 +61,21 @@ class FourierClock(Clock):
     name: ClassVar[str] = "fourier"
 
     def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        self._in_tau1, self._in_time, self._mean = in_tau1, in_time, mean
-        modes, coefficients = _significant_modes(rate)
+        modes, coefficients, edge = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
-        self._modes, coefficients = modes[order], coefficients[order]
+        modes, coefficients = modes[order], coefficients[order]
+        self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
+        #: How far modes move τ₁ with each phase at the start, in a unit of time.
+        self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
+        at_edge = in_tau1.rates_of(edge)
+        self._modes, slow = _with_slow_phases(modes, self._pull.max(axis=1, initial=0.0), in_tau1.rates)
+        self._in_tau1, self._in_time = (flow.with_combinations(slow) if len(slow) else flow for flow in (in_tau1, in_time))
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
-        pace = 2 * np.pi * (self._modes @ in_tau1.rates)
+        pace = 2 * np.pi * self._in_tau1.rates_of(self._modes)
         amplitudes = 2 * coefficients / pace
         # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h) in turn, divided by k!:
         # of sin h cos h and of sin²h.
-        offset = 2 * np.pi * (self._modes @ in_tau1.start)
+        offset = 2 * np.pi * (self._modes @ self._in_tau1.start)
         cosine, sine = np.cos(offset), np.sin(offset)
         sizes = 2 * np.stack([amplitudes, 2 * coefficients, -coefficients * pace, -coefficients * pace**2 / 3], axis=1)
         of_squares = -sizes * np.stack([sine, cosine, sine, cosine], axis=1)
@@ -71,7 +83,9 @@ class FourierClock(Clock):
         self._at_start = np.cumsum(np.vstack([[mean, 0.0, 0.0], -of_squares[:, 1:] / 2]), axis=0)
         self._highest = int(np.max(np.abs(self._modes), initial=0))
         self._reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
-        self._longest, self._fastest = 2 / np.abs(pace), float(np.max(np.abs(in_tau1.rates)))
+        #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
+        self._longest = 1 / np.maximum(np.abs(np.concatenate([pace / 2, np.pi * at_edge])), np.finfo(float).tiny)
+        self._longest_of_all = float(np.max(self._longest, initial=0.0))
         self._settled = self._last_step(coefficients, pace)
 
     @property
@@ -87,15 +101,28 @@ class FourierClock(Clock):
     def ahead(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
-        return np.asarray(self._periodic(advance, self.size)[0]), self._in_time.start + advance
+        return np.asarray(self._periodic(advance, self.size)[0]), (self._in_time.start + advance)[:, : self._genus]
 
-    def error(self, tau1: Array) -> Array:
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
 
-        Modes left out are as small and hardly more numerous; independent errors add in squares.
+        So are those next to them that are left out, and others are smaller. An error of phase k moves τ₁ by 2F_m 2πm_k/F_0 of it
+        for as long. Errors of different modes add in squares. To these comes one rounding of δ.
         """
-        lengths = np.minimum(self._longest, max(abs(float(tau1[0])), abs(float(tau1[-1]))))
-        return np.full(1, 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest))
+        elapsed = max(abs(float(tau1[0])), abs(float(tau1[-1])))
+        of_all, sway = self._swayed if elapsed > self._longest_of_all else self._swayed_for(elapsed)
+        return np.abs(tau1) * (sway @ of_rates) + (of_all + sway @ of_start)
+
+    @cached_property
+    def _swayed(self) -> tuple[float, Array]:
+        return self._swayed_for(np.inf)
+
+    def _swayed_for(self, elapsed: float) -> tuple[float, Array]:
+        """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
+        lengths = np.minimum(self._longest, elapsed)
+        of_modes = 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
+        shifts = self._pull * lengths[: self.size, None]
+        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt((shifts * shifts).sum(axis=0))
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
@@ -147,20 +174,36 @@ class FourierClock(Clock):
             delta = np.maximum(np.minimum(-value / np.maximum(slope, least), reach), -reach)
         delta = increasing_root(excess, delta, -reach, reach, self._settled, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
-        return times / self._mean + delta, z
+        return times / self._mean + delta, z[:, : self._genus]
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[NDArray[np.int64], Array]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, and F_m."""
+def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
+    """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
+
+    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes too much of that, the mode is a
+    multiple of a slow combination.
+    """
+    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (np.count_nonzero(modes, axis=1) > 1)
+    if not slow.any():
+        return modes, modes[:0]
+    multiples = np.gcd.reduce(modes[slow], axis=1)
+    combinations, which = np.unique(modes[slow] // multiples[:, None], axis=0, return_inverse=True)
+    of_slow = np.zeros((len(modes), len(combinations)), dtype=np.int64)
+    of_slow[np.flatnonzero(slow), which.ravel()] = multiples
+    return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
+
+
+def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
+    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, F_m, and the modes next to them."""
     columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
 
-    def determinants(modes: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
+    def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
         matrices = np.stack([np.cos(2 * np.pi * (modes @ G.T)) @ weights.T for weights, G in columns(modes)], axis=2)
         values = float(rate.scale) * np.linalg.det(matrices)
         return values, np.abs(values) > threshold
 
-    modes, values = grown(rate.inversion.periods.genus, determinants)
-    return modes, values.astype(np.float64)
+    modes, values, edge = grown(rate.inversion.periods.genus, determinants)
+    return modes, values.astype(np.float64), edge
 
 
 class ColumnsForModes:
@@ -170,7 +213,7 @@ class ColumnsForModes:
         self._rate = rate
         self._count, self._columns = 0, list[tuple[Values, Values]]()
 
-    def __call__(self, modes: NDArray[np.int64]) -> list[tuple[Values, Values]]:
+    def __call__(self, modes: Integers) -> list[tuple[Values, Values]]:
         """Return the columns for modes (M, g)."""
         needed = 2 * (max(self._rate.needed_nodes) + int(np.max(np.abs(modes))))
         if needed > self._count:
@@ -180,9 +223,9 @@ class ColumnsForModes:
 
 
 def grown(
-    genus: int, coefficients: Callable[[NDArray[np.int64]], tuple[Any, NDArray[np.bool_]]], most: int = _MOST_MODES
-) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, and these.
+    genus: int, coefficients: Callable[[Integers], tuple[Any, NDArray[np.bool_]]], most: int = _MOST_MODES
+) -> tuple[Integers, NDArray[Any], Integers]:
+    """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, these, and the modes next to them.
 
     ``coefficients`` gives those of modes (M, g), and whether each is large enough. They fall off like the support function of a
     convex body, so the set is convex up to its edge: it is grown from zero through neighbours, in whichever directions it
@@ -205,16 +248,16 @@ def grown(
             raise Unsolved("too-far", f"the clock has more than {most} Fourier modes, and the time is too far for panels")
     modes, values = np.concatenate(kept_modes), np.concatenate(kept_values)
     moving = np.any(modes != 0, axis=1)
-    return modes[moving], values[moving]
+    return modes[moving], values[moving], refused
 
 
-def _half_space(modes: NDArray[np.int64]) -> NDArray[np.int64]:
+def _half_space(modes: Integers) -> Integers:
     """Return the modes, each replaced by its negative where its first nonzero entry is negative."""
     first = modes[np.arange(modes.shape[0]), np.argmax(modes != 0, axis=1)]
     return np.asarray(np.where(first[:, None] < 0, -modes, modes))
 
 
-def _others(modes: NDArray[np.int64], known: NDArray[np.int64]) -> NDArray[np.int64]:
+def _others(modes: Integers, known: Integers) -> Integers:
     """Return the distinct ones among modes (M, g) that are not among the known, in lexicographic order."""
     rows = np.concatenate([known, modes])
     order = np.lexsort(rows.T[::-1])  # stable: of equal rows known ones come first

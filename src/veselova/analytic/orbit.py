@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,11 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.precision import Values
-from veselova.analytic.twofold import exact_product, halves
+from veselova.analytic.twofold import Twofold, exact_product, halves
 
 __all__ = ["LinearFlow"]
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Bits of the largest rate that products with the orders of modes leave exact.
+_COARSE_BITS = 30
+
+#: What a combination that stands still moves by.
+_STANDING = 1e-60
 
 
 @dataclass(frozen=True)
@@ -33,6 +41,22 @@ class LinearFlow:
         leading = np.array([float(rate) for rate in rates])
         rests = np.array([float(rate - head) for rate, head in zip(rates, leading.tolist(), strict=True)])
         return cls(start, leading, rests)
+
+    def with_combinations(self, orders: Integers) -> LinearFlow:
+        """Return the flow of z and, after them, of the combinations m·z for integers m (K, g), whose rates keep all digits.
+
+        None of them stands still: it moves by a 1e-60th of the fastest rate instead.
+        """
+        rates = (Twofold(self.rates, self.rests) * orders).total()
+        high = np.where(rates.high == 0, _STANDING * np.max(np.abs(self.rates)), rates.high)
+        start, rests = np.concatenate([self.start, orders @ self.start]), np.concatenate([self.rests, rates.low])
+        return LinearFlow(start, np.concatenate([self.rates, high]), rests)
+
+    def rates_of(self, orders: Integers) -> Array:
+        """Return m·(rates + rests) for integers m (K, g), right to 1e-24 of the largest rate: small ones do not cancel."""
+        quantum = np.ldexp(1.0, math.frexp(float(np.max(np.abs(self.rates))))[1] - _COARSE_BITS)
+        coarse = np.rint(self.rates / quantum) * quantum
+        return np.asarray(orders @ coarse + orders @ ((self.rates - coarse) + self.rests))
 
     @cached_property
     def _halves(self) -> tuple[Array, Array]:

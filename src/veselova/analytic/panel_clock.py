@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 #: Rounding of dt/dτ₁ that all panels share, in ε.
 _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
+#: By how many radians a phase moves those parts of the rate that matter.
+_ORDER = 6 * np.pi
+
 #: A Newton step of this size, in half panels, leaves an error of its square.
 _SETTLED = 1e-9
 
@@ -68,10 +71,18 @@ class PanelClock(Clock):
             self.panels = integrated(self._rate, self.in_tau1, low, high)
         return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
-    def error(self, tau1: Array) -> Array:
-        """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share."""
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+        """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share.
+
+        What errors of the phases do is judged by how far t/F_0 is from τ₁ at most, which slow parts of dt/dτ₁ make large.
+        """
+        elapsed, panels = np.abs(tau1), self.panels
         # The tails are those of t; divided by the mean rate they are those of τ₁.
-        return np.asarray(self.panels.error(tau1) / self.panels.mean_size + _SHARED_ROUNDING * np.abs(tau1))
+        error = panels.error(tau1) / panels.mean_size + _SHARED_ROUNDING * elapsed
+        apart = float(np.max(np.abs(panels.values / self._mean - panels.borders)))
+        error += _ORDER * np.minimum(elapsed, apart) * float(of_start.sum())
+        error += _ORDER * apart * float(of_rates.sum()) * elapsed
+        return np.asarray(error)
 
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times within the panels."""
