@@ -91,6 +91,9 @@ def test_rates_of_combinations_do_not_cancel(rng: np.random.Generator) -> None:
     longer = flow.with_combinations(orders)
     for k, x in enumerate(exact):
         assert abs(Fraction(longer.rates[3 + k]) + Fraction(longer.rests[3 + k]) - x) < 1e-31
+    slower = longer.per(0.7)
+    for x, r, y, s in zip(longer.rates, longer.rests, slower.rates, slower.rests, strict=True):
+        assert abs((Fraction(y) + Fraction(s)) * Fraction(0.7) / (Fraction(x) + Fraction(r)) - 1) < 1e-30
     still = LinearFlow(np.zeros(2), np.array([1.0, 0.5]), np.zeros(2)).with_combinations(np.array([[1, -2]]))
     assert 0 < still.rates[2] < 1e-50
 

@@ -69,7 +69,11 @@ class FourierClock(Clock):
         self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
         at_edge = in_tau1.rates_of(edge)
         self._modes, slow = _with_slow_phases(modes, self._pull.max(axis=1, initial=0.0), in_tau1.rates)
-        self._in_tau1, self._in_time = (flow.with_combinations(slow) if len(slow) else flow for flow in (in_tau1, in_time))
+        if len(slow):
+            in_tau1 = in_tau1.with_combinations(slow)
+            # Without guard digits f/F_0 is rounded, and its combinations would not be those of f: so f is divided to more digits.
+            in_time = in_time.with_combinations(slow) if in_time.rests.any() else in_tau1.per(mean)
+        self._in_tau1, self._in_time = in_tau1, in_time
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
         pace = 2 * np.pi * self._in_tau1.rates_of(self._modes)
         amplitudes = 2 * coefficients / pace

@@ -52,6 +52,12 @@ class LinearFlow:
         start, rests = np.concatenate([self.start, orders @ self.start]), np.concatenate([self.rests, rates.low])
         return LinearFlow(start, np.concatenate([self.rates, high]), rests)
 
+    def per(self, unit: float) -> LinearFlow:
+        """Return z as a function of x·unit: the rates divided by it, to as many digits as two doubles have."""
+        rates = self.rates / unit
+        product, error = exact_product(rates, np.full_like(rates, unit))
+        return LinearFlow(self.start, rates, (((self.rates - product) - error) + self.rests) / unit)
+
     def rates_of(self, orders: Integers) -> Array:
         """Return m·(rates + rests) for integers m (K, g), right to 1e-24 of the largest rate: small ones do not cancel."""
         quantum = np.ldexp(1.0, math.frexp(float(np.max(np.abs(self.rates))))[1] - _COARSE_BITS)
