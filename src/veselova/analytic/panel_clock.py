@@ -22,8 +22,11 @@ Array = NDArray[np.float64]
 #: Rounding of dt/dτ₁ that all panels share, in ε.
 _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: By how many radians a phase moves those parts of the rate that matter.
-_ORDER = 6 * np.pi
+#: By how much a phase moves slow parts of t, against their range: π times its order in those that matter.
+_TURN = 3 * np.pi
+
+#: Cycles over which all other parts average out, and the highest order at which some are looked for.
+_AVERAGED, _HIGHEST = 16.0, 8
 
 #: A Newton step of this size, in half panels, leaves an error of its square.
 _SETTLED = 1e-9
@@ -74,15 +77,25 @@ class PanelClock(Clock):
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share.
 
-        What errors of the phases do is judged by how far t/F_0 is from τ₁ at most, which slow parts of dt/dτ₁ make large.
+        What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
         """
-        elapsed, panels = np.abs(tau1), self.panels
+        elapsed, panels, apart = np.abs(tau1), self.panels, self._drift()
         # The tails are those of t; divided by the mean rate they are those of τ₁.
         error = panels.error(tau1) / panels.mean_size + _SHARED_ROUNDING * elapsed
-        apart = float(np.max(np.abs(panels.values / self._mean - panels.borders)))
-        error += _ORDER * np.minimum(elapsed, apart) * float(of_start.sum())
-        error += _ORDER * apart * float(of_rates.sum()) * elapsed
+        # The fastest phase has no part in them where it takes orders that are not there to make up for it.
+        rates = np.abs(self.in_tau1.rates)
+        slow = _HIGHEST * (rates.sum() - rates) >= rates
+        error += _TURN * np.minimum(elapsed, apart) * float(of_start @ slow)
+        error += _TURN * apart * float(of_rates @ slow) * elapsed
         return np.asarray(error)
+
+    def _drift(self) -> float:
+        """Return the range of t/F_0 − τ₁, averaged over stretches of some cycles; zero within one."""
+        borders, values = self.panels.borders, self.panels.values
+        stretches = np.floor(borders * (np.max(np.abs(self.in_tau1.rates)) / _AVERAGED))
+        begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
+        sums = np.add.reduceat(values / self._mean - borders, begins)
+        return float(np.ptp(sums / np.diff(begins, append=borders.size)))
 
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times within the panels."""
