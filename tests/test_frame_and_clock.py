@@ -245,7 +245,7 @@ def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
     found, finer = solve(problem, times), solve(problem, times, digits=25)
     error = np.max(np.abs(found.frame - finer.frame), axis=(1, 2))
     assert np.all(error <= 2 * found.error)
-    assert np.max(found.error) < 2e-11  # half of it what two slow phases make of the rounding of the start
+    assert np.max(found.error) < 1e-11
 
 
 @pytest.mark.parametrize(

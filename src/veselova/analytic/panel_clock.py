@@ -79,23 +79,28 @@ class PanelClock(Clock):
 
         What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
         """
-        elapsed, panels, apart = np.abs(tau1), self.panels, self._drift()
+        elapsed, panels = np.abs(tau1), self.panels
         # The tails are those of t; divided by the mean rate they are those of τ₁.
         error = panels.error(tau1) / panels.mean_size + _SHARED_ROUNDING * elapsed
         # The fastest phase has no part in them where it takes orders that are not there to make up for it.
         rates = np.abs(self.in_tau1.rates)
         slow = _HIGHEST * (rates.sum() - rates) >= rates
-        error += _TURN * np.minimum(elapsed, apart) * float(of_start @ slow)
-        error += _TURN * apart * float(of_rates @ slow) * elapsed
+        if slow.any():
+            error += _TURN * self._drift(tau1) * (float(of_start @ slow) + float(of_rates @ slow) * elapsed)
         return np.asarray(error)
 
-    def _drift(self) -> float:
-        """Return the range of t/F_0 − τ₁, averaged over stretches of some cycles; zero within one."""
+    def _drift(self, tau1: Array) -> Array:
+        """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero and Neumann times, (N,)."""
         borders, values = self.panels.borders, self.panels.values
         stretches = np.floor(borders * (np.max(np.abs(self.in_tau1.rates)) / _AVERAGED))
         begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
-        sums = np.add.reduceat(values / self._mean - borders, begins)
-        return float(np.ptp(sums / np.diff(begins, append=borders.size)))
+        counts = np.diff(begins, append=borders.size)
+        centres, means = (np.add.reduceat(x, begins) / counts for x in (borders, values / self._mean - borders))
+        first = int(np.argmin(np.abs(centres)))
+        gone = np.abs(means - means[first])
+        gone[first:] = np.maximum.accumulate(gone[first:])
+        gone[: first + 1] = np.maximum.accumulate(gone[first::-1])[::-1]
+        return np.asarray(np.interp(tau1, centres, gone))
 
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times within the panels."""
