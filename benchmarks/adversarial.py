@@ -65,8 +65,8 @@ def measured(i: int, seed: int, patience: int) -> tuple[int, str, int, Any]:
         return i, name, n, f"the truth, {type(error).__name__}: {error}"[:150]
     if frame is None:
         return i, name, n, None
-    error = np.max(np.abs(found.frame - frame), axis=(1, 2))
-    return i, name, n, (float(np.max(error)), float(np.max(found.error)), float(np.max(error / found.error)))
+    off = np.max(np.abs(found.frame - frame), axis=(1, 2))
+    return i, name, n, (float(np.max(off)), float(np.max(found.error)), float(np.max(off / found.error)))
 
 
 def true_frame(name: str, problem: vs.Veselova, times: Any, patience: int) -> Any:

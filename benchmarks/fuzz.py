@@ -133,7 +133,7 @@ def followed(model: type[TorusRequest], text: bytes) -> str:
         if isinstance(request, ComparisonRequest) and request.time_count() < 10_000:
             request.time_grid()
         if isinstance(request, SweepRequest):
-            request.request_of(request.total - 1)
+            request.request_of(request.values(request.total - 1))
     except (VeselovaError, Refused) as error:
         document = problem_document(error)
         json.dumps(document).encode()

@@ -26,6 +26,7 @@ from veselova import Veselova, solve
 from veselova.mechanics.reduced_flow import ReducedFlow
 from veselova.numeric import taylor
 from veselova.numeric.dop853 import Dop853
+from veselova.numeric.integrator import Integrator
 from veselova.numeric.solve import _integrate
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -41,7 +42,7 @@ def closed(problem: Veselova) -> np.ndarray:
     return solve(problem, TIMES).frame
 
 
-def _integrated(flow: ReducedFlow, integrator: object) -> np.ndarray:
+def _integrated(flow: ReducedFlow, integrator: Integrator) -> np.ndarray:
     return flow.unpack(_integrate(flow, TIMES / flow.time_unit, integrator))["frame"]
 
 

@@ -81,7 +81,7 @@ def along_orbit(genus: int, count: int) -> str:
     clock = UniformClock(LinearFlow.of(start, rates), 1.0)
     fewest = solution.costs(times).fewest_in_window(32, "panels")
 
-    def evaluation(z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    def evaluation(_: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
 
     began = time.process_time()
