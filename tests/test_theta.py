@@ -65,6 +65,20 @@ def test_waves_and_gaussians_are_the_same_function(genus: int, rng: np.random.Ge
         assert np.allclose(Theta(T, waves).values(z, characteristics), series, rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.parametrize("genus", [1, 2, 3, 4])
+def test_values_at_few_points_are_those_at_many(genus: int, rng: np.random.Generator) -> None:
+    """Few points take all functions at once, many take group after group: with waves, with Gaussians, and with both."""
+    T, z = random_riemann_matrix(rng, genus), rng.uniform(-3, 3, (2000, genus))
+    characteristics = all_characteristics(genus)[:: 1 + genus**2]
+    for waves in (None, (), tuple(range(genus)), (0,)):
+        theta = Theta(T, waves)
+        scale = theta.values(np.zeros((1, genus)), [Characteristic.zero(genus)])[0, 0]
+        many = theta.values(z, characteristics)[:5]
+        assert np.max(np.abs(theta.values(z[:5], characteristics) - many)) < 1e-14 * scale
+        alone = np.concatenate([theta.values(z[:5], [c]) for c in characteristics], axis=1)
+        assert np.max(np.abs(alone - many)) < 1e-14 * scale
+
+
 @pytest.mark.parametrize("genus", [1, 2, 3, 5])
 def test_theta_has_period_one_up_to_the_sign_of_its_characteristic(genus: int, rng: np.random.Generator) -> None:
     theta, z = Theta(random_riemann_matrix(rng, genus)), rng.uniform(-1, 1, (4, genus))

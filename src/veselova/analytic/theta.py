@@ -14,7 +14,7 @@ which the sum is short (analytic.lattice).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, half_of, lattice_points, schur, small_norm
-from veselova.analytic.waves import waves_at
+from veselova.analytic.theta_sums import SIGNS, Blocks, Family, Group, in_blocks
 
 __all__ = ["Theta"]
 
@@ -35,85 +35,11 @@ _VANISHING = -630.0
 #: i^m.
 _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
-#: (−1)^m by m modulo two.
-_SIGNS = np.array([1.0, -1.0])
-
 #: Entries of one block of (points × lattice): temporaries that stay in the cache.
 _BLOCK = 100_000
 
-
-@dataclass(frozen=True)
-class _Family:
-    """M characteristics with the same Gaussians and waves.
-
-    orders (X, |F|): 2x of the waves
-    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
-    """
-
-    orders: NDArray[np.int64]
-    tables: Array
-
-    @property
-    def size(self) -> int:
-        """Return M."""
-        return len(self.tables) // (2 * len(self.orders) if self.orders.shape[1] else 1)
-
-    def of(self, members: list[int]) -> _Family:
-        """Return the family of some members."""
-        lattice = self.tables.shape[1]
-        return _Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
-
-    def sums(self, bells: Array, along: Array) -> Array:
-        """Return the sums without their signs, shape (M, N); ``along`` (W, N): cosines of each x, then sines."""
-        weighted = (self.tables @ bells.T).reshape(-1, *along.shape)
-        return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
-
-
-@dataclass(frozen=True)
-class _Group:
-    """The families with one δ_G, and of all their characteristics:
-
-    places  among those asked for · parities (|G|, M): 2ε_G · signs (M,): of their reduction modulo one, and det T_GG^{−1/2}
-    """
-
-    delta_G: Array
-    families: list[_Family]
-    places: list[int]
-    parities: Array
-    signs: Array
-
-    def of(self, places: Mapping[int, int]) -> _Group | None:
-        """Return the group of the members at some places, the keys, with their new places; None where it has none of them."""
-        kept = [i for i, place in enumerate(self.places) if place in places]
-        if not kept:
-            return None
-        families, first = [], 0
-        for family in self.families:
-            last = first + family.size
-            members = [i - first for i in kept if first <= i < last]
-            families += [family.of(members)] if members else []
-            first = last
-        new = [places[self.places[i]] for i in kept]
-        return _Group(self.delta_G, families, new, self.parities[:, kept], self.signs[kept])
-
-    @cached_property
-    def _orders(self) -> NDArray[np.int64]:
-        return np.concatenate([family.orders for family in self.families])
-
-    @cached_property
-    def _highest(self) -> int:
-        return int(np.max(np.abs(self._orders), initial=0))
-
-    def sums(self, bells: Array, angles: Array) -> Array:
-        """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
-        if not angles.shape[1]:
-            return np.concatenate([family.tables @ bells.T for family in self.families])
-        along, result, first = waves_at(angles, self._orders, self._highest), [], 0
-        for family in self.families:
-            last = first + len(family.orders)
-            result.append(family.sums(bells, along[:, first:last].reshape(-1, len(angles))))
-            first = last
-        return np.concatenate(result)
+#: Products of few points with the tables of all functions at once, which save the calls of one group after the other.
+_FEW = 100_000
 
 
 @dataclass(frozen=True)
@@ -174,8 +100,11 @@ class Theta:
 
         |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
         """
-        result = np.empty((len(characteristics), z.shape[0]))
-        groups, y = self._groups(tuple(characteristics)), self._coordinates.points(z - 2 * np.rint(z / 2))
+        wanted, y = tuple(characteristics), self._coordinates.points(z - 2 * np.rint(z / 2))
+        blocks = self._blocks(wanted)
+        if blocks is not None and len(z) * blocks.tables.size <= _FEW:
+            return blocks.values(*self._bells(y, blocks.shifts))
+        result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)
         block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
         at_once = max(1, block // max(len(z), 1))  # groups, of few points
         for first in range(0, z.shape[0], block):
@@ -184,30 +113,61 @@ class Theta:
                 self._fill(groups[k : k + at_once], y[rows], result[:, rows])
         return result.T
 
-    def _fill(self, groups: list[_Group], y: Array, result: Array) -> None:
+    def _fill(self, groups: list[Group], y: Array, result: Array) -> None:
         """Write the values of some groups at points (N, g) of our coordinates to their places, the rows of the result."""
-        bells, r, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
-        angles = np.pi * (y[:, self._split[0]] - r @ self._parts[1].T)
+        bells, angles, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
         for k, group in enumerate(groups):
             half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
-            signs = group.signs[:, None] * _SIGNS[half_turns & 1]
+            signs = group.signs[:, None] * SIGNS[half_turns & 1]
             result[group.places] = group.sums(bells[k], angles[k]) * signs
 
     def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
-        """Return (e^{−π|k−r|²}, r, n), k on the Gaussian lattice, with y_G + δ_G = n + r reduced to the unit cell around zero.
+        """Return (e^{−π|k−r|²}, π(y_F − Cr), n), k on the Gaussian lattice, with y_G + δ_G = n + r, r in the cell around zero.
 
-        ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |G|) and the same.
+        ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |F|) and (P, N, |G|).
         """
         y_G = y[:, self._split[1]] + shifts[:, None, :]
         nearest = np.rint(y_G)
         r = y_G - nearest
+        angles = np.pi * (y[:, self._split[0]] - r @ self._parts[1].T)
         if r.shape[2] == 0:
-            return np.ones((*y_G.shape[:2], 1)), r, nearest
+            return np.ones((*y_G.shape[:2], 1)), angles, nearest
         constant, linear, quadratic = self._exponents
         exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]
-        return np.exp(np.where(exponents > _VANISHING, exponents, -np.inf)), r, nearest
+        return np.exp(np.where(exponents > _VANISHING, exponents, -np.inf)), angles, nearest
 
-    def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[_Group]:
+    def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks | None:
+        """Return the tables of all characteristics at once; None where those of one point are too large."""
+        if characteristics not in self._blocked:
+            self._blocked[characteristics] = self._side_by_side(characteristics)
+        return self._blocked[characteristics]
+
+    @cached_property
+    def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks | None]:
+        return {}
+
+    def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks | None:
+        (F, G), k, local = self._split, self._gaussian_lattice, self._coordinates.characteristics(characteristics)
+        deltas, crossings = [tuple(c.delta[i] for i in G) for c, _ in local], [self._crossing(c.epsilon) for c, _ in local]
+        shifts, counts = list(dict.fromkeys(deltas)), [len(x) for x, _ in crossings]
+        if 2 * sum(counts) * len(shifts) * len(k) > _FEW:
+            return None
+        blocks, of = np.array([shifts.index(delta) for delta in deltas]), np.repeat(np.arange(len(local)), counts)
+        epsilon, delta = (np.array([c[part] for c, _ in local], dtype=float) for part in (0, 1))
+        x = np.concatenate([x for x, _ in crossings])
+        quarters = np.rint(2 * (x * delta[of][:, F]).sum(axis=1)).astype(int) % 4
+        signs = 1 - 2 * np.mod(k @ epsilon[:, G].T, 2)
+        turned = np.concatenate([table for _, table in crossings], axis=1) * signs[:, of] * _QUARTER_TURNS[quarters]
+        return Blocks(
+            np.array(shifts, dtype=float) / 2,
+            in_blocks(2 * x, blocks[of], len(shifts)),
+            in_blocks(np.concatenate([turned.real, -turned.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
+            np.cumsum([0, *counts[:-1]]),
+            in_blocks(epsilon[:, G], blocks, len(shifts)),
+            self._parts[3] * np.array([[sign] for _, sign in local]),
+        )
+
+    def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         """Return the families by δ_G."""
         if (groups := self._grouped.get(characteristics)) is None:
             wanted = set(characteristics)  # a copy of the known ones: another thread may add to them
@@ -222,20 +182,20 @@ class Theta:
         return groups
 
     @cached_property
-    def _grouped(self) -> dict[tuple[Characteristic, ...], list[_Group]]:
+    def _grouped(self) -> dict[tuple[Characteristic, ...], list[Group]]:
         return {}
 
-    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[int, Characteristic, int]]]) -> _Group:
+    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[int, Characteristic, int]]]) -> Group:
         places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
         families = [self._family([c for _, c, _ in of]) for of in members]
         parities = self._parities(characteristics)
-        return _Group(np.array(delta_G) / 2, families, list(places), parities, self._parts[3] * np.array(signs))
+        return Group(np.array(delta_G) / 2, families, list(places), parities, self._parts[3] * np.array(signs))
 
     def _parities(self, members: Sequence[Characteristic]) -> Array:
         G = self._split[1]
         return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
 
-    def _family(self, members: list[Characteristic]) -> _Family:
+    def _family(self, members: list[Characteristic]) -> Family:
         F = self._split[0]
         tables = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
         x, crossing = self._crossing(members[0].epsilon)
@@ -243,7 +203,7 @@ class Theta:
             quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
             turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
             tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
-        return _Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
+        return Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
 
     def _crossing(self, epsilon: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
         """Return the x of the waves and w_x e^{2πi x·Ck}, shape (K, X); w_x counts x and −x."""
