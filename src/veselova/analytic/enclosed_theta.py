@@ -33,7 +33,7 @@ class EnclosedTheta:
     """The theta functions of T, shape (g, g), balls of ``arithmetic``. What is left out of the sums is estimated, not bounded."""
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
-        self._xp, self._coordinates = arithmetic, Coordinates.cheapest(_symmetric(T))
+        self._xp, self._coordinates = arithmetic, Coordinates.cheapest(_symmetric(T))[0]
         self._T = self._coordinates.form(T)
         self._F, self._G = list(self._coordinates.waves), self._coordinates.gaussians
         self._crossings: dict[tuple[int, ...], tuple[NDArray[np.int64], Values]] = {}

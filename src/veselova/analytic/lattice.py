@@ -52,8 +52,8 @@ class Coordinates:
     waves: tuple[int, ...]
 
     @classmethod
-    def cheapest(cls, T: Array) -> Coordinates:
-        """Return those with the shortest sum, by volume, in which the waves do not cancel: S stays above a floor.
+    def cheapest(cls, T: Array) -> tuple[Coordinates, float]:
+        """Return those with the shortest sum, by volume, in which the waves do not cancel: S stays above a floor; and its cost.
 
         Gaussians are the shortest vectors of a basis reduced in T, or what the shortest of one reduced in T⁻¹ leave.
         """
@@ -62,23 +62,19 @@ class Coordinates:
         choices = []
         for U, counts in ((primal, range(genus + 1)), (dual, range(1, genus))):
             factors = _Factors.of(U @ T @ U.T)
-            choices += [(factors.cost(m), cls(U, tuple(range(m, genus)))) for m in counts]
-        return min(choices, key=lambda choice: choice[0])[1]
+            choices += [(cls(U, tuple(range(m, genus))), factors.cost(m)) for m in counts]
+        return min(choices, key=lambda choice: choice[1])
 
     @classmethod
-    def given(cls, genus: int, waves: tuple[int, ...]) -> Coordinates:
-        """Return those of Z^g itself."""
-        return cls(np.eye(genus, dtype=np.int64), waves)
+    def given(cls, T: Array, waves: tuple[int, ...]) -> tuple[Coordinates, float]:
+        """Return those of Z^g itself, and the cost of their sum; infinite where the waves cancel."""
+        order = [*(i for i in range(len(T)) if i not in waves), *waves]
+        return cls(np.eye(len(T), dtype=np.int64), waves), _Factors.of(T[np.ix_(order, order)]).cost(len(T) - len(waves))
 
     @cached_property
     def gaussians(self) -> list[int]:
         """Return G, the coordinates that are not waves."""
         return [i for i in range(len(self.U)) if i not in self.waves]
-
-    def cost(self, T: Array) -> float:
-        """Return the terms of a value, by volume, with what Gaussians and waves take; infinite where waves cancel."""
-        order = [*self.gaussians, *self.waves]
-        return _Factors.of(np.asarray(self.form(T))[np.ix_(order, order)]).cost(len(self.gaussians))
 
     def form(self, T: Any) -> Any:
         """Return UTUᵀ."""

@@ -185,6 +185,8 @@ def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
 
 
 def _unit(vector: Sequence[Fraction]) -> Array:
+    if len(vector) == 1:
+        return np.array([1.0 if vector[0] > 0 else -1.0])
     largest = max(abs(x) for x in vector)
     scaled = to_float([x / largest for x in vector])
     return np.asarray(scaled / np.linalg.norm(scaled))

@@ -39,7 +39,7 @@ _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 _BLOCK = 100_000
 
 #: Products of few points with the tables of all functions at once, which save the calls of one group after the other.
-_FEW = 100_000
+_FEW = 150_000
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,12 @@ class Theta:
         return int(self.T.shape[0])
 
     @cached_property
+    def _chosen(self) -> tuple[Coordinates, float]:
+        return Coordinates.cheapest(self.T) if self.waves is None else Coordinates.given(self.T, self.waves)
+
+    @property
     def _coordinates(self) -> Coordinates:
-        return Coordinates.cheapest(self.T) if self.waves is None else Coordinates.given(self.genus, self.waves)
+        return self._chosen[0]
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
@@ -82,17 +86,17 @@ class Theta:
     @property
     def cost(self) -> float:
         """Return about the number of lattice terms, without forming them, and what their Gaussians and waves take."""
-        return self._coordinates.cost(self.T)
+        return self._chosen[1]
 
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        return int(self._gaussian_lattice.shape[0] * self._crossing((0,) * self.genus)[0].shape[0])
+        return int(self._gaussian_lattice.shape[0] * self._crossing((0,) * len(self._split[0]))[0].shape[0])
 
-    def _wave_lattice(self, epsilon: tuple[int, ...]) -> Array:
+    def _wave_lattice(self, epsilon_F: tuple[int, ...]) -> Array:
         """Return one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all of them small."""
         S = self._parts[0]
-        shift = np.array([epsilon[i] / 2 for i in self._split[0]])
+        shift = np.array(epsilon_F) / 2
         return np.asarray(half_of(lattice_points(S, np.sqrt(RADIUS**2 + small_norm(S, shift)), shift)))
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
@@ -101,8 +105,8 @@ class Theta:
         |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
         """
         wanted, y = tuple(characteristics), self._coordinates.points(z - 2 * np.rint(z / 2))
-        blocks = self._blocks(wanted)
-        if blocks is not None and len(z) * blocks.tables.size <= _FEW:
+        if len(z) * len(wanted) * self._size_in_blocks <= _FEW:
+            blocks = self._blocks(wanted)
             return blocks.values(*self._bells(y, blocks.shifts))
         result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)
         block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
@@ -136,22 +140,32 @@ class Theta:
         exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]
         return np.exp(np.where(exponents > _VANISHING, exponents, -np.inf)), angles, nearest
 
-    def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks | None:
-        """Return the tables of all characteristics at once; None where those of one point are too large."""
-        if characteristics not in self._blocked:
-            self._blocked[characteristics] = self._side_by_side(characteristics)
-        return self._blocked[characteristics]
+    @cached_property
+    def _size_in_blocks(self) -> int:
+        """Return about how many entries the tables of all characteristics at once have for each."""
+        return int(2 * self.size * 2 ** len(self._split[1]))
+
+    def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
+        """Return the tables of all characteristics at once."""
+        if (blocks := self._blocked.get(characteristics)) is None:
+            wanted = set(characteristics)
+            more = next((known for known in list(self._blocked) if wanted <= set(known)), None)
+            if more is None:
+                blocks = self._side_by_side(characteristics)
+            else:
+                blocks = self._blocked[more].of([more.index(c) for c in characteristics])
+            self._blocked[characteristics] = blocks
+        return blocks
 
     @cached_property
-    def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks | None]:
+    def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks]:
         return {}
 
-    def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks | None:
+    def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         (F, G), k, local = self._split, self._gaussian_lattice, self._coordinates.characteristics(characteristics)
-        deltas, crossings = [tuple(c.delta[i] for i in G) for c, _ in local], [self._crossing(c.epsilon) for c, _ in local]
+        deltas, of_waves = ([tuple(c[part][i] for i in places) for c, _ in local] for part, places in ((1, G), (0, F)))
+        crossings = [self._crossing(epsilon_F) for epsilon_F in of_waves]
         shifts, counts = list(dict.fromkeys(deltas)), [len(x) for x, _ in crossings]
-        if 2 * sum(counts) * len(shifts) * len(k) > _FEW:
-            return None
         blocks, of = np.array([shifts.index(delta) for delta in deltas]), np.repeat(np.arange(len(local)), counts)
         epsilon, delta = (np.array([c[part] for c, _ in local], dtype=float) for part in (0, 1))
         x = np.concatenate([x for x, _ in crossings])
@@ -198,18 +212,17 @@ class Theta:
     def _family(self, members: list[Characteristic]) -> Family:
         F = self._split[0]
         tables = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
-        x, crossing = self._crossing(members[0].epsilon)
+        x, crossing = self._crossing(tuple(members[0].epsilon[i] for i in F))
         if F:
             quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
             turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
             tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
         return Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
 
-    def _crossing(self, epsilon: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
+    def _crossing(self, epsilon_F: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
         """Return the x of the waves and w_x e^{2πi x·Ck}, shape (K, X); w_x counts x and −x."""
-        epsilon_F = tuple(epsilon[i] for i in self._split[0])
         if epsilon_F not in self._crossings:
-            x, (S, C, _, _) = self._wave_lattice(epsilon), self._parts
+            x, (S, C, _, _) = self._wave_lattice(epsilon_F), self._parts
             weights = np.where(np.any(x != 0, axis=1), 2.0, 1.0) * np.exp(-np.pi * np.sum((x @ S) * x, axis=1))
             self._crossings[epsilon_F] = x, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
         return self._crossings[epsilon_F]

@@ -111,6 +111,16 @@ class Blocks:
     parities: Array
     signs: Array
 
+    def of(self, members: list[int]) -> Blocks:
+        """Return the tables of some members."""
+        ends = np.append(self.firsts, len(self.orders))
+        counts = np.diff(ends)[members]
+        waves = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in members])
+        tables = np.concatenate([part[waves] for part in np.split(self.tables, 2)])
+        return Blocks(
+            self.shifts, self.orders[waves], tables, np.cumsum(counts) - counts, self.parities[members], self.signs[members]
+        )
+
     def values(self, bells: Array, angles: Array, nearest: Array) -> Array:
         """Return the theta functions, (N, M), from (P, N, K), (P, N, |F|) and (P, N, |G|): see ``Theta``."""
         phases, terms = self.orders @ _stacked(angles), self.tables @ _stacked(bells)
