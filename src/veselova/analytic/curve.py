@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +13,9 @@ from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
 __all__ = ["BranchPoint", "Curve", "Layout"]
+
+#: Layouts that are kept, and the most branch points of such.
+_MOST_KEPT, _LARGEST_KEPT = 64, 33
 
 
 @dataclass(frozen=True)
@@ -82,19 +85,7 @@ class Curve:
 
     @cached_property
     def _layouts(self) -> dict[Literal["I", "c"], Layout]:
-        return {"I": self._layout("I"), "c": self._layout("c")}
-
-    def _layout(self, kind: Literal["I", "c"]) -> Layout:
-        count = self.genus + 1 if kind == "I" else self.genus
-        places, ends = [self.place[kind, index] for index in range(count)], list[tuple[int, int, int]]()
-        for k, j in enumerate(places):
-            if j > 0:
-                other = self.origins[j + 1 if j % 2 == 1 else j - 1]
-                ends.append((k, self.cut_of(j) - 1, other.index if other.kind == kind else -1))
-        cuts, inner = np.arange(self.genus)[:, None], np.arange(1, self.genus)
-        beyond = np.where(cuts < np.arange(count), cuts, cuts + 1)
-        sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
-        return Layout(np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner), tuple(ends))
+        return (_kept_layouts if len(self.origins) <= _LARGEST_KEPT else _layouts)(self.origins)
 
     def root_stretches(self, kind: Literal["I", "c"]) -> Values:
         """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m); one where there is none."""
@@ -119,7 +110,7 @@ class Curve:
 
     def cut_of(self, j: Any) -> Any:
         """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for b_0, which ends none."""
-        return (j + 1) // 2
+        return _cut_of(j)
 
     @cached_property
     def midpoints(self) -> Values:
@@ -140,3 +131,27 @@ class Curve:
             for j in range(first, 2 * self.genus, 2)
         ]
         return min(ratios, default=1.0)
+
+
+def _cut_of(j: Any) -> Any:
+    return (j + 1) // 2
+
+
+def _layouts(origins: tuple[BranchPoint, ...]) -> dict[Literal["I", "c"], Layout]:
+    return {"I": _layout(origins, "I"), "c": _layout(origins, "c")}
+
+
+_kept_layouts = lru_cache(_MOST_KEPT)(_layouts)
+
+
+def _layout(origins: tuple[BranchPoint, ...], kind: Literal["I", "c"]) -> Layout:
+    genus, place = (len(origins) - 1) // 2, {origin.index: j for j, origin in enumerate(origins) if origin.kind == kind}
+    places, ends = [place[index] for index in range(len(place))], list[tuple[int, int, int]]()
+    for k, j in enumerate(places):
+        if j > 0:
+            other = origins[j + 1 if j % 2 == 1 else j - 1]
+            ends.append((k, _cut_of(j) - 1, other.index if other.kind == kind else -1))
+    cuts, inner = np.arange(genus)[:, None], np.arange(1, genus)
+    beyond = np.where(cuts < np.arange(len(places)), cuts, cuts + 1)
+    sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
+    return Layout(np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner), tuple(ends))

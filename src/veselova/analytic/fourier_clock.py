@@ -161,8 +161,8 @@ class FourierClock(Clock):
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0; large modes come first."""
-        uniform, delta = self._in_time.advance(times), np.zeros_like(times)
-        reach, least = np.full_like(times, self._reach), _LEAST_SLOPE * self._mean
+        uniform, delta = self._in_time.advance(times), np.zeros(times.size)
+        reach, least = np.full(times.size, self._reach), _LEAST_SLOPE * self._mean
 
         def excess(delta: Array, rows: Rows, size: int = self.size) -> tuple[Array, Array]:
             value, slope, a, b = self._periodic(uniform[rows] + delta[:, None] * self._in_tau1.rates, size)

@@ -93,6 +93,8 @@ class PanelClock(Clock):
         """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero and Neumann times, (N,)."""
         borders, values = self.panels.borders, self.panels.values
         stretches = np.floor(borders * (np.max(np.abs(self.in_tau1.rates)) / _AVERAGED))
+        if stretches[0] == stretches[-1]:
+            return np.zeros(tau1.size)
         begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
         counts = np.diff(begins, append=borders.size)
         centres, means = (np.add.reduceat(x, begins) / counts for x in (borders, values / self._mean - borders))

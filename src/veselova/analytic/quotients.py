@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
+from veselova.analytic.curve import BranchPoint
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.frame import Attitude, Frame, slopes
 from veselova.analytic.precision import DOUBLE
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 #: Terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
 _MOST_TERMS = 2.5e8
 _LARGEST_GENUS = 18
+
+#: Orders of branch points of which the characteristics are kept.
+_MOST_KEPT = 64
 
 
 @dataclass(frozen=True)
@@ -57,24 +61,20 @@ class ThetaQuotients:
             raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
         return cls(theta, frame)
 
-    @cached_property
-    def _characteristics(self) -> list[Characteristic]:
-        """Return those of q_1 … q_n, then of v_k, then of (n_k)_i with i before k; k runs over c_2 … c_{n−1}, c_1."""
-        curve = self.frame.periods.curve
-        g = curve.genus
-        of_I = [Characteristic.of_branch_point(curve.place["I", i], g) for i in range(g + 1)]
-        of_c = [Characteristic.of_branch_point(curve.place["c", k], g) for k in [*range(1, g), 0]]
-        return [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
-
-    @cached_property
-    def functions(self) -> list[Characteristic]:
+    @property
+    def functions(self) -> tuple[Characteristic, ...]:
         """Return the characteristics of all functions once: that of the denominator, then those of the numerators."""
-        return [Characteristic.zero(self.theta.genus), *sorted(set(self._characteristics))]
+        return self._functions[0]
+
+    @property
+    def places(self) -> NDArray[np.intp]:
+        """Return where among the functions the numerator of each constant κ stands: of q_1 … q_n, of v_k, and of (n_k)_i with i
+        before k; k runs over c_2 … c_{n−1}, c_1."""
+        return self._functions[1]
 
     @cached_property
-    def places(self) -> NDArray[np.intp]:
-        """Return where among the functions the numerator of each constant κ stands."""
-        return np.array([self.functions.index(c, 1) for c in self._characteristics])
+    def _functions(self) -> tuple[tuple[Characteristic, ...], NDArray[np.intp]]:
+        return _functions(self.frame.periods.curve.origins)
 
     def _raw(self, values: Array) -> Array:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g), from values of the functions."""
@@ -109,7 +109,7 @@ class ThetaQuotients:
         """Return q along sorted axes at points z of shape (N, g), modulo 2."""
         n = self.theta.genus + 1
         constants = self.constants[:n]  # first: it makes the tables of all functions, of which those of q are rows
-        values = self.theta.values(z, [Characteristic.zero(self.theta.genus), *self._characteristics[:n]])
+        values = self.theta.values(z, [self.functions[i] for i in (0, *self.places[:n].tolist())])
         return np.asarray(values[:, 1:] / values[:, :1] * constants)
 
     def slopes(self, z: Array) -> Array:
@@ -127,3 +127,16 @@ class ThetaQuotients:
         g = self.theta.genus
         n = g + 1
         return Attitude(entries[:, :n], entries[:, n + g :].reshape(-1, n, g), entries[:, n : n + g], np.empty((len(values), 0)))
+
+
+@lru_cache(_MOST_KEPT)
+def _functions(origins: tuple[BranchPoint, ...]) -> tuple[tuple[Characteristic, ...], NDArray[np.intp]]:
+    """Return ``ThetaQuotients.functions`` and ``places`` for branch points in this order."""
+    genus, place = (len(origins) - 1) // 2, {origin: j for j, origin in enumerate(origins)}
+    of_I = [Characteristic.of_branch_point(place[BranchPoint("I", i)], genus) for i in range(genus + 1)]
+    of_c = [Characteristic.of_branch_point(place[BranchPoint("c", k)], genus) for k in [*range(1, genus), 0]]
+    numerators = [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
+    functions = (Characteristic.zero(genus), *sorted(set(numerators)))
+    places = np.array([functions.index(c, 1) for c in numerators])
+    places.setflags(write=False)
+    return functions, places
