@@ -86,9 +86,9 @@ class Balls(Arithmetic):
         _global.release()
 
     def number(self, value: Any) -> Any:
-        """Return a ball that holds a rational, float or mpmath number (these two are exact), or the given ball."""
-        if isinstance(value, Fraction):
-            return flint.arb(flint.fmpq(value.numerator, value.denominator))
+        """Return a ball that holds a rational, decimal, float or mpmath number (these two are exact), or the given ball."""
+        if isinstance(value, (Fraction, Decimal)):
+            return flint.arb(flint.fmpq(*value.as_integer_ratio()))
         if isinstance(value, np.generic):
             value = value.item()
         if hasattr(value, "man_exp") and not isinstance(value, flint.arb):  # an mpf

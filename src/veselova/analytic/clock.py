@@ -21,7 +21,7 @@ from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.periods import Periods
-from veselova.analytic.precision import Arithmetic, Values
+from veselova.analytic.precision import Arithmetic, Decimals, Values
 from veselova.analytic.spectrum import Spectrum
 
 __all__ = ["Clock", "ClockRate", "Rate", "clock_rate", "rate_factor"]
@@ -96,9 +96,11 @@ class ClockRate(Rate[Periods]):
         """Return the rate whose scale follows from its value at the start."""
         curve, fine = inversion.periods.curve, spectrum.arithmetic
         product = fine.number(1)
-        for s, point in enumerate(spectrum.spheroconic):
-            product = product * rate_factor(curve, s, point, time, fine)
-        return cls(inversion, inversion.arithmetic.number(1 / (spectrum.clock_rate * product)), time)
+        with spectrum.working():
+            for s, point in enumerate(spectrum.spheroconic):
+                product = product * rate_factor(curve, s, point, time, fine)
+            scale = 1 / (spectrum.clock_rate * product)
+        return cls(inversion, inversion.arithmetic.number(scale), time)
 
     def at(self, psi: Values) -> Values:
         """Return dt/dτ₁ at angles of shape (N, g)."""
@@ -130,20 +132,21 @@ class ClockRate(Rate[Periods]):
         return np.asarray(sign * forms * self._factor(s, below)[..., None, :])
 
 
-def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
+def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic | Decimals) -> Any:
     """Return φ(λ_s) for the cut s = 0…g−1."""
     if time == "t":
         return arithmetic.sqrt(point / _number(curve.point(2 * s + 2), arithmetic))
     return _number(curve.point(2 * s + 1), arithmetic) / point if time == "s" else 1 + 0 * point
 
 
-def _number(value: Any, arithmetic: Arithmetic) -> Any:
+def _number(value: Any, arithmetic: Arithmetic | Decimals) -> Any:
     return value if isinstance(value, np.ndarray) else arithmetic.number(value)
 
 
 def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:
     """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving directions."""
-    start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
+    with spectrum.working():
+        start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
     size, at_start = (start * start) @ A, arithmetic.number(spectrum.clock_rate)
 
     def rate(q: Values) -> Values:

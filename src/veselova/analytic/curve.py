@@ -63,7 +63,8 @@ class Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
         rows, columns = np.triu_indices(points.size, 1)
-        upwards = arithmetic.array(points[columns] - points[rows])
+        with spectrum.working():
+            upwards = arithmetic.array(points[columns] - points[rows])
         differences = np.full((points.size, points.size), arithmetic.number(0))
         differences[rows, columns], differences[columns, rows] = upwards, -upwards
         origins = tuple(BranchPoint(kind, index) for _, kind, index in spectrum.branch_points)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -19,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from veselova.analytic.precision import Arithmetic, Decimals, Values, extended
+from veselova.analytic.precision import Arithmetic, Decimals, Values
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction
@@ -42,13 +43,13 @@ _MOST_ROUNDS = 4
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I.
+    """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate ``with spectrum.working()``.
 
     inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime = dq/dτ₁
     constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · clock_rate dτ₁/d(time) there
     """
 
-    arithmetic: Arithmetic
+    arithmetic: Arithmetic | Decimals
     inverse: Values
     q: Values
     q_prime: Values
@@ -56,15 +57,16 @@ class Spectrum:
     spheroconic: Values
     clock_rate: Any
 
-    @classmethod
-    def of(cls, arithmetic: Arithmetic, values: _InDecimals) -> Spectrum:
-        """Return the spectrum with its values, in the order above, taken into an arithmetic."""
-        inverse, q, q_prime, constants, spheroconic = map(arithmetic.array, values[:5])
-        return cls(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(values[5]))
-
     def in_arithmetic(self, arithmetic: Arithmetic) -> Spectrum:
         """Return the spectrum in another arithmetic."""
-        return Spectrum.of(arithmetic, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic, self.clock_rate))
+        values = map(arithmetic.array, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic))
+        inverse, q, q_prime, constants, spheroconic = values
+        return Spectrum(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(self.clock_rate))
+
+    def working(self) -> AbstractContextManager[object]:
+        """Return the context in which operators keep the digits of decimals; other numbers keep theirs by themselves, or in that
+        of their arithmetic."""
+        return Decimals(self.arithmetic.digits) if isinstance(self.arithmetic, Decimals) else nullcontext()
 
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
@@ -77,7 +79,8 @@ class Spectrum:
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
         points = [value for value, _, _ in self.branch_points]
-        return [b - a for a, b in itertools.pairwise(points)]
+        with self.working():
+            return [b - a for a, b in itertools.pairwise(points)]
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
     separatrices, hidden = set[int](), set[int]()
     while True:
         found = spectrum(moving, digits, coinciding)
-        threshold = found.arithmetic.number(10) ** -coinciding
+        threshold = Decimal((0, (1,), -coinciding))
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | hidden)))
@@ -134,7 +137,7 @@ def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectr
         known = narrowest >= Decimal((0, (1,), _SPARE - working))  # otherwise nothing can be said of it but that it is small
         needed = wanted - narrowest.adjusted() if known else 2 * working
         if found is not None and working >= min(needed, most):
-            return Spectrum.of(extended(working), found)
+            return Spectrum(Decimals(working), *found)
         if working > _MOST_ROUNDS * most:
             raise InternalContradiction("the spectra do not settle")
         working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
@@ -184,7 +187,7 @@ def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
             return None
         else:
             constants = [Decimal(0), *constants]
-    return inverse, q, v, constants, spheroconic, rate
+        return inverse, q, v, xp.array(constants), spheroconic, rate
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:

@@ -31,11 +31,11 @@ def start(spectrum: Spectrum, curve: Curve, enclosed: Spectrum | None = None) ->
     """
     numbers = spectrum if enclosed is None else enclosed
     ends = [value for value, _, _ in numbers.branch_points]
-    increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
-    angles = [
-        Interval(curve, 2 * s + 1).points.angle(x - ends[2 * s + 1], ends[2 * s + 2] - x, increasing[s])
-        for s, x in enumerate(numbers.spheroconic)
-    ]
+    with spectrum.working():
+        increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
+    with numbers.working():
+        distances = [(x - ends[2 * s + 1], ends[2 * s + 2] - x) for s, x in enumerate(numbers.spheroconic)]
+    angles = [Interval(curve, 2 * s + 1).points.angle(*distances[s], up) for s, up in enumerate(increasing)]
     signs = []
     for i, (position, velocity) in enumerate(zip(spectrum.q, spectrum.q_prime, strict=True)):
         b = curve.place["I", i]
