@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pickle
+from dataclasses import replace
 from decimal import ROUND_DOWN, Context, Decimal, Inexact, localcontext
 from fractions import Fraction
 from pathlib import Path
@@ -252,16 +254,41 @@ def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generat
 
 def test_the_decimal_context_of_the_caller_plays_no_part() -> None:
     context = Context(prec=3, rounding=ROUND_DOWN, Emin=-9, Emax=9, traps=[Inexact])
-    expected = vs.solve(body3(), [1, 2], digits=30).decimals
+    expected, frame = made(vs.solve(body3(), [1, 2], digits=30)), vs.solve(body3(), [1, 2]).frame
     with localcontext(context):
-        frame = vs.solve(body3(), [1, 2]).frame
-        found = vs.solve(body3(), [1, 2], digits=30).decimals
-    assert np.array_equal(frame, vs.solve(body3(), [1, 2]).frame)
-    assert found is not None
-    assert expected is not None
+        assert np.array_equal(vs.solve(body3(), [1, 2]).frame, frame)
+        found = made(vs.solve(body3(), [1, 2], digits=30))
+    assert_same(found, expected)
+
+
+def made(trajectory: vs.Trajectory) -> Decimals:
+    """The decimals of a trajectory, all of them made: that is done when they are asked for."""
+    assert trajectory.decimals is not None
+    return replace(trajectory.decimals, midpoints=dict(trajectory.decimals.midpoints), radii=dict(trajectory.decimals.radii))
+
+
+def assert_same(found: Decimals, expected: Decimals) -> None:
+    assert list(found.radii) == list(expected.radii) == list(expected.midpoints)
     for name, radii in expected.radii.items():
         assert np.array_equal(found.midpoints[name], expected.midpoints[name]), name
         assert np.array_equal(found.radii[name], radii), name
+
+
+def test_decimals_made_later_are_those_made_at_once() -> None:
+    """Whatever became of Arb's global precision, in pickles too, and doubles are the nearest to them."""
+    trajectory = vs.solve(body3(), [-1, 0, 2], digits=40)
+    kept, expected = pickle.loads(pickle.dumps(trajectory)), made(trajectory)
+    later, before = vs.solve(body3(), [-1, 0, 2], digits=40), flint.ctx.prec
+    try:
+        flint.ctx.prec = 20
+        assert_same(made(later), expected)
+    finally:
+        flint.ctx.prec = before
+    assert_same(kept.decimals, expected)
+    assert np.array_equal(kept.error, trajectory.error)
+    assert max(expected.error) < Decimal("1e-40")
+    for name in ("q_dot", "frame", "tau1"):
+        assert np.array_equal(trajectory.arrays[name], expected.midpoints[name].astype(float)), name
 
 
 def test_decimals_turn_into_numbers_of_both_libraries() -> None:

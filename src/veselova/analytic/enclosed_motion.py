@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.precision import Values
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
-from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
+from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals, Later, Pair
 from veselova.mechanics.errors import InvalidInput, Unsolved
 from veselova.mechanics.times import exact_times
 from veselova.mechanics.trajectory import Provenance, Trajectory
@@ -78,14 +79,14 @@ class EnclosedMotion:
             working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
-                decimals, details = self._attempt(solution, method, working, exact, clock, reach)
+                found, details = self._attempt(solution, method, working, exact, clock, reach)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
                 continue
-            missing = self._missing(decimals, working)
+            missing = found.missing(self.digits, working)
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
-                return self._trajectory(method, grid, decimals, details, began)
+                return self._trajectory(method, grid, found, details, began)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
 
@@ -99,36 +100,22 @@ class EnclosedMotion:
     def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:
         working = 2 * self.digits + _SPARE
         with balls(working, self.certified) as xp:
-            decimals = self._decimals(resting_series(self.problem, grid.size, xp), xp)
+            found = _Found.of(resting_series(self.problem, grid.size, xp), xp)
         details = {"regime": "rest", "working_digits": working, "certified": self.certified}
-        return self._trajectory("rest", grid, decimals, details, began)
+        return self._trajectory("rest", grid, found, details, began)
 
     def _trajectory(
-        self, method: str, grid: NDArray[np.float64], decimals: Decimals, details: Mapping[str, Any], began: float
+        self, method: str, grid: NDArray[np.float64], found: _Found, details: Mapping[str, Any], began: float
     ) -> Trajectory:
+        decimals = found.decimals(self.digits, self.certified)
+        arrays = {name: found.rounded(name) for name in self.problem.outputs if name not in self.problem.derived}
+        error = np.nextafter(np.max(found.spread.astype(np.float64), axis=1), np.inf) + np.finfo(float).eps / 2
         provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
-        return Trajectory.of_decimals(self.problem, grid, decimals, provenance, self)
-
-    def _decimals(self, series: Mapping[str, Values], xp: Balls) -> Decimals:
-        """Return the decimals; q is the first column of the frame, and ω is skew: its upper half is converted."""
-        digits, upper = self.digits + _SHOWN, np.triu_indices(self.problem.n, 1)
-        pairs = {name: xp.decimals(series[name], digits) for name in series if name not in ("q", "omega")}
-        (frame, spread), (omega, slack) = pairs["frame"], xp.decimals(series["omega"][:, *upper], digits)
-        pairs["q"] = frame[:, :, 0], spread[:, :, 0]
-        pairs["omega"] = _square(omega, np.asarray(_negative(omega)), upper), _square(slack, slack, upper)
-        midpoints, radii = ({name: pairs[name][i] for name in series} for i in (0, 1))
-        return Decimals(self.digits, self.certified, midpoints, radii)
-
-    def _missing(self, decimals: Decimals, working: int) -> int:
-        """Return how many digits the largest error is above the one asked for."""
-        largest = max(decimals.error)
-        if not largest.is_finite():
-            return working
-        return self.digits + largest.adjusted() + 1 if largest else 0
+        return Trajectory(self.problem, grid, error, arrays, provenance, self, decimals)
 
     def _attempt(
         self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock, reach: float
-    ) -> tuple[Decimals, Any]:
+    ) -> tuple[_Found, Any]:
         solution = EnclosedSolution(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
             series, details = solution.series(xp.array(exact), clock)
@@ -136,7 +123,52 @@ class EnclosedMotion:
                 neighbour = EnclosedSolution(coarse, working, self.certified, method, distance=-solution.distance)
                 other, _ = neighbour.series(xp.array(exact), clock)
                 series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
-            return self._decimals(series, xp), details
+            return _Found.of(series, xp), details
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The series in balls of an arithmetic, and the radii of the frame, (N, n²)."""
+
+    balls: Balls
+    series: Mapping[str, Values]
+    spread: Values
+
+    @classmethod
+    def of(cls, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
+        """Return the series with their radii; call it ``with`` the arithmetic."""
+        frame = series["frame"].reshape(len(series["frame"]), -1)
+        return cls(arithmetic, series, arithmetic.at_most(frame - arithmetic.midpoints(frame)))
+
+    def missing(self, digits: int, working: int) -> int:
+        """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
+        if not all(radius.is_finite() for radius in self.spread.ravel()):
+            return working
+        with self.balls as xp:
+            (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
+        return digits + int(largest.adjusted()) + 1
+
+    def rounded(self, name: str) -> NDArray[np.float64]:
+        """Return the doubles nearest to the midpoints of a series."""
+        return self.series[name].astype(np.float64)
+
+    def decimals(self, digits: int, certified: bool) -> Decimals:
+        """Return the decimals, made when they are asked for; q is the first column of the frame."""
+        shown = digits + _SHOWN
+        pairs: dict[str, Pair | Callable[[], Pair]] = {
+            name: partial(self.balls.decimals, values, shown) for name, values in self.series.items()
+        }
+        midpoints, radii = Later(pairs, 0), Later(pairs, 1)
+        pairs["q"] = lambda: (midpoints["frame"][:, :, 0], radii["frame"][:, :, 0])
+        pairs["omega"] = partial(_skew, self.balls, self.series["omega"], shown)
+        return Decimals(digits, certified, midpoints, radii)
+
+
+def _skew(arithmetic: Balls, omega: Values, digits: int) -> Pair:
+    """Return the decimals of skew matrices (N, n, n), of which the upper half is converted."""
+    upper = np.triu_indices(omega.shape[1], 1)
+    above, slack = arithmetic.decimals(omega[:, *upper], digits)
+    return _square(above, np.asarray(_negative(above)), upper), _square(slack, slack, upper)
 
 
 def _square(above: Values, below: Values, upper: tuple[Values, Values]) -> Values:

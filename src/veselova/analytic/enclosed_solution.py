@@ -146,12 +146,16 @@ class EnclosedSolution:
             windows = EnclosedWindows.worth_while(times, cycles, sampled, self.arithmetic)
         while windows is not None:
             tau1, attitude, details = self._evaluated(windows.times, coarse)
-            table = [tau1, attitude.q, attitude.components, attitude.normals.reshape(len(tau1), -1)]
+            normals = attitude.normals if size != 3 else attitude.normals[:, :, :1]  # γ = ±q×n_2
+            table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
             found = windows.at(times, np.column_stack(table))
             if found is not None:
-                q, components, normals = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
-                attitude = Attitude(q, normals.reshape(len(times), size, -1), components, found[:, :0])
-                return found[:, 0], attitude, details
+                q, components, rest = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
+                normals = rest.reshape(len(times), size, -1)
+                if size == 3:
+                    handed = _across(attitude.q[:1], attitude.normals[:1, :, 0]) @ attitude.normals[0, :, 1]
+                    normals = np.stack([rest, _across(q, rest) * (1 if handed[0] > 0 else -1)], axis=2)
+                return found[:, 0], Attitude(q, normals, components, found[:, :0]), details
             windows = windows.finer()
         return self._evaluated(times, coarse)
 
@@ -237,6 +241,11 @@ class EnclosedSolution:
         if not self.moving.frozen:
             return 0
         return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
+
+
+def _across(a: Values, b: Values) -> Values:
+    """Return the vector products of vectors (N, 3)."""
+    return np.asarray(a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]])
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:

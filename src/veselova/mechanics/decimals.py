@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import BackendMissing
 
-__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "beyond_double", "decimals_of"]
+__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "Later", "Pair", "beyond_double", "decimals_of"]
 
 Objects = NDArray[np.object_]
+
+#: Midpoints and radii of one series.
+Pair: TypeAlias = tuple[Objects, Objects]
 
 #: Digits that can be asked for; the fewest are those of double precision.
 FEWEST_DIGITS, MOST_DIGITS = 15, 1000
@@ -36,12 +39,38 @@ def decimals_of(texts: Any) -> Objects:
     return np.asarray(np.vectorize(Decimal, otypes=[object])(np.asarray(texts, dtype=object)))
 
 
+class Later(Mapping[str, Objects]):
+    """The midpoints (side 0) or radii (side 1) of series that become decimals when they are first asked for, both together.
+
+    pairs: by name, what makes the pair; both sides share it, and it is replaced by what it made
+    """
+
+    def __init__(self, pairs: dict[str, Pair | Callable[[], Pair]], side: int) -> None:
+        self._pairs, self._side = pairs, side
+
+    def __getitem__(self, name: str) -> Objects:
+        pair = self._pairs[name]
+        if not isinstance(pair, tuple):
+            pair = self._pairs[name] = pair()
+        return pair[self._side]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._pairs)
+
+    def __len__(self) -> int:
+        return len(self._pairs)
+
+    def __reduce__(self) -> tuple[type, tuple[dict[str, Objects]]]:
+        return dict, (dict(self),)
+
+
 @dataclass(frozen=True, repr=False)
 class Decimals:
     """The series of a trajectory to more digits than a double has, or with certified errors.
 
-    midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape; the exact value lies within
-    midpoint ± radius, proven where ``certified``, and otherwise to the honesty of all our error estimates.
+    midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape, which may be made when they
+    are first asked for; the exact value lies within midpoint ± radius, proven where ``certified``, and otherwise to the honesty
+    of all our error estimates.
     error (N,) the largest radius of q and frame at each time
     """
 
