@@ -52,7 +52,8 @@ def main(most: int) -> None:
         assert finer.decimals is not None
         difference = np.max(np.abs(found.decimals.midpoints["frame"] - finer.decimals.midpoints["frame"]))
         details, span = found.provenance.details, f"{times.size} to {times[-1]:g}"
-        figures = f"{'   '.join(f'{x:7.2f}' for x in seconds)}   {details['working_digits']:7d}   {details['clock']:8s}   {details['clock_size']:11d}"
+        spent = "   ".join(f"{x:7.2f}" for x in seconds)
+        figures = f"{spent}   {details['working_digits']:7d}   {details['clock']:8s}   {details['clock_size']:11d}"
         errors = f"{max(found.decimals.error):8.1e}   {difference:8.1e}"
         print(f"{n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
 

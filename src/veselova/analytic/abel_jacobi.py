@@ -178,7 +178,7 @@ class AbelJacobi(Generic[P]):
             inverses = _inverses(slopes, working)
             rest = _applied(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
         step = rest - _applied(inverses, excess)
-        if not xp.inside(step, reach):
+        if not xp.inside(step, reach).all():
             raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
         return np.asarray(psi + step)
 

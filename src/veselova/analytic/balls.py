@@ -144,9 +144,9 @@ class Balls(Arithmetic):
         """Return exact lower bounds of positive values."""
         return np.asarray(_lower(values))
 
-    def inside(self, inner: Values, outer: Values) -> bool:
-        """Return whether every ball lies in the interior of its partner."""
-        return all(b.contains_interior(a) for a, b in zip(inner.ravel(), outer.ravel(), strict=True))
+    def inside(self, inner: Values, outer: Values) -> Values:
+        """Return which balls lie in the interior of their partners."""
+        return np.asarray(_contained(inner, outer), dtype=bool)
 
     def midpoints(self, values: Values) -> Values:
         """Return the exact midpoints."""
@@ -253,6 +253,7 @@ class _Series:
 
 
 _lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
+_contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
 _upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
 _turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
 _conjugate = np.frompyfunc(lambda w: w.conjugate(), 1, 1)

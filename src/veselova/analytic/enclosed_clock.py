@@ -212,7 +212,7 @@ class _Panels:
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
         value, rate = clock(x, xp.digits)
         reach = xp.around_zero((value - times) / (_SLOPE * rate))
-        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * xp.at_least(rate))):
+        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * xp.at_least(rate))).all():
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
         # The root is x less the residual over a slope between the two.
         return np.asarray(x - (value - times) / xp.widened(rate, reach * self._steepness[p]))

@@ -59,7 +59,7 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     """
     room = _ROOM * (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
     found, around = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
-    for row in [row for row in range(len(q)) if not xp.inside(found[row], around[row])]:
+    for row in np.flatnonzero(~xp.inside(found, around).all(axis=1)).tolist():
         poles = [xp.rational(x) for x in inverse]
         middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
         found[row] = xp.widened(xp.array(middle), room[row] / _ROOM)
