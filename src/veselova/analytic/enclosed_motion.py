@@ -50,6 +50,9 @@ _SHOWN = 3
 #: −x to the last digit, whatever the caller's context of decimals.
 _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 
+#: Radii of balls, exact: infinite where nothing is known of a number, and never undefined.
+_radii = np.frompyfunc(lambda x: x.rad(), 1, 1)
+
 
 @dataclass(frozen=True)
 class EnclosedMotion:
@@ -109,7 +112,7 @@ class EnclosedMotion:
     ) -> Trajectory:
         decimals = found.decimals(self.digits, self.certified)
         arrays = {name: found.rounded(name) for name in self.problem.outputs if name not in self.problem.derived}
-        error = np.nextafter(np.max(found.spread.astype(np.float64), axis=1), np.inf) + np.finfo(float).eps / 2
+        error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
         provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
         return Trajectory(self.problem, grid, error, arrays, provenance, self, decimals)
 
@@ -128,7 +131,7 @@ class EnclosedMotion:
 
 @dataclass(frozen=True)
 class _Found:
-    """The series in balls of an arithmetic, and the radii of the frame, (N, n²)."""
+    """The series in balls of an arithmetic, and the largest radius of the frame at each time, (N,)."""
 
     balls: Balls
     series: Mapping[str, Values]
@@ -136,13 +139,12 @@ class _Found:
 
     @classmethod
     def of(cls, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
-        """Return the series with their radii; call it ``with`` the arithmetic."""
-        frame = series["frame"].reshape(len(series["frame"]), -1)
-        return cls(arithmetic, series, arithmetic.at_most(frame - arithmetic.midpoints(frame)))
+        """Return the series with that of their frame."""
+        return cls(arithmetic, series, np.max(_radii(series["frame"]), axis=(1, 2)))
 
     def missing(self, digits: int, working: int) -> int:
         """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
-        if not all(radius.is_finite() for radius in self.spread.ravel()):
+        if not all(radius.is_finite() for radius in self.spread):
             return working
         with self.balls as xp:
             (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
