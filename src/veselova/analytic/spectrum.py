@@ -194,7 +194,7 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until roots are taken.
 
     With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose tangent is along Aw, (dτ₁/ds)²
-    = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q| = 1.
+    = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q| = 1. Call it ``with`` the arithmetic.
     """
     # Over common denominators: sums of fractions would look for common factors at every step.
     A, A_unit = _over_common(moving.A)
@@ -209,11 +209,11 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
         terms = zip(A, q2, v2, qv, strict=True)
         scaled = (a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms)
         rate = speed * Fraction(qAq**3 * A_unit * square_unit, qq * sum(scaled)) / moving.unit
-    q = arithmetic.sqrt(arithmetic.array([Fraction(x, qq) for x in q2]))
+    q = arithmetic.sqrt(arithmetic.array([_quotient(x, qq, arithmetic) for x in q2]))
     v = [
-        arithmetic.number(Fraction(x * qq - along * own, qq * square_unit)) / _root(Fraction(own, square_unit), arithmetic)
+        _quotient(x * qq - along * own, qq * square_unit, arithmetic) / arithmetic.sqrt(_quotient(own, square_unit, arithmetic))
         if own
-        else _root(Fraction(other, square_unit), arithmetic)
+        else arithmetic.sqrt(_quotient(other, square_unit, arithmetic))
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
     return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
@@ -223,6 +223,13 @@ def _over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:
     """Return numerators over the least common denominator, and that."""
     unit = math.lcm(*(value.denominator for value in values))
     return [value.numerator * (unit // value.denominator) for value in values], unit
+
+
+def _quotient(numerator: int, denominator: int, arithmetic: Arithmetic | Decimals) -> Any:
+    """Return a rational, rounded once: decimals divide without looking for common factors."""
+    if isinstance(arithmetic, Decimals):
+        return Decimal(numerator) / Decimal(denominator)
+    return arithmetic.number(Fraction(numerator, denominator))
 
 
 def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
