@@ -118,18 +118,27 @@ def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> N
     assert Path("/dev/full").exists()
 
 
+@pytest.mark.parametrize("form", ["json", "npz", "csv"])
 @pytest.mark.parametrize(
-    "changes", [{}, {"digits": 30, "certified": True}, {"problem": {**GOOD["problem"], "A": [3 * 10**30, 2 * 10**30, 10**30]}}]
+    "changes",
+    [
+        {},
+        {"certified": True},
+        {"digits": 30, "certified": True},
+        {"problem": {**GOOD["problem"], "A": [3 * 10**30, 2 * 10**30, 10**30]}},
+    ],
 )
-def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(tmp_path: Path, changes: dict[str, Any]) -> None:
-    entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
-    made = solved({**GOOD, **changes}, IN_MEMORY, entry)
+def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
+    tmp_path: Path, changes: dict[str, Any], form: str
+) -> None:
+    entry, wanted = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6), Wanted(form, "identity")
+    made = solved({**GOOD, **changes}, wanted, entry)
     assert made.entry
     assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
     for again in (
-        restored(made.entry, IN_MEMORY),
-        restored(entry.path, IN_MEMORY),
-        solved({**GOOD, **changes}, IN_MEMORY, entry),
+        restored(made.entry, wanted),
+        restored(entry.path, wanted),
+        solved({**GOOD, **changes}, wanted, entry),
     ):
         assert (again.body, again.provenance, again.kept) == (made.body, made.provenance, True)
         assert (again.stored, again.entry) == (0, None)

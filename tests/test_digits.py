@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
-from decimal import ROUND_DOWN, Context, Decimal, Inexact, localcontext
+from decimal import ROUND_DOWN, Context, Decimal, DefaultContext, Inexact, localcontext
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -261,6 +261,30 @@ def test_the_decimal_context_of_the_caller_plays_no_part() -> None:
     assert_same(found, expected)
 
 
+def test_a_process_that_traps_what_is_inexact_gets_the_same_answers() -> None:
+    expected, trapped = made(vs.solve(body3(), [1, 2], digits=30)), DefaultContext.traps[Inexact]
+    try:
+        DefaultContext.traps[Inexact] = True
+        found = made(vs.solve(body3(), [1, 2], digits=30))
+    finally:
+        DefaultContext.traps[Inexact] = trapped
+    assert_same(found, expected)
+
+
+@pytest.mark.parametrize("time", ["1e-8", "-1e-9", "1e-16", "1e-20", "-1e-30", "1e-300"])
+@pytest.mark.parametrize("options", [{}, {"method": "angles"}, {"certified": True}], ids=str)
+def test_times_below_the_rounding_of_a_clock_in_doubles_are_served(time: str, options: dict[str, Any]) -> None:
+    """Near t = 0 the frame is e_1 + t q̇ …, and τ₁ = t dτ₁/dt: both to second order."""
+    late, first = (made(vs.solve(body3(), [at], digits=40, **options)) for at in (time, 0))
+    rate = Decimal(float(np.linalg.norm(body3().q_dot) / np.linalg.norm(body3().neumann().q_prime)))
+    t = Decimal(time)
+    with localcontext(Context(prec=60)):
+        ahead = late.midpoints["q"] - first.midpoints["q"] - t * first.midpoints["q_dot"]
+        assert np.max(np.abs(ahead)) <= 10 * t * t + Decimal("1e-39")
+        assert abs(late.midpoints["tau1"][0] - t * rate) <= 10 * abs(t) * (abs(t) + Decimal("1e-15")) + Decimal("1e-39")
+    assert max(late.error) <= Decimal("1e-40")
+
+
 def made(trajectory: vs.Trajectory) -> Decimals:
     """The decimals of a trajectory, all of them made: that is done when they are asked for."""
     assert trajectory.decimals is not None
@@ -277,6 +301,9 @@ def assert_same(found: Decimals, expected: Decimals) -> None:
 def test_decimals_made_later_are_those_made_at_once() -> None:
     """Whatever became of Arb's global precision, in pickles too, and doubles are the nearest to them."""
     trajectory = vs.solve(body3(), [-1, 0, 2], digits=40)
+    assert trajectory.decimals is not None
+    assert "omega" in trajectory.decimals.radii
+    assert "gamma" not in trajectory.decimals.radii
     kept, expected = pickle.loads(pickle.dumps(trajectory)), made(trajectory)
     later, before = vs.solve(body3(), [-1, 0, 2], digits=40), flint.ctx.prec
     try:

@@ -75,6 +75,7 @@ def test_values_at_few_points_are_those_at_many(genus: int, rng: np.random.Gener
         scale = theta.values(np.zeros((1, genus)), [Characteristic.zero(genus)])[0, 0]
         many = theta.values(z, characteristics)[:5]
         assert np.max(np.abs(theta.values(z[:5], characteristics) - many)) < 1e-14 * scale
+        assert theta.values(z[:0], characteristics).shape == (0, len(characteristics))
         alone = np.concatenate([theta.values(z[:5], [c]) for c in characteristics], axis=1)
         assert np.max(np.abs(alone - many)) < 1e-14 * scale
 

@@ -141,3 +141,11 @@ def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[st
     with pytest.raises(InvalidInput) as raised:
         Veselova.from_torus(**{**GOOD, **changes})
     assert raised.value.field == field
+
+
+@pytest.mark.parametrize("A", [["1e-300", "1e300"], ["1e150", "1e-150", 1]], ids=str)
+def test_moments_too_far_apart_for_floats_are_refused_by_name(A: list[Any]) -> None:
+    problem = Veselova(A, [3, 4, 0][: len(A)], [4, -3, 1][: len(A)], normalize=True)
+    for ask in (torus, lambda problem: solve(problem, [1.0]), lambda problem: solve(problem, [1.0], digits=30)):
+        with pytest.raises(Unsolved, match="beyond-floats: the A's are too far apart"):
+            ask(problem)

@@ -36,8 +36,8 @@ _MANY_NODES = 300
 _DIGITS_PER_TURN = 0.151
 
 #: Where midpoints are formed, and radii rounded, whatever the caller's context of decimals.
-_EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX)
-_UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX)
+_EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
+_UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 
 #: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero.
 _UNASKED_DIGITS = 5
@@ -86,7 +86,7 @@ class Balls(Arithmetic):
         _global.release()
 
     def number(self, value: Any) -> Any:
-        """Return a ball that holds a rational, decimal, float or mpmath number (these two are exact), or the given ball."""
+        """Return a ball that holds a rational or a decimal, that of a float or mpmath number exactly, or the given ball."""
         if isinstance(value, (Fraction, Decimal)):
             return flint.arb(flint.fmpq(*value.as_integer_ratio()))
         if isinstance(value, np.generic):

@@ -155,4 +155,7 @@ def _layout(origins: tuple[BranchPoint, ...], kind: Literal["I", "c"]) -> Layout
     cuts, inner = np.arange(genus)[:, None], np.arange(1, genus)
     beyond = np.where(cuts < np.arange(len(places)), cuts, cuts + 1)
     sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
-    return Layout(np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner), tuple(ends))
+    arrays = np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner)
+    for array in arrays:
+        array.setflags(write=False)  # they serve every curve of this order
+    return Layout(*arrays, tuple(ends))

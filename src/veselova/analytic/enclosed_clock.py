@@ -40,8 +40,9 @@ _FIRST_DIGITS, _LOST_DIGITS = 12, 2
 #: Part of the slope at the approximate root that is certain next to it.
 _SLOPE = 0.5
 
-#: Panels end a little beyond the last time, and are not so short that their length over others leaves the range of doubles.
-_BEYOND, _SHORTEST = 1 + 1e-9, 1e-100
+#: Panels end a little beyond the last time, by a part of it and by cycles of the fastest phase: the end comes from a clock in
+#: doubles, which has a relative and an absolute error.
+_BEYOND, _CYCLES_BEYOND = 1 + 1e-9, 1e-12
 
 
 class EnclosedClock:
@@ -76,7 +77,8 @@ class EnclosedClock:
     def _panels(self, reach: float, direction: int) -> _Panels | None:
         if reach == 0:
             return None
-        reach = max(reach * _BEYOND, _SHORTEST)
+        fastest = max(abs(float(f)) for f in self._orbit.frequencies)
+        reach = reach * _BEYOND + _CYCLES_BEYOND / fastest
         if self._certified:
             width, largest = self._orbit.strip
             count = math.ceil(reach / (2 * _PANEL_IN_STRIPS * width))
@@ -87,7 +89,6 @@ class EnclosedClock:
             truncation = self._xp.bounded_tail(largest, decay, nodes)
             panels = self._evaluated(reach, direction, count, nodes)
             return replace(panels, truncation=self._xp.array([truncation] * count), steepest=largest / width)
-        fastest = max(abs(float(f)) for f in self._orbit.frequencies)
         # Near a separatrix dt/dτ₁ varies much faster than any phase.
         count = math.ceil(reach / (2 * min(_PANEL_IN_CYCLES / fastest, _LONGEST_IN_STRIPS * self._orbit.strip[0])))
         self._require_few(count)

@@ -50,8 +50,8 @@ _SHOWN = 3
 #: −x to the last digit, whatever the caller's context of decimals.
 _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 
-#: Radii of balls, exact: infinite where nothing is known of a number, and never undefined.
-_radii = np.frompyfunc(lambda x: x.rad(), 1, 1)
+#: Radii of balls, exact; of one that is not finite the ball itself.
+_radii = np.frompyfunc(lambda x: x.rad() if x.is_finite() else abs(x), 1, 1)
 
 
 @dataclass(frozen=True)
@@ -155,15 +155,13 @@ class _Found:
         return self.series[name].astype(np.float64)
 
     def decimals(self, digits: int, certified: bool) -> Decimals:
-        """Return the decimals, made when they are asked for; q is the first column of the frame."""
+        """Return the decimals, made when they are asked for."""
         shown = digits + _SHOWN
         pairs: dict[str, Pair | Callable[[], Pair]] = {
             name: partial(self.balls.decimals, values, shown) for name, values in self.series.items()
         }
-        midpoints, radii = Later(pairs, 0), Later(pairs, 1)
-        pairs["q"] = lambda: (midpoints["frame"][:, :, 0], radii["frame"][:, :, 0])
         pairs["omega"] = partial(_skew, self.balls, self.series["omega"], shown)
-        return Decimals(digits, certified, midpoints, radii)
+        return Decimals(digits, certified, Later(pairs, 0), Later(pairs, 1))
 
 
 def _skew(arithmetic: Balls, omega: Values, digits: int) -> Pair:

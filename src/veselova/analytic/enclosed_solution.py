@@ -151,11 +151,11 @@ class EnclosedSolution:
             found = windows.at(times, np.column_stack(table))
             if found is not None:
                 q, components, rest = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
-                normals = rest.reshape(len(times), size, -1)
                 if size == 3:
-                    handed = _across(attitude.q[:1], attitude.normals[:1, :, 0]) @ attitude.normals[0, :, 1]
-                    normals = np.stack([rest, _across(q, rest) * (1 if handed[0] > 0 else -1)], axis=2)
-                return found[:, 0], Attitude(q, normals, components, found[:, :0]), details
+                    handed = (_across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1])[0]
+                    side = 1 if handed > 0 else -1 if handed < 0 else 1 / handed  # of a ball that holds zero, nothing known
+                    rest = np.stack([rest, _across(q, rest) * side], axis=2)
+                return found[:, 0], Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]), details
             windows = windows.finer()
         return self._evaluated(times, coarse)
 

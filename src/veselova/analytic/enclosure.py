@@ -60,6 +60,8 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     room = _ROOM * (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
     found, around = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
     for row in np.flatnonzero(~xp.inside(found, around).all(axis=1)).tolist():
+        if not all(x.is_finite() for x in q[row]):
+            raise ZeroDivisionError("a position that is not known at all")
         poles = [xp.rational(x) for x in inverse]
         middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
         found[row] = xp.widened(xp.array(middle), room[row] / _ROOM)

@@ -206,7 +206,8 @@ class Decimals:
     def __init__(self, digits: int) -> None:
         self.digits = digits
         self.epsilon = decimal.Decimal((0, (1,), -digits))
-        self._context = decimal.Context(prec=digits + _GUARD, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
+        trapped = [decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow]
+        self._context = decimal.Context(digits + _GUARD, "ROUND_HALF_EVEN", decimal.MIN_EMIN, decimal.MAX_EMAX, traps=trapped)
         self._outer = decimal.Context()
 
     def __enter__(self) -> Decimals:

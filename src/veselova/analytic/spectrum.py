@@ -23,7 +23,7 @@ import numpy as np
 from veselova.analytic.precision import Arithmetic, Decimals, Values
 from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
-from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.errors import InternalContradiction, Unsolved
 
 __all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
 
@@ -98,6 +98,8 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
     Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by ``distance`` where that is
     given. Where I_i = c_k is an end of a closed cut, or of a gap and less than the root of 1e-290 of the rest moves along its
     direction, or of 10^−20 times the opening squared, the direction is frozen; at a gap that is a separatrix to all digits.
+
+    Raises Unsolved (``beyond-floats``) where the least I is no larger than that part of the others.
     """
     exponent = 2 * digits + 10 + beyond
     opening, coinciding = Fraction(1, 10**exponent), max(_COINCIDE, 2 * exponent + 20)
@@ -111,6 +113,8 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | hidden)))
         j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
+        if j == 0 and moving.time != "tau1":  # between c_1 = 0 and the least I, which is no separatrix
+            raise Unsolved("beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}")
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.moved(0, opening)

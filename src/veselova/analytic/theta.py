@@ -105,7 +105,7 @@ class Theta:
         |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
         """
         wanted, y = tuple(characteristics), self._coordinates.points(z - 2 * np.rint(z / 2))
-        if len(z) * len(wanted) * self._size_in_blocks <= _FEW:
+        if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
             blocks = self._blocks(wanted)
             return blocks.values(*self._bells(y, blocks.shifts))
         result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)

@@ -72,11 +72,11 @@ def read_archive(problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
 
     found = archive["provenance"]
     provenance = Provenance(**(found if isinstance(found, dict) else json.loads(str(found))))
-    if f"{next(iter(problem.outputs))}_{_DECIMAL}" not in archive:
-        series = {name: archive[name] for name in problem.outputs if name not in problem.derived}
-        return Trajectory(problem, archive["times"], archive["error"], series, provenance)
-    midpoints, radii = (
-        {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
-    )
-    decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii)
-    return Trajectory.of_decimals(problem, archive["times"], decimals, provenance)
+    series = {name: archive[name] for name in problem.outputs if name not in problem.derived}
+    decimals = None
+    if f"{next(iter(problem.outputs))}_{_DECIMAL}" in archive:
+        midpoints, radii = (
+            {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
+        )
+        decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii)
+    return Trajectory(problem, archive["times"], archive["error"], series, provenance, decimals=decimals)

@@ -54,6 +54,9 @@ class Later(Mapping[str, Objects]):
             pair = self._pairs[name] = pair()
         return pair[self._side]
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._pairs
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._pairs)
 
@@ -95,7 +98,7 @@ class Decimals:
     @cached_property
     def error(self) -> Objects:
         """Return the largest radius of q and frame at each time, (N,)."""
-        return np.array([max([*q, *frame.ravel()]) for q, frame in zip(self.radii["q"], self.radii["frame"], strict=True)])
+        return np.array([max(frame.ravel()) for frame in self.radii["frame"]])  # of which q is the first column
 
     def strings(self, name: str, radii: bool = False) -> Any:
         """Return a series, or its radii, as nested lists of decimal strings."""
