@@ -46,12 +46,8 @@ _THETA_SIZE = 3
 #: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
 _SHOWN = 3
 
-
 #: −x to the last digit, whatever the caller's context of decimals.
 _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
-
-#: Radii of balls, exact; of one that is not finite the ball itself.
-_radii = np.frompyfunc(lambda x: x.rad() if x.is_finite() else abs(x), 1, 1)
 
 
 @dataclass(frozen=True)
@@ -133,20 +129,22 @@ class EnclosedMotion:
 class _Found:
     """The series in balls of an arithmetic, and the largest radius of the frame at each time, (N,)."""
 
-    balls: Balls
+    arithmetic: Balls
     series: Mapping[str, Values]
     spread: Values
 
     @classmethod
     def of(cls, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
-        """Return the series with that of their frame."""
-        return cls(arithmetic, series, np.max(_radii(series["frame"]), axis=(1, 2)))
+        """Return the series with that of their frame, infinite where nothing is known of a number."""
+        unknown = arithmetic.number(math.inf)
+        radii = np.frompyfunc(lambda x: x.rad() if x.is_finite() else unknown, 1, 1)(series["frame"])
+        return cls(arithmetic, series, np.max(radii, axis=(1, 2)))
 
     def missing(self, digits: int, working: int) -> int:
         """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
         if not all(radius.is_finite() for radius in self.spread):
             return working
-        with self.balls as xp:
+        with self.arithmetic as xp:
             (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
         return digits + int(largest.adjusted()) + 1
 
@@ -158,9 +156,9 @@ class _Found:
         """Return the decimals, made when they are asked for."""
         shown = digits + _SHOWN
         pairs: dict[str, Pair | Callable[[], Pair]] = {
-            name: partial(self.balls.decimals, values, shown) for name, values in self.series.items()
+            name: partial(self.arithmetic.decimals, values, shown) for name, values in self.series.items()
         }
-        pairs["omega"] = partial(_skew, self.balls, self.series["omega"], shown)
+        pairs["omega"] = partial(_skew, self.arithmetic, self.series["omega"], shown)
         return Decimals(digits, certified, Later(pairs, 0), Later(pairs, 1))
 
 

@@ -14,9 +14,10 @@ which the sum is short (analytic.lattice).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ from veselova.analytic.theta_sums import SIGNS, Blocks, Family, Group, in_blocks
 __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
+
+K = TypeVar("K")
 
 #: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
 _VANISHING = -630.0
@@ -147,15 +150,7 @@ class Theta:
 
     def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         """Return the tables of all characteristics at once."""
-        if (blocks := self._blocked.get(characteristics)) is None:
-            wanted = set(characteristics)
-            more = next((known for known in list(self._blocked) if wanted <= set(known)), None)
-            if more is None:
-                blocks = self._side_by_side(characteristics)
-            else:
-                blocks = self._blocked[more].of([more.index(c) for c in characteristics])
-            self._blocked[characteristics] = blocks
-        return blocks
+        return _kept(self._blocked, characteristics, self._side_by_side, Blocks.of)
 
     @cached_property
     def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks]:
@@ -183,21 +178,15 @@ class Theta:
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         """Return the families by δ_G."""
-        if (groups := self._grouped.get(characteristics)) is None:
-            wanted = set(characteristics)  # a copy of the known ones: another thread may add to them
-            more = next((known for known in list(self._grouped) if wanted <= set(known)), None)
-            if more is not None and len(wanted) == len(characteristics):
-                places = {more.index(c): place for place, c in enumerate(characteristics)}
-                groups = [group for known in self._grouped[more] if (group := known.of(places)) is not None]
-            else:
-                families = self._coordinates.families(characteristics).items()
-                groups = [self._group(delta_G, list(of.values())) for delta_G, of in families]
-            self._grouped[characteristics] = groups
-        return groups
+        return _kept(self._grouped, characteristics, self._by_shift, _part)
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[Group]]:
         return {}
+
+    def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
+        families = self._coordinates.families(characteristics).items()
+        return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
     def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[int, Characteristic, int]]]) -> Group:
         places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
@@ -230,3 +219,24 @@ class Theta:
     @cached_property
     def _crossings(self) -> dict[tuple[int, ...], tuple[Array, NDArray[np.complex128]]]:
         return {}
+
+
+def _kept(
+    tables: dict[tuple[Characteristic, ...], K],
+    wanted: tuple[Characteristic, ...],
+    made: Callable[[tuple[Characteristic, ...]], K],
+    part: Callable[[K, list[int]], K],
+) -> K:
+    """Return the tables of characteristics: those that are kept, a part of those of more of them, or those that are made."""
+    if (found := tables.get(wanted)) is None:
+        each, known = set(wanted), list(tables)  # a copy: another thread may add to them
+        more = next((kept for kept in known if each <= set(kept)), None) if len(each) == len(wanted) else None
+        found = made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
+        tables[wanted] = found
+    return found
+
+
+def _part(groups: list[Group], members: list[int]) -> list[Group]:
+    """Return the groups of the characteristics at some places, in this order."""
+    places = {member: place for place, member in enumerate(members)}
+    return [part for group in groups if (part := group.of(places)) is not None]
