@@ -14,7 +14,7 @@ import pytest
 from conftest import Server
 from hostile import BUDGET_S
 from veselova import Client, InvalidInput, InvalidRequest, compare, solve
-from veselova.service.documents import encoded, stored_outputs, trajectory_document, trajectory_of
+from veselova.service.documents import encoded, trajectory_document, trajectory_of
 from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
 from veselova.service.systems import SYSTEMS
 
@@ -56,7 +56,7 @@ def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -
     assert again.as_dict() == problem.as_dict()
     found = solve(problem, TIMES)
     assert found.provenance.engine == next(iter(problem.engines))
-    back = trajectory_of(again, orjson.loads(encoded(trajectory_document(found, stored_outputs(problem)))))
+    back = trajectory_of(again, orjson.loads(encoded(trajectory_document(found, problem.stored))))
     for output, axes in problem.outputs.items():
         assert np.array_equal(back.series(output), found.series(output))
         assert found.series(output).ndim == 1 + len(axes)

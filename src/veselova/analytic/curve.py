@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from veselova.analytic.precision import Arithmetic, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["BranchPoint", "Curve", "Layout"]
+__all__ = ["BranchPoint", "Curve", "Layout", "places_of"]
 
 #: Layouts that are kept, and the most branch points of such.
 _MOST_KEPT, _LARGEST_KEPT = 64, 33
@@ -78,7 +78,7 @@ class Curve:
     @cached_property
     def place(self) -> dict[tuple[str, int], int]:
         """Return the index j of each branch point by (kind, index)."""
-        return {(origin.kind, origin.index): j for j, origin in enumerate(self.origins)}
+        return places_of(self.origins)
 
     def layout(self, kind: Literal["I", "c"]) -> Layout:
         """Return where the branch points of one kind stand."""
@@ -109,9 +109,10 @@ class Curve:
         """Return b_j in the same way."""
         return self.branch_points[j] if self.branch_points.ndim == 1 else self.branch_points[:, j, None]
 
-    def cut_of(self, j: Any) -> Any:
+    @staticmethod
+    def cut_of(j: Any) -> Any:
         """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for b_0, which ends none."""
-        return _cut_of(j)
+        return (j + 1) // 2
 
     @cached_property
     def midpoints(self) -> Values:
@@ -134,8 +135,9 @@ class Curve:
         return min(ratios, default=1.0)
 
 
-def _cut_of(j: Any) -> Any:
-    return (j + 1) // 2
+def places_of(origins: tuple[BranchPoint, ...]) -> dict[tuple[str, int], int]:
+    """Return the index j of each branch point by (kind, index)."""
+    return {(origin.kind, origin.index): j for j, origin in enumerate(origins)}
 
 
 def _layouts(origins: tuple[BranchPoint, ...]) -> dict[Literal["I", "c"], Layout]:
@@ -146,12 +148,12 @@ _kept_layouts = lru_cache(_MOST_KEPT)(_layouts)
 
 
 def _layout(origins: tuple[BranchPoint, ...], kind: Literal["I", "c"]) -> Layout:
-    genus, place = (len(origins) - 1) // 2, {origin.index: j for j, origin in enumerate(origins) if origin.kind == kind}
-    places, ends = [place[index] for index in range(len(place))], list[tuple[int, int, int]]()
+    genus, place = (len(origins) - 1) // 2, places_of(origins)
+    places, ends = [place[kind, index] for index in range(genus + (kind == "I"))], list[tuple[int, int, int]]()
     for k, j in enumerate(places):
         if j > 0:
             other = origins[j + 1 if j % 2 == 1 else j - 1]
-            ends.append((k, _cut_of(j) - 1, other.index if other.kind == kind else -1))
+            ends.append((k, Curve.cut_of(j) - 1, other.index if other.kind == kind else -1))
     cuts, inner = np.arange(genus)[:, None], np.arange(1, genus)
     beyond = np.where(cuts < np.arange(len(places)), cuts, cuts + 1)
     sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)

@@ -107,7 +107,7 @@ class EnclosedMotion:
         self, method: str, grid: NDArray[np.float64], found: _Found, details: Mapping[str, Any], began: float
     ) -> Trajectory:
         decimals = found.decimals(self.digits, self.certified)
-        arrays = {name: found.rounded(name) for name in self.problem.outputs if name not in self.problem.derived}
+        arrays = {name: found.rounded(name) for name in self.problem.stored}
         error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
         provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
         return Trajectory(self.problem, grid, error, arrays, provenance, self, decimals)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.curve import BranchPoint
+from veselova.analytic.curve import BranchPoint, places_of
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.frame import Attitude, Frame, slopes
 from veselova.analytic.precision import DOUBLE
@@ -61,20 +61,16 @@ class ThetaQuotients:
             raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
         return cls(theta, frame)
 
-    @property
+    @cached_property
     def functions(self) -> tuple[Characteristic, ...]:
         """Return the characteristics of all functions once: that of the denominator, then those of the numerators."""
-        return self._functions[0]
+        return _functions(self.frame.periods.curve.origins)[0]
 
-    @property
+    @cached_property
     def places(self) -> NDArray[np.intp]:
         """Return where among the functions the numerator of each constant κ stands: of q_1 … q_n, of v_k, and of (n_k)_i with i
         before k; k runs over c_2 … c_{n−1}, c_1."""
-        return self._functions[1]
-
-    @cached_property
-    def _functions(self) -> tuple[tuple[Characteristic, ...], NDArray[np.intp]]:
-        return _functions(self.frame.periods.curve.origins)
+        return _functions(self.frame.periods.curve.origins)[1]
 
     def _raw(self, values: Array) -> Array:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g), from values of the functions."""
@@ -132,9 +128,9 @@ class ThetaQuotients:
 @lru_cache(_MOST_KEPT)
 def _functions(origins: tuple[BranchPoint, ...]) -> tuple[tuple[Characteristic, ...], NDArray[np.intp]]:
     """Return ``ThetaQuotients.functions`` and ``places`` for branch points in this order."""
-    genus, place = (len(origins) - 1) // 2, {origin: j for j, origin in enumerate(origins)}
-    of_I = [Characteristic.of_branch_point(place[BranchPoint("I", i)], genus) for i in range(genus + 1)]
-    of_c = [Characteristic.of_branch_point(place[BranchPoint("c", k)], genus) for k in [*range(1, genus), 0]]
+    genus, place = (len(origins) - 1) // 2, places_of(origins)
+    of_I = [Characteristic.of_branch_point(place["I", i], genus) for i in range(genus + 1)]
+    of_c = [Characteristic.of_branch_point(place["c", k], genus) for k in [*range(1, genus), 0]]
     numerators = [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
     functions = (Characteristic.zero(genus), *sorted(set(numerators)))
     places = np.array([functions.index(c, 1) for c in numerators])

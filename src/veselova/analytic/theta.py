@@ -157,23 +157,17 @@ class Theta:
         return {}
 
     def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
-        (F, G), k, local = self._split, self._gaussian_lattice, self._coordinates.characteristics(characteristics)
-        deltas, of_waves = ([tuple(c[part][i] for i in places) for c, _ in local] for part, places in ((1, G), (0, F)))
-        crossings = [self._crossing(epsilon_F) for epsilon_F in of_waves]
-        shifts, counts = list(dict.fromkeys(deltas)), [len(x) for x, _ in crossings]
-        blocks, of = np.array([shifts.index(delta) for delta in deltas]), np.repeat(np.arange(len(local)), counts)
-        epsilon, delta = (np.array([c[part] for c, _ in local], dtype=float) for part in (0, 1))
-        x = np.concatenate([x for x, _ in crossings])
-        quarters = np.rint(2 * (x * delta[of][:, F]).sum(axis=1)).astype(int) % 4
-        signs = 1 - 2 * np.mod(k @ epsilon[:, G].T, 2)
-        turned = np.concatenate([table for _, table in crossings], axis=1) * signs[:, of] * _QUARTER_TURNS[quarters]
+        local, signs = zip(*self._coordinates.characteristics(characteristics), strict=True)
+        deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
+        shifts, (of, x, turned) = list(dict.fromkeys(deltas)), self._turned(local)
+        blocks = np.array([shifts.index(delta) for delta in deltas])
         return Blocks(
             np.array(shifts, dtype=float) / 2,
             in_blocks(2 * x, blocks[of], len(shifts)),
             in_blocks(np.concatenate([turned.real, -turned.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
-            np.cumsum([0, *counts[:-1]]),
-            in_blocks(epsilon[:, G], blocks, len(shifts)),
-            self._parts[3] * np.array([[sign] for _, sign in local]),
+            np.flatnonzero(np.diff(of, prepend=-1)),
+            in_blocks(self._parities(local).T, blocks, len(shifts)),
+            self._parts[3] * np.array(signs)[:, None],
         )
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
@@ -199,14 +193,24 @@ class Theta:
         return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
 
     def _family(self, members: list[Characteristic]) -> Family:
+        of, x, turned = self._turned(members)
+        each = turned.reshape(len(turned), len(members), -1)
+        parts = [each.real, -each.imag] if self._split[0] else [each.real]
+        tables = np.stack(parts, axis=2).reshape(len(turned), -1)
+        return Family(np.rint(2 * x[of == 0]).astype(np.int64), np.ascontiguousarray(tables.T))
+
+    def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], Array, NDArray[np.complex128]]:
+        """Return what is summed, characteristic after characteristic: which it is, (X,), the x of its waves, (X, |F|), and
+        (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
         F = self._split[0]
-        tables = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
-        x, crossing = self._crossing(tuple(members[0].epsilon[i] for i in F))
-        if F:
-            quarters = np.rint(2 * x @ np.array([[c.delta[i] for c in members] for i in F])).astype(int) % 4
-            turned = crossing[:, None, :] * _QUARTER_TURNS[quarters.T]
-            tables = (tables[:, :, None, None] * np.stack([turned.real, -turned.imag], axis=2)).reshape(len(tables), -1)
-        return Family(np.rint(2 * x).astype(np.int64), np.ascontiguousarray(tables.T))
+        crossings = [self._crossing(tuple(c.epsilon[i] for i in F)) for c in members]
+        of, x = np.repeat(np.arange(len(members)), [len(x) for x, _ in crossings]), np.concatenate([x for x, _ in crossings])
+        delta = np.array([[c.delta[i] for i in F] for c in members], dtype=float)
+        signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
+        turned = np.concatenate([table for _, table in crossings], axis=1)
+        turned *= signs[:, of]
+        turned *= _QUARTER_TURNS[np.rint(2 * (x * delta[of]).sum(axis=1)).astype(int) % 4]
+        return of, x, turned
 
     def _crossing(self, epsilon_F: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
         """Return the x of the waves and w_x e^{2πi x·Ck}, shape (K, X); w_x counts x and −x."""

@@ -72,7 +72,7 @@ def read_archive(problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
 
     found = archive["provenance"]
     provenance = Provenance(**(found if isinstance(found, dict) else json.loads(str(found))))
-    series = {name: archive[name] for name in problem.outputs if name not in problem.derived}
+    series = {name: archive[name] for name in problem.stored}
     decimals = None
     if f"{next(iter(problem.outputs))}_{_DECIMAL}" in archive:
         midpoints, radii = (

@@ -48,6 +48,11 @@ class Problem(ABC):
         for name, value in fields.items():
             object.__setattr__(self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value)
 
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """Return the outputs from which a trajectory can be rebuilt: the others follow from them."""
+        return tuple(name for name in self.outputs if name not in self.derived)
+
     @abstractmethod
     def flow(self, formulation: str) -> Flow:
         """Return the field with this start; it must move."""

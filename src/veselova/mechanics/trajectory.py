@@ -88,8 +88,7 @@ class Trajectory:
         dense: Callable[[Any], Trajectory] | None = None,
     ) -> Trajectory:
         """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
-        names = (name for name in problem.outputs if name not in problem.derived)
-        arrays = {name: decimals.midpoints[name].astype(np.float64) for name in names}
+        arrays = {name: decimals.midpoints[name].astype(np.float64) for name in problem.stored}
         error = np.nextafter(decimals.error.astype(np.float64), np.inf) + np.finfo(float).eps / 2
         return cls(problem, times, error, arrays, provenance, dense, decimals)
 

@@ -16,7 +16,7 @@ from veselova.mechanics.table import Target
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.service.documents import comparison_of, stored_outputs, torus_of, trajectory_of
+from veselova.service.documents import comparison_of, torus_of, trajectory_of
 from veselova.service.download import Sink, media_type_of, provenance_of, sink_of
 
 __all__ = ["Call", "compare_call", "download_call", "torus_call", "trajectory_call"]
@@ -118,6 +118,6 @@ def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -
         "problem": problem.as_dict(),
         "times": _times(times),
         "method": method,
-        "outputs": list(stored_outputs(problem)),
+        "outputs": list(problem.stored),
         "budget_s": budget_s,
     }

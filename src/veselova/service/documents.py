@@ -22,7 +22,6 @@ __all__ = [
     "comparison_document",
     "comparison_of",
     "encoded",
-    "stored_outputs",
     "torus_of",
     "trajectory_document",
     "trajectory_of",
@@ -32,11 +31,6 @@ __all__ = [
 
 #: Documents whose arrays have no more numbers are written at once.
 _FEW_NUMBERS = 10_000
-
-
-def stored_outputs(problem: Problem) -> tuple[str, ...]:
-    """Return the outputs from which a Trajectory can be rebuilt: the others follow from them."""
-    return tuple(name for name in problem.outputs if name not in problem.derived)
 
 
 def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = None) -> dict[str, Any]:
@@ -66,15 +60,13 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     """Return the trajectory of a document that has the stored outputs; numbers come back to the last bit or digit."""
     if "radii" in document:
         return _with_decimals(problem, document)
-    series = {name: np.array(document["series"][name], dtype=np.float64) for name in stored_outputs(problem)}
+    series = {name: np.array(document["series"][name], dtype=np.float64) for name in problem.stored}
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
     return Trajectory(problem, times, error, series, Provenance(**document["provenance"]))
 
 
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
-    midpoints, radii = (
-        {name: decimals_of(document[kind][name]) for name in stored_outputs(problem)} for kind in ("series", "radii")
-    )
+    midpoints, radii = ({name: decimals_of(document[kind][name]) for name in problem.stored} for kind in ("series", "radii"))
     provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     decimals = Decimals.with_derived(provenance.digits, certified, midpoints, radii)
