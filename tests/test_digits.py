@@ -99,6 +99,22 @@ def test_thirty_digits_at_a_million_million() -> None:
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-30
 
 
+@pytest.mark.parametrize("method", ["theta", "angles"])
+@pytest.mark.parametrize("n", [2, 3])
+def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(n: int, method: str, rng: np.random.Generator) -> None:
+    """Which cell of the torus a phase is in decides signs, and doubles do not tell those of 10²⁰ apart."""
+    body = random_problem(rng, n)
+    there = vs.solve(body, ["1e20"], digits=60, method=method).decimals
+    assert there is not None
+    state = (list(map(str, there.midpoints[series][0])) for series in ("q", "q_dot"))
+    back = vs.solve(vs.Veselova(body.A, *state, normalize=True), ["-1e20"], digits=20, method=method).decimals
+    start = vs.solve(body, [0], digits=20).decimals
+    assert back is not None
+    assert start is not None
+    for series in ("q", "q_dot"):
+        assert deviation(back, start, series) < 1e-19, series
+
+
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_theta_functions_and_angles_agree_in_balls(n: int, rng: np.random.Generator) -> None:
     problem = random_problem(rng, n)

@@ -46,8 +46,9 @@ class Orbit:
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
     def phases(self, tau1: Values) -> Values:
-        """Return z at Neumann times (N,), shape (N, g)."""
-        return np.asarray(self.start + tau1[:, None] * self.frequencies)
+        """Return z modulo 2 at Neumann times (N,), shape (N, g): however far they are, doubles tell its cells apart."""
+        z = self.start + tau1[:, None] * self.frequencies
+        return np.asarray(z - 2 * self.rate.inversion.arithmetic.floor(z / 2))
 
     def rates(self, tau1: Values) -> Values:
         """Return dt/dτ₁ at Neumann times (N,)."""
