@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Sequence
 from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any, ClassVar
 
 import flint
@@ -26,8 +26,7 @@ __all__ = ["Balls", "balls"]
 _GUARD = 6
 
 #: Digits of quantities that only bound others, and terms beyond those that the decay of a series asks for.
-_COARSE_DIGITS = 20
-_EXTRA_TERMS = 6
+_COARSE_DIGITS, _EXTRA_TERMS = 20, 6
 
 #: Nodes from which series are formed by products of polynomials.
 _MANY_NODES = 300
@@ -43,7 +42,6 @@ _UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX,
 _UNASKED_DIGITS = 5
 _UNASKED = 10**_UNASKED_DIGITS
 _HALF = _UNASKED // 2
-
 _ZERO = Decimal(0)
 
 _global = threading.RLock()
@@ -199,14 +197,14 @@ class Balls(Arithmetic):
 
     def powers(self, exponents: Values, bases: Values) -> Values:
         """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
-        return _products(exponents, bases, operator.pow)
+        return _products(exponents, bases, lambda w: 1 / w)
 
     def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
         """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
 
-        A power takes up to 2 log₂|m| products, each of which loses up to half a bit.
+        A power comes from up to log₂|m| products in a row, each of which loses up to half a bit.
         """
-        products = _products(modes, turns, lambda w, m: w**m if m >= 0 else _conjugate(w**-m))
+        products = _products(modes, turns, _conjugate)
         return np.asarray(_real(products)), np.asarray(_imaginary(products))
 
     @staticmethod
@@ -256,9 +254,9 @@ _lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
 _contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
 _upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
 _turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
-_conjugate = np.frompyfunc(lambda w: w.conjugate(), 1, 1)
-_real = np.frompyfunc(lambda w: w.real, 1, 1)
-_imaginary = np.frompyfunc(lambda w: w.imag, 1, 1)
+_conjugate = np.frompyfunc(flint.acb.conjugate, 1, 1)
+_real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
+_imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
 _around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
@@ -276,13 +274,17 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
     return shown, Decimal(radius).scaleb(exponent, _UPWARDS) if radius else _ZERO
 
 
-def _products(exponents: Values, bases: Values, power: Callable[[Values, int], Values]) -> Values:
-    """Return Π_k power(w_k, m_k), shape (M, N), for exponents (M, g) and bases (N, g), each power formed once."""
-    result: Any = 1
+def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Values]) -> Values:
+    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g); w^m is w^{⌊m/2⌋} times the rest."""
+    factors = []
     for column, base in zip(exponents.T, bases.T, strict=True):
-        orders, places = np.unique(column, return_inverse=True)
-        result = result * np.stack([power(base, int(order)) for order in orders])[places]
-    return np.asarray(result)
+        powers = [1 + 0 * base, base]
+        for m in range(2, int(np.max(np.abs(column), initial=0)) + 1):
+            powers.append(powers[m // 2] * powers[m - m // 2])
+        # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
+        powers += [inverse(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
+        factors.append(np.stack(powers)[column.astype(np.int64)])
+    return np.asarray(reduce(operator.mul, factors))
 
 
 def _matrix(values: Values) -> Any:

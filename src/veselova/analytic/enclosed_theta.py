@@ -82,35 +82,29 @@ class EnclosedTheta:
         xp, F, G = self._xp, self._F, self._G
         result, z = np.empty((len(z), len(characteristics)), dtype=object), self._coordinates.points(z)
         for delta_G, families in self._coordinates.families(characteristics).items():
-            bells, r, nearest = self._bells(z, delta_G)
-            turns = xp.turns((z[:, F] - (r @ self._parts[1].T if F and G else 0)) / 2)
-            for epsilon, members in families.items():
-                x, table = self._crossing(epsilon)
-                products = [xp.product(bells[:, rows], table[rows]).T for _, rows in self._classes]
-                # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
-                cosines, sines = xp.waves(x, turns)
-                waves = np.stack([cosines, -sines, -cosines, sines]) if F else None
+            heights, common, r, nearest = self._bells(z, delta_G)
+            x, tables = (list(parts) for parts in zip(*map(self._crossing, families), strict=True))
+            table = np.concatenate(tables, axis=1)
+            # Classes of k; real and imaginary parts of each x; points.
+            products = np.stack([xp.product(heights[:, rows], table[rows]).T for _, rows in self._classes])
+            # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
+            y_F = z[:, F] - (r @ self._parts[1].T if F and G else 0)
+            waves = xp.waves(np.concatenate(x), xp.turns(y_F / 2)) if F else None
+            first = 0
+            for orders, members in zip(x, families.values(), strict=True):
+                rows, first = slice(first, first + len(orders)), first + len(orders)
+                parts = products[:, 2 * rows.start : 2 * rows.stop]
+                sums = _Sums(orders, parts[:, : len(orders)], parts[:, len(orders) :], waves and (waves[0][rows], waves[1][rows]))
                 for place, characteristic, sign in members:
-                    sums = sign * self._sums(characteristic, products, waves, x)
-                    odd = np.array(nearest @ [characteristic.epsilon[i] for i in G], dtype=float) % 2 == 1 if G else False
-                    result[:, place] = np.where(odd, -sums, sums)
+                    epsilon, delta = (
+                        np.array([of[i] for i in places], dtype=np.int64)
+                        for of, places in ((characteristic.epsilon, G), (characteristic.delta, F))
+                    )
+                    value = common * sums.of([-1 if parity @ epsilon % 2 else 1 for parity, _ in self._classes], delta)
+                    flipped = (nearest @ epsilon % 2 == 1) ^ (sign < 0)
+                    value[flipped] = -value[flipped]
+                    result[:, place] = value
         return np.asarray(xp.widened(result, np.abs(result[:, :1]) * xp.epsilon))
-
-    def _sums(self, characteristic: Characteristic, products: list[Values], waves: Values | None, x: NDArray[np.int64]) -> Values:
-        """Return the sums of a characteristic, (N,), from the products of its family and its waves c, −s, −c, s, (4, X, N)."""
-        epsilon_G, delta_F = (
-            np.array([of[i] for i in places], dtype=np.int64)
-            for of, places in ((characteristic.epsilon, self._G), (characteristic.delta, self._F))
-        )
-        signed = [
-            -product if parity @ epsilon_G % 2 else product for (parity, _), product in zip(self._classes, products, strict=True)
-        ]
-        weighted = np.sum(signed, axis=0)
-        if waves is None:
-            return np.asarray(weighted[0])
-        count, quarters = len(x), x @ delta_F
-        real, imaginary = (waves[(quarters + turn) % 4, np.arange(count)] for turn in (0, 3))
-        return np.asarray(np.sum(real * weighted[:count] - imaginary * weighted[count:], axis=0))
 
     @cached_property
     def _classes(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
@@ -118,17 +112,17 @@ class EnclosedTheta:
         parities, which = np.unique(self._gaussian_lattice % 2, axis=0, return_inverse=True)
         return [(parity, np.flatnonzero(which.ravel() == place)) for place, parity in enumerate(parities)]
 
-    def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values]:
-        """Return (e^{−π rᵀT_GG⁻¹r + 2π kᵀT_GG⁻¹r}, r, n) with y_G = n + r, k on the Gaussian lattice."""
+    def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values, NDArray[np.float64]]:
+        """Return (e^{2π kᵀT_GG⁻¹r}, k on the Gaussian lattice, e^{−π rᵀT_GG⁻¹r}, r, n) with y_G = n + r."""
         xp = self._xp
         if not self._G:
-            return xp.array(np.ones((len(z), 1))), z[:, :0], z[:, :0]
+            return xp.array(np.ones((len(z), 1))), xp.array(np.ones(len(z))), z[:, :0], np.zeros((len(z), 0))
         y = z[:, self._G] + xp.array([xp.number(d) / 2 for d in delta])
         nearest = xp.floor(y + xp.number(1) / 2)
         r = y - nearest
         projected = r @ self._parts[2]
-        heights = xp.powers(self._gaussian_lattice, xp.exp(2 * xp.pi * projected))
-        return (heights * xp.exp(-xp.pi * np.sum(projected * r, axis=1))).T, r, nearest
+        heights = xp.powers(self._gaussian_lattice, xp.exp(2 * xp.pi * projected)).T
+        return heights, xp.exp(-xp.pi * np.sum(projected * r, axis=1)), r, nearest.astype(float)
 
     def _crossing(self, epsilon_F: tuple[int, ...]) -> tuple[NDArray[np.int64], Values]:
         """Return 2x of the waves, one of each pair ±x, and the real and imaginary parts of
@@ -146,6 +140,40 @@ class EnclosedTheta:
                 cosines, sines = (weights * wave.T for wave in xp.waves(x, xp.turns((k @ C.T) / 2)))
             self._crossings[epsilon_F] = x, np.concatenate([cosines, sines], axis=1)
         return self._crossings[epsilon_F]
+
+
+class _Sums:
+    """The sums of a family over its waves x: Σ_x Re i^{2x·2δ_F} (R_x + iI_x) e^{2πix·y_F}, class of k by class, at N points.
+
+    orders (X, |F|): 2x · real, imaginary (classes, X, N): R and I · waves (X, N) each: cos and sin 2πx·y_F, None without F
+    """
+
+    def __init__(self, orders: NDArray[np.int64], real: Values, imaginary: Values, waves: tuple[Values, Values] | None) -> None:
+        self._real, self._imaginary, self._waves = real, imaginary, waves
+        quarters, which = np.unique(orders % 4, axis=0, return_inverse=True)
+        self._quarters, self._rows = quarters, [np.flatnonzero(which.ravel() == place) for place in range(len(quarters))]
+        self._parts: dict[bool, list[list[Values]]] = {}
+
+    def of(self, signs: list[int], delta: NDArray[np.int64]) -> Values:
+        """Return the sums over all classes of k, with signs, and over x, with 2δ_F; shape (N,)."""
+        turns = self._quarters @ delta % 4
+        parts = self._turned(bool(turns[0] % 2))  # 2x is odd or even as ε_F is, so all turns are
+        total: Any = 0
+        for sign, of_class in zip(signs, parts, strict=True):
+            for turn, part in zip(turns, of_class, strict=True):
+                total = total - part if (sign < 0) != (turn > 1) else total + part
+        return np.asarray(total)
+
+    def _turned(self, odd: bool) -> list[list[Values]]:
+        """Return the sums over the x alike modulo two, of each class of k; of i times the terms where ``odd``."""
+        if odd not in self._parts:
+            terms = self._real
+            if self._waves is not None:
+                cosines, sines = self._waves
+                real, imaginary = self._real, self._imaginary
+                terms = -(sines * real + cosines * imaginary) if odd else cosines * real - sines * imaginary
+            self._parts[odd] = [[np.sum(of_class[rows], axis=0) for rows in self._rows] for of_class in terms]
+        return self._parts[odd]
 
 
 def _symmetric(form: Values) -> Array:
