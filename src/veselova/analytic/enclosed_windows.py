@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
+from veselova.analytic.enclosed_series import EnclosedSeries
 from veselova.analytic.precision import DOUBLE, Values
 
 __all__ = ["EnclosedWindows"]
@@ -33,9 +34,6 @@ _NODE, _TERM = 1.2, 1 / 600
 #: logarithm of the digits, and is below one at fewer than 32. Of 330 random motions with n = 3 … 5 and 30 … 100 digits, 8 needed
 #: more, 1.22 times those expected at most.
 _SPARE, _SPARE_DIGITS, _SPARE_GROWTH = 1.08, 59, 0.13
-
-#: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
-_RECURRENCE_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -97,12 +95,10 @@ class EnclosedWindows:
             return None
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
         slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
-        shape = (self.count, columns)
-        halves, slack = _by_parity(series).reshape(2, *shape, -1), slack.reshape(shape)
+        series, slack = series.reshape(self.count, columns, -1), slack.reshape(self.count, columns)
         for w, rows in self._rows(times):
             x = (self._centres[w] - times[rows]) / self.half
-            sums = xp.product(self._waves(2 * x * x - 1), np.concatenate(halves[:, w]).T)
-            result[rows] = xp.widened(sums[:, :columns] + x[:, None] * sums[:, columns:], slack[w])
+            result[rows] = xp.widened(EnclosedSeries(series[w], xp)(x), slack[w])
         return result
 
     def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:
@@ -112,32 +108,6 @@ class EnclosedWindows:
         for w, (first, last) in enumerate(pairwise(borders)):
             if first < last:
                 yield w, slice(first, last)
-
-    def _waves(self, y: Values) -> Values:
-        """Return T_0 … of half as many terms as there are nodes at y (N,), shape (N, terms), by T_{j+k} = 2T_jT_k − T_{j−k}."""
-        xp, count = self.arithmetic, (self.nodes + 1) // 2
-        with xp.at(xp.digits + _RECURRENCE_DIGITS):
-            waves, twice = [1 + 0 * y, y], [None, 2 * y]
-            for m in range(2, count):
-                waves.append(twice[m // 2] * waves[m - m // 2] - waves[m % 2])
-                if 2 * m <= count:
-                    twice.append(2 * waves[m])
-        return np.stack(waves[:count], axis=1)
-
-
-def _by_parity(series: Values) -> Values:
-    """Return the e and d with Σ c_m T_m(x) = Σ e_j T_j(y) + x Σ d_j T_j(y), y = 2x²−1, (2, K, terms), from c (K, M).
-
-    T_2j(x) = T_j(y), and T_2j+1(x) = x (2T_j(y) − 2T_j−1(y) + … ± T_0): d_j = 2c_2j+1 − d_j+1, d_0 half of that.
-    """
-    terms = (series.shape[1] + 1) // 2
-    halves = np.zeros((2, series.shape[0], terms), dtype=object)
-    halves[0] = series[:, ::2]
-    above: Any = 0
-    for j in reversed(range(series.shape[1] // 2)):
-        above = halves[1, :, j] = 2 * series[:, 2 * j + 1] - above
-    halves[1, :, 0] = halves[1, :, 0] / 2
-    return halves
 
 
 def _samples(first: float, last: float, count: int, sampled: Callable[[Array], Array]) -> Array:

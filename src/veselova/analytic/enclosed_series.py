@@ -1,0 +1,114 @@
+"""Chebyshev series in balls, several at once at many points.
+
+Sums go over even and odd terms apart: T_2j(x) = T_j(y) with y = 2x²−1, and T_2j+1(x) = x (2T_j(y) − 2T_{j−1}(y) + … ± T_0), so half
+as many polynomials are formed, by T_{j+k} = 2T_jT_k − T_{j−k}. Up to a hundred digits that is done in fixed point.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.fixed_point import Fixed
+from veselova.analytic.precision import Values
+
+__all__ = ["EnclosedSeries"]
+
+Array = NDArray[np.float64]
+
+#: Digits beyond which fixed-point numbers take more time than Arb's.
+_MOST_FIXED = 100
+
+#: Points at once: their polynomials stay in the cache.
+_POINTS = 1000
+
+#: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
+_RECURRENCE_DIGITS = 6
+
+#: Digits of fixed-point numbers beyond those of the series, and bits of a double that is one part of a number.
+_SPARE_DIGITS, _PART_BITS = 4, 52
+
+#: What an error ε of x and of every operation makes of 2x²−1, in ε.
+_OF_SQUARE = 6
+
+#: Sizes of series that doubles can be scaled to.
+_LEAST, _LARGEST = 1e-250, 1e250
+
+
+class EnclosedSeries:
+    """The series Σ_m c_cm T_m(x), |x| ≤ 1, for coefficients (C, M), balls."""
+
+    def __init__(self, coefficients: Values, arithmetic: Any) -> None:
+        self._xp = arithmetic
+        series, terms = coefficients.shape
+        even, odd = np.zeros((2, (terms + 1) // 2, series), dtype=object)
+        even[:] = coefficients[:, ::2].T
+        above: Any = 0  # d_j = 2c_{2j+1} − d_{j+1}, and half of that for d_0
+        for j in reversed(range(terms // 2)):
+            above = odd[j] = 2 * coefficients[:, 2 * j + 1] - above
+        odd[0] = odd[0] / 2
+        self._coefficients = np.concatenate([even, odd], axis=1)
+        sizes = np.max(np.abs(self._coefficients.astype(float)), axis=0).reshape(2, -1).max(axis=0)
+        fits = arithmetic.digits <= _MOST_FIXED and np.all((sizes == 0) | ((sizes > _LEAST) & (sizes < _LARGEST)))
+        self._in_fixed_point = _InFixedPoint(self._coefficients, sizes, arithmetic) if fits else None
+
+    def __call__(self, x: Values) -> Values:
+        """Return the sums at points (N,), shape (N, C)."""
+        sums = self._in_fixed_point or self._in_balls
+        return np.concatenate([sums(x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)])
+
+    def _in_balls(self, x: Values) -> Values:
+        xp, series = self._xp, self._coefficients.shape[1] // 2
+        y = 2 * x * x - 1
+        with xp.at(xp.digits + _RECURRENCE_DIGITS):
+            table = np.stack(_polynomials(1 + 0 * y, y, len(self._coefficients)), axis=1)
+        sums = xp.product(table, self._coefficients)
+        return np.asarray(sums[:, :series] + x[:, None] * sums[:, series:])
+
+
+class _InFixedPoint:
+    """The same sums, of coefficients (terms, 2C), even and odd, of sizes (C,)."""
+
+    def __init__(self, coefficients: Values, sizes: Array, arithmetic: Any) -> None:
+        self._xp, self._bits = arithmetic, math.ceil((arithmetic.digits + _SPARE_DIGITS) * math.log2(10))
+        #: Powers of two above the coefficients.
+        self._scales = np.exp2(np.ceil(np.log2(np.where(sizes > 0, sizes, 1.0))) + 1)
+        middle = arithmetic.midpoints(coefficients)
+        self._weights = self._fixed(middle / np.tile(self._scales, 2))
+        # What an error of x and of every operation does, and what the coefficients leave open.
+        growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None] + 2
+        steepness = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
+        self._steepness = steepness.reshape(2, -1).sum(axis=0) + (2 * len(growth) + 4) * self._scales
+        self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(2, -1).sum(axis=0)
+
+    def __call__(self, x: Values) -> Values:
+        series = len(self._scales)
+        spread = max(float(ball.rad()) for ball in x) + 2.0**-self._bits
+        point, one = self._fixed(x), Fixed.of([np.ones(len(x))], self._bits)
+        polynomials = (point * (point + point) - one).polynomials(self._weights.limbs.shape[1])
+        sums = polynomials.weighted(self._weights)
+        total = sums[:, :series] + point[:, None] * sums[:, series:]
+        result = np.broadcast_to(self._xp.around_zero(self._open + self._xp.array(spread * self._steepness)), (len(x), series))
+        for part in total.parts():
+            result = result + part * self._scales
+        return np.asarray(result)
+
+    def _fixed(self, values: Values) -> Fixed:
+        parts = []
+        for _ in range(math.ceil(self._bits / _PART_BITS) + 1):
+            parts.append(values.astype(float))
+            values = values - parts[-1]
+        return Fixed.of(parts, self._bits)
+
+
+def _polynomials(one: Values, y: Values, count: int) -> list[Values]:
+    """Return T_0(y) … ."""
+    polynomials, doubled = [one, y], [2 * one, 2 * y]
+    for m in range(2, count):
+        polynomials.append(doubled[m // 2] * polynomials[m - m // 2] - polynomials[m % 2])
+        if 2 * m <= count:
+            doubled.append(2 * polynomials[m])
+    return polynomials[:count]

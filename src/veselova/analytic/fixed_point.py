@@ -1,0 +1,120 @@
+"""Fixed-point numbers of many digits whose sums of products are products of matrices of doubles.
+
+A number is Σ_i a_i 2^(−22i), i = 0 … L−1, with whole a_i in doubles: a table of numbers is L tables of doubles. After a carry they
+are at most 2²¹, all but the first. Factors may be a little larger (a product of a_i up to 2²³ and b_j up to 2²²), since sums of L
+products of limbs are exact in doubles as long as they stay below 2⁵³. What lies beyond the last limb is dropped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Fixed"]
+
+Array = NDArray[np.float64]
+
+#: Bits of a limb.
+_BITS = 22
+_BASE, _OF_BASE = 2.0**_BITS, 2.0**-_BITS
+
+#: A product with L limbs is off by at most (L+1) 2^(23 − 22L): the products beyond the one after the last limb, and that one.
+_DROPPED_BITS = 6
+
+#: Products of limbs up to 2²² and 2²¹ of which a sum is exact.
+_EXACT = 2**10
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A table of numbers below 2⁸, ``limbs`` of shape (L, …) with L at most 60."""
+
+    limbs: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[Array], bits: int) -> Fixed:
+        """Return sums of doubles, exact but for the last bit; no operation on them adds an error above 2^−bits."""
+        limbs = np.zeros((math.ceil((bits + _DROPPED_BITS) / _BITS) + 1, *parts[0].shape))
+        for rest in parts:
+            for i, limb in enumerate(limbs):
+                whole = np.rint(rest * _BASE**i)
+                limb += whole
+                rest = rest - whole * _OF_BASE**i
+        return cls(_carried(limbs))
+
+    def parts(self) -> list[Array]:
+        """Return doubles whose sums are the numbers, exactly."""
+        weighted = self.limbs * _OF_BASE ** np.arange(len(self.limbs)).reshape(-1, *(1,) * (self.limbs.ndim - 1))
+        return [weighted[:3].sum(axis=0), *(weighted[i : i + 2].sum(axis=0) for i in range(3, len(weighted), 2))]
+
+    def __add__(self, other: Fixed) -> Fixed:
+        return Fixed(self.limbs + other.limbs)
+
+    def __sub__(self, other: Fixed) -> Fixed:
+        return Fixed(self.limbs - other.limbs)
+
+    def __mul__(self, other: Fixed) -> Fixed:
+        a, b = self.limbs, other.limbs
+        count, shape = len(a), np.broadcast_shapes(a.shape[1:], b.shape[1:])
+        sums, products = np.zeros((count + 1, *shape)), np.empty((count, *shape))
+        for i in range(count):
+            most = min(count, count + 1 - i)
+            sums[i : i + most] += np.multiply(a[i], b[:most], out=products[:most])
+        return Fixed(_carried(sums)[:count])
+
+    def __getitem__(self, where: tuple[slice | None, ...]) -> Fixed:
+        return Fixed(self.limbs[:, *where])
+
+    def polynomials(self, count: int) -> Fixed:
+        """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i − T_{h−i} for a whole range of i."""
+        table = np.zeros((len(self.limbs), count, self.limbs.shape[1]))
+        table[0, 0], table[:, 1] = 1, self.limbs
+        last = 1
+        while last < count - 1:
+            rows = min(last, count - 1 - last)
+            middle, upwards = Fixed(2 * table[:, last : last + 1]), Fixed(table[:, 1 : rows + 1])
+            table[:, last + 1 : last + 1 + rows] = (middle * upwards - Fixed(table[:, last - rows : last][:, ::-1])).limbs
+            last += rows
+        return Fixed(table)
+
+    @staticmethod
+    def growth(count: int, error: float) -> Array:
+        """Return what those polynomials make of an error of their numbers, in units of that of an operation."""
+        errors = np.zeros(count)
+        errors[1:2], last = error, 1
+        while last < count - 1:
+            rows = min(last, count - 1 - last)
+            sums = 2 * errors[last] + 2 * errors[1 : rows + 1] + errors[last - rows : last][::-1] + 1
+            errors[last + 1 : last + 1 + rows], last = sums, last + rows
+        return errors
+
+    def weighted(self, weights: Fixed) -> Fixed:
+        """Return Σ_k x_kn w_kj, shape (N, J), for numbers (K, N) and weights (K, J)."""
+        count, terms, columns = weights.limbs.shape
+        size, most = self.limbs.shape[2], _EXACT // count
+        total = np.zeros((count, size, columns))
+        for first in range(0, terms, most):
+            some = slice(first, first + most)
+            factors, table = self.limbs[:, some], weights.limbs[:, some]
+            # Limb i of x times limb j of w goes to place i + j.
+            shifted = np.zeros((*table.shape[:2], count + 1, columns))
+            for i in range(count):
+                placed = np.moveaxis(table[: count + 1 - i], 0, 1)
+                shifted[i, :, i : i + placed.shape[1]] = placed
+            sums = factors.reshape(-1, size).T @ shifted.reshape(-1, (count + 1) * columns)
+            total += _carried(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
+        return Fixed(_carried(total) if terms > most else total)
+
+
+def _carried(limbs: Array) -> Array:
+    """Return limbs at most half the base, in place, but for the first; the last one is exact."""
+    for i in range(len(limbs) - 1, 0, -1):
+        over = np.rint(limbs[i] * _OF_BASE)
+        limbs[i - 1] += over
+        over *= _BASE
+        limbs[i] -= over
+    return limbs
