@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
+from veselova.analytic.enclosed_series import EnclosedSeries
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -36,6 +37,9 @@ _SAMPLED_PANELS = 200
 
 #: Newton's steps double the digits from those of a double, but for what they lose.
 _FIRST_DIGITS, _LOST_DIGITS = 12, 2
+
+#: Terms beyond those that the digits of a step ask for.
+_EXTRA_TERMS = 6
 
 #: Part of the slope at the approximate root that is certain next to it.
 _SLOPE = 0.5
@@ -191,21 +195,18 @@ class _Panels:
 
     def _roots_on(self, p: int, times: Values, approximate: NDArray[np.float64]) -> Values:
         """Newton's method on midpoints, then one step in intervals."""
-        xp, left, right = self.arithmetic, self.centres[p] - self.half, self.centres[p] + self.half
+        xp, centre, zero = self.arithmetic, self.centres[p], [self.arithmetic.number(0)]
         constant = self._ends[p] - np.sum(self._waves[p])
-        values = xp.cosine_sums(np.concatenate([[constant], self._waves[p]])[None, :, None])
-        rates = xp.cosine_sums(self.rates[p][None, :, None])
+        series = np.stack([np.concatenate([zero, self._waves[p]]), np.concatenate([self.rates[p], zero])])
 
         def clock(x: Values, digits: int) -> tuple[Values, Values]:
-            """Return t and dt/dx; a slope of half the digits doubles those of a root."""
-            theta = 2 * xp.atan2(xp.sqrt(x - left), xp.sqrt(right - x))[:, None]
-            with xp.at(digits):
-                value = values(theta)[:, 0, 0]
-            with xp.at(digits // 2):
-                rate = rates(theta)[:, 0, 0]
-            return xp.widened(value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
+            """Return t and dt/dx, of as many terms as so many digits take."""
+            terms = math.ceil(series.shape[1] * digits / xp.digits) + _EXTRA_TERMS
+            with xp.at(digits) as fewer:
+                value, rate = EnclosedSeries(series[:, :terms], fewer)((centre - x) / self.half).T
+                return xp.widened(constant + value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
 
-        lowest, highest = xp.midpoints(xp.array([left, right]))
+        lowest, highest = xp.midpoints(xp.array([centre - self.half, centre + self.half]))
         x = xp.array(np.clip(approximate, float(lowest), float(highest)))
         for digits in _doublings(xp.digits):
             value, rate = clock(x, digits)

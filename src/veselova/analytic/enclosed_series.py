@@ -34,8 +34,8 @@ _SPARE_DIGITS, _PART_BITS = 4, 52
 #: What an error ε of x and of every operation makes of 2x²−1, in ε.
 _OF_SQUARE = 6
 
-#: Sizes of series that doubles can be scaled to.
-_LEAST, _LARGEST = 1e-250, 1e250
+#: Sizes of series that doubles can be scaled to, and what makes up for the rounding of bounds in doubles.
+_LEAST, _LARGEST, _UPWARDS = 1e-250, 1e250, 1 + 1e-9
 
 
 class EnclosedSeries:
@@ -51,7 +51,7 @@ class EnclosedSeries:
             above = odd[j] = 2 * coefficients[:, 2 * j + 1] - above
         odd[0] = odd[0] / 2
         self._coefficients = np.concatenate([even, odd], axis=1)
-        sizes = np.max(np.abs(self._coefficients.astype(float)), axis=0).reshape(2, -1).max(axis=0)
+        sizes = np.sum(np.abs(self._coefficients.astype(float)), axis=0).reshape(2, -1).sum(axis=0)
         fits = arithmetic.digits <= _MOST_FIXED and np.all((sizes == 0) | ((sizes > _LEAST) & (sizes < _LARGEST)))
         self._in_fixed_point = _InFixedPoint(self._coefficients, sizes, arithmetic) if fits else None
 
@@ -70,11 +70,11 @@ class EnclosedSeries:
 
 
 class _InFixedPoint:
-    """The same sums, of coefficients (terms, 2C), even and odd, of sizes (C,)."""
+    """The same sums, of coefficients (terms, 2C), even and odd; of sizes (C,), sums of absolute values."""
 
     def __init__(self, coefficients: Values, sizes: Array, arithmetic: Any) -> None:
         self._xp, self._bits = arithmetic, math.ceil((arithmetic.digits + _SPARE_DIGITS) * math.log2(10))
-        #: Powers of two above the coefficients.
+        #: Powers of two above the sums.
         self._scales = np.exp2(np.ceil(np.log2(np.where(sizes > 0, sizes, 1.0))) + 1)
         middle = arithmetic.midpoints(coefficients)
         self._weights = self._fixed(middle / np.tile(self._scales, 2))
@@ -82,6 +82,7 @@ class _InFixedPoint:
         growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None] + 2
         steepness = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
         self._steepness = steepness.reshape(2, -1).sum(axis=0) + (2 * len(growth) + 4) * self._scales
+        self._steepness *= _UPWARDS
         self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(2, -1).sum(axis=0)
 
     def __call__(self, x: Values) -> Values:

@@ -31,7 +31,7 @@ _EXACT = 2**10
 
 @dataclass(frozen=True)
 class Fixed:
-    """A table of numbers below 2⁸, ``limbs`` of shape (L, …) with L at most 60."""
+    """A table of numbers below 2⁸, ``limbs`` of shape (L, …) with L at most 31."""
 
     limbs: Array
 
