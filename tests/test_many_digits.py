@@ -14,9 +14,11 @@ import veselova as vs
 from draws import random_riemann_matrix
 from test_theta import all_characteristics, as_flint_orders
 from veselova.analytic.balls import balls
+from veselova.analytic.enclosed_series import EnclosedSeries
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosed_windows import EnclosedWindows
 from veselova.analytic.enclosure import _quadratic_zeros, spheroconic
+from veselova.analytic.fixed_point import Fixed
 from veselova.analytic.precision import Arithmetic, Decimals, extended
 from veselova.analytic.secular import zeros_between_poles
 from veselova.mechanics.veselova import Veselova
@@ -81,6 +83,67 @@ def test_windows_that_do_not_resolve_a_motion_say_so() -> None:
         error = np.abs(found - motion(times))
         assert all(ball.contains(0) for ball in (found - motion(times)).ravel())
         assert float(np.max(xp.at_most(error))) < 1e-27
+
+
+@pytest.mark.parametrize("bits", [60, 216, 400])
+def test_fixed_point_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np.random.Generator) -> None:
+    """Against rationals: products, Chebyshev's polynomials, and sums of more terms than one product of matrices takes."""
+    count, terms = 5, 90
+    parts = [rng.uniform(-1, 1, count) * 2.0 ** (-50 * k) for k in range(bits // 50 + 2)]
+    weights = [rng.uniform(-1, 1, (terms, 2)) / terms * 2.0 ** (-50 * k) for k in range(bits // 50 + 2)]
+    x, w = Fixed.of([part / 2 for part in parts], bits), Fixed.of(weights, bits)
+    polynomials, exact_x, exact_w = x.polynomials(terms), in_rationals(x.parts()), in_rationals(w.parts())
+    exact: list[list[Fraction]] = [[Fraction(1)] * count, exact_x]
+    for _ in range(2, terms):
+        exact.append([2 * a * b - c for a, b, c in zip(exact_x, exact[-1], exact[-2], strict=True)])
+    growth, unit = Fixed.growth(terms, 0.0), Fraction(1, 2**bits)
+    found = in_rationals(polynomials.parts())
+    for k in range(terms):
+        for n in range(count):
+            assert abs(found[k * count + n] - exact[k][n]) <= float(growth[k]) * unit
+    sums = in_rationals(polynomials.weighted(w).parts())
+    for n in range(count):
+        for j in range(2):
+            expected = sum(exact[k][n] * exact_w[2 * k + j] for k in range(terms))
+            slack = sum(float(growth[k]) * abs(exact_w[2 * k + j]) for k in range(terms)) + terms
+            assert abs(sums[2 * n + j] - expected) <= slack * unit
+    product = in_rationals((x * (x + x)).parts())
+    assert all(abs(p - 2 * a * a) <= unit for p, a in zip(product, exact_x, strict=True))
+
+
+def in_rationals(parts: list[Any]) -> list[Fraction]:
+    return [sum(map(Fraction, row), Fraction()) for row in np.stack([part.ravel() for part in parts], axis=1).tolist()]
+
+
+@pytest.mark.parametrize(("digits", "terms"), [(15, 1), (20, 2), (30, 41), (60, 130), (100, 90)])
+def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng: np.random.Generator) -> None:
+    """Of all sizes, zero and coefficients that are open to a digit among them; and the radii are not empty promises."""
+    sizes = [1, Fraction(1, 10**200), 10**200, 0, 3]
+    with balls(digits, True) as xp:
+        decay = 10.0 ** (-digits / terms)
+        rows = [
+            [xp.number(size) * xp.number(x) * xp.number(decay) ** k for k, x in enumerate(rng.normal(size=terms))]
+            for size in sizes
+        ]
+        coefficients = np.array(rows, dtype=object)
+        coefficients[4] = xp.widened(coefficients[4], xp.number(10) ** -5)
+        points = xp.array(rng.uniform(-1, 1, 30)) / xp.sqrt(xp.number(2))
+        series = EnclosedSeries(coefficients, xp)
+        found, plain = series(points), series._in_balls(points)
+        assert series._in_fixed_point is not None
+        for row, of_balls in zip(found, plain, strict=True):
+            assert all(a.overlaps(b) for a, b in zip(row, of_balls, strict=True))
+            widths = [float(a.rad() / xp.number(size)) for a, size in zip(row, sizes, strict=True) if size]
+            assert max(widths[:3]) < 10.0 ** (2 - digits) * terms
+            assert 1e-6 < widths[3] < 1e-5 * (2 * terms) ** 2
+            assert row[3] == 0 or abs(row[3]) < xp.number(10) ** -digits
+
+
+def test_series_beyond_the_range_of_scales_stay_in_balls() -> None:
+    with balls(30, False) as xp:
+        series = EnclosedSeries(np.array([[xp.number(10) ** 400, xp.number(10) ** 399]], dtype=object), xp)
+        assert series._in_fixed_point is None
+        assert series(xp.array([Fraction(1, 2)]))[0, 0].contains(xp.number(105) * xp.number(10) ** 398)
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3])

@@ -1,7 +1,7 @@
 """Chebyshev series in balls, several at once at many points.
 
-Sums go over even and odd terms apart: T_2j(x) = T_j(y) with y = 2x²−1, and T_2j+1(x) = x (2T_j(y) − 2T_{j−1}(y) + … ± T_0), so half
-as many polynomials are formed, by T_{j+k} = 2T_jT_k − T_{j−k}. Up to a hundred digits that is done in fixed point.
+Sums go over even and odd terms apart: T_2j(x) = T_j(y) with y = 2x²−1, and T_2j+1(x) = x (2T_j(y) − 2T_{j−1}(y) + … ± T_0), so
+half as many polynomials are formed, by T_{j+k} = 2T_jT_k − T_{j−k}. Up to a hundred digits that is done in fixed point.
 """
 
 from __future__ import annotations

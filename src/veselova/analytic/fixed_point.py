@@ -1,8 +1,8 @@
 """Fixed-point numbers of many digits whose sums of products are products of matrices of doubles.
 
-A number is Σ_i a_i 2^(−22i), i = 0 … L−1, with whole a_i in doubles: a table of numbers is L tables of doubles. After a carry they
-are at most 2²¹, all but the first. Factors may be a little larger (a product of a_i up to 2²³ and b_j up to 2²²), since sums of L
-products of limbs are exact in doubles as long as they stay below 2⁵³. What lies beyond the last limb is dropped.
+A number is Σ_i a_i 2^(−22i), i = 0 … L−1, with whole a_i in doubles: a table of numbers is L tables of doubles. After a carry
+they are at most 2²¹, all but the first. Factors may be a little larger, a_i up to 2²³ in one and 2²² in the other, since sums of
+L products of limbs are exact in doubles as long as they stay below 2⁵³. What lies beyond the last limb is dropped.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Fixed:
 
     def polynomials(self, count: int) -> Fixed:
         """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i − T_{h−i} for a whole range of i."""
-        table = np.zeros((len(self.limbs), count, self.limbs.shape[1]))
+        table = np.zeros((len(self.limbs), max(count, 2), self.limbs.shape[1]))
         table[0, 0], table[:, 1] = 1, self.limbs
         last = 1
         while last < count - 1:
@@ -79,7 +79,7 @@ class Fixed:
             middle, upwards = Fixed(2 * table[:, last : last + 1]), Fixed(table[:, 1 : rows + 1])
             table[:, last + 1 : last + 1 + rows] = (middle * upwards - Fixed(table[:, last - rows : last][:, ::-1])).limbs
             last += rows
-        return Fixed(table)
+        return Fixed(table[:, :count])
 
     @staticmethod
     def growth(count: int, error: float) -> Array:
