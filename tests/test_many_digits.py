@@ -128,8 +128,8 @@ def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng:
         coefficients = np.array(rows, dtype=object)
         coefficients[4] = xp.widened(coefficients[4], xp.number(10) ** -5)
         points = xp.array(rng.uniform(-1, 1, 30)) / xp.sqrt(xp.number(2))
-        series = EnclosedSeries(coefficients, xp)
-        found, plain = series(points), series._in_balls(points)
+        series = EnclosedSeries(coefficients[None], xp)
+        found, plain = series(0, points), series._in_balls(0, points)
         assert series._in_fixed_point is not None
         for row, of_balls in zip(found, plain, strict=True):
             assert all(a.overlaps(b) for a, b in zip(row, of_balls, strict=True))
@@ -141,9 +141,9 @@ def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng:
 
 def test_series_beyond_the_range_of_scales_stay_in_balls() -> None:
     with balls(30, False) as xp:
-        series = EnclosedSeries(np.array([[xp.number(10) ** 400, xp.number(10) ** 399]], dtype=object), xp)
+        series = EnclosedSeries(np.array([[[xp.number(10) ** 400, xp.number(10) ** 399]]], dtype=object), xp)
         assert series._in_fixed_point is None
-        assert series(xp.array([Fraction(1, 2)]))[0, 0].contains(xp.number(105) * xp.number(10) ** 398)
+        assert series(0, xp.array([Fraction(1, 2)]))[0, 0].contains(xp.number(105) * xp.number(10) ** 398)
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3])

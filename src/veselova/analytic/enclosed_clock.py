@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -187,23 +188,33 @@ class _Panels:
     def roots(self, times: Values, approximate: NDArray[np.float64]) -> Values:
         """Return x with t(x) = times, from approximate values."""
         places = np.searchsorted(self._ends[1:].astype(float), times.astype(float))
+        panels, places = np.unique(np.minimum(places, len(self.centres) - 1), return_inverse=True)
+        steps = {digits: self._series(panels, digits) for digits in [*_doublings(self.arithmetic.digits), self.arithmetic.digits]}
         result = np.empty(times.shape, dtype=object)
-        for p in np.unique(places):
-            rows, panel = np.flatnonzero(places == p), min(int(p), len(self.centres) - 1)
-            result[rows] = self._roots_on(panel, times[rows], approximate[rows])
+        for place, panel in enumerate(panels.tolist()):
+            rows = np.flatnonzero(places == place)
+            clocks = {digits: partial(series, place) for digits, series in steps.items()}
+            result[rows] = self._roots_on(panel, clocks, times[rows], approximate[rows])
         return result
 
-    def _roots_on(self, p: int, times: Values, approximate: NDArray[np.float64]) -> Values:
-        """Newton's method on midpoints, then one step in intervals."""
-        xp, centre, zero = self.arithmetic, self.centres[p], [self.arithmetic.number(0)]
-        constant = self._ends[p] - np.sum(self._waves[p])
-        series = np.stack([np.concatenate([zero, self._waves[p]]), np.concatenate([self.rates[p], zero])])
+    def _series(self, panels: NDArray[np.intp], digits: int) -> EnclosedSeries:
+        """Return the series of t less a constant, and of dt/dx, on some panels, of as many terms as so many digits take."""
+        xp, zero = self.arithmetic, self.arithmetic.array(np.zeros((len(panels), 1)))
+        both = [np.hstack([zero, self._waves[panels]]), np.hstack([self.rates[panels], zero])]
+        terms = math.ceil(both[0].shape[1] * digits / xp.digits) + _EXTRA_TERMS
+        with xp.at(digits) as fewer:
+            return EnclosedSeries(np.stack(both, axis=1)[:, :, :terms], fewer)
+
+    def _roots_on(
+        self, p: int, clocks: Mapping[int, Callable[[Values], Values]], times: Values, approximate: NDArray[np.float64]
+    ) -> Values:
+        """Newton's method on midpoints, then one step in intervals, with the series of each step by its digits."""
+        xp, centre, constant = self.arithmetic, self.centres[p], self._ends[p] - np.sum(self._waves[p])
 
         def clock(x: Values, digits: int) -> tuple[Values, Values]:
-            """Return t and dt/dx, of as many terms as so many digits take."""
-            terms = math.ceil(series.shape[1] * digits / xp.digits) + _EXTRA_TERMS
-            with xp.at(digits) as fewer:
-                value, rate = EnclosedSeries(series[:, :terms], fewer)((centre - x) / self.half).T
+            """Return t and dt/dx."""
+            with xp.at(digits):
+                value, rate = clocks[digits]((centre - x) / self.half).T
                 return xp.widened(constant + value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
 
         lowest, highest = xp.midpoints(xp.array([centre - self.half, centre + self.half]))

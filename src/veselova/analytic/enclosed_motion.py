@@ -113,7 +113,7 @@ class EnclosedMotion:
         return Trajectory(self.problem, grid, error, arrays, provenance, self, decimals)
 
     def _attempt(
-        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction, ...], clock: Clock, reach: float
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], clock: Clock, reach: float
     ) -> tuple[_Found, Any]:
         solution = EnclosedSolution(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:

@@ -39,38 +39,39 @@ _LEAST, _LARGEST, _UPWARDS = 1e-250, 1e250, 1 + 1e-9
 
 
 class EnclosedSeries:
-    """The series Σ_m c_cm T_m(x), |x| ≤ 1, for coefficients (C, M), balls."""
+    """C series Σ_m c_cm T_m(x), |x| ≤ 1, on each of W intervals, for coefficients (W, C, M), balls."""
 
     def __init__(self, coefficients: Values, arithmetic: Any) -> None:
         self._xp = arithmetic
-        series, terms = coefficients.shape
-        even, odd = np.zeros((2, (terms + 1) // 2, series), dtype=object)
-        even[:] = coefficients[:, ::2].T
+        intervals, series, count = coefficients.shape
+        terms = np.moveaxis(coefficients, 2, 0)
+        even, odd = np.zeros((2, (count + 1) // 2, intervals, series), dtype=object)
+        even[:] = terms[::2]
         above: Any = 0  # d_j = 2c_{2j+1} − d_{j+1}, and half of that for d_0
-        for j in reversed(range(terms // 2)):
-            above = odd[j] = 2 * coefficients[:, 2 * j + 1] - above
+        for j in reversed(range(count // 2)):
+            above = odd[j] = 2 * terms[2 * j + 1] - above
         odd[0] = odd[0] / 2
-        self._coefficients = np.concatenate([even, odd], axis=1)
-        sizes = np.sum(np.abs(self._coefficients.astype(float)), axis=0).reshape(2, -1).sum(axis=0)
+        self._coefficients = np.concatenate([even, odd], axis=2)
+        sizes = np.sum(np.abs(self._coefficients.astype(float)), axis=0).reshape(intervals, 2, series).sum(axis=1)
         fits = arithmetic.digits <= _MOST_FIXED and np.all((sizes == 0) | ((sizes > _LEAST) & (sizes < _LARGEST)))
         self._in_fixed_point = _InFixedPoint(self._coefficients, sizes, arithmetic) if fits else None
 
-    def __call__(self, x: Values) -> Values:
-        """Return the sums at points (N,), shape (N, C)."""
+    def __call__(self, interval: int, x: Values) -> Values:
+        """Return the sums of an interval at points (N,), shape (N, C)."""
         sums = self._in_fixed_point or self._in_balls
-        return np.concatenate([sums(x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)])
+        return np.concatenate([sums(interval, x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)])
 
-    def _in_balls(self, x: Values) -> Values:
-        xp, series = self._xp, self._coefficients.shape[1] // 2
-        y = 2 * x * x - 1
+    def _in_balls(self, interval: int, x: Values) -> Values:
+        xp, coefficients = self._xp, self._coefficients[:, interval]
+        y, series = 2 * x * x - 1, coefficients.shape[1] // 2
         with xp.at(xp.digits + _RECURRENCE_DIGITS):
-            table = np.stack(_polynomials(1 + 0 * y, y, len(self._coefficients)), axis=1)
-        sums = xp.product(table, self._coefficients)
+            table = np.stack(_polynomials(1 + 0 * y, y, len(coefficients)), axis=1)
+        sums = xp.product(table, coefficients)
         return np.asarray(sums[:, :series] + x[:, None] * sums[:, series:])
 
 
 class _InFixedPoint:
-    """The same sums, of coefficients (terms, 2C), even and odd; of sizes (C,), sums of absolute values."""
+    """The same sums, of coefficients (terms, W, 2C), even and odd; of sizes (W, C), sums of absolute values."""
 
     def __init__(self, coefficients: Values, sizes: Array, arithmetic: Any) -> None:
         self._xp, self._bits = arithmetic, math.ceil((arithmetic.digits + _SPARE_DIGITS) * math.log2(10))
@@ -79,22 +80,22 @@ class _InFixedPoint:
         middle = arithmetic.midpoints(coefficients)
         self._weights = self._fixed(middle / np.tile(self._scales, 2))
         # What an error of x and of every operation does, and what the coefficients leave open.
-        growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None] + 2
+        growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None, None] + 2
         steepness = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
-        self._steepness = steepness.reshape(2, -1).sum(axis=0) + (2 * len(growth) + 4) * self._scales
-        self._steepness *= _UPWARDS
-        self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(2, -1).sum(axis=0)
+        both = (*sizes.shape[:1], 2, *sizes.shape[1:])
+        self._steepness = (steepness.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * _UPWARDS
+        self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(both).sum(axis=1)
 
-    def __call__(self, x: Values) -> Values:
-        series = len(self._scales)
-        spread = max(float(ball.rad()) for ball in x) + 2.0**-self._bits
+    def __call__(self, interval: int, x: Values) -> Values:
+        xp, scales, weights = self._xp, self._scales[interval], self._weights[:, interval]
+        spread, series = max(float(ball.rad()) for ball in x) + 2.0**-self._bits, len(scales)
         point, one = self._fixed(x), Fixed.of([np.ones(len(x))], self._bits)
-        polynomials = (point * (point + point) - one).polynomials(self._weights.limbs.shape[1])
-        sums = polynomials.weighted(self._weights)
+        sums = (point * (point + point) - one).polynomials(weights.limbs.shape[1]).weighted(weights)
         total = sums[:, :series] + point[:, None] * sums[:, series:]
-        result = np.broadcast_to(self._xp.around_zero(self._open + self._xp.array(spread * self._steepness)), (len(x), series))
+        slack = xp.around_zero(self._open[interval] + xp.array(spread * self._steepness[interval]))
+        result = np.broadcast_to(slack, (len(x), series))
         for part in total.parts():
-            result = result + part * self._scales
+            result = result + part * scales
         return np.asarray(result)
 
     def _fixed(self, values: Values) -> Fixed:

@@ -95,10 +95,10 @@ class EnclosedWindows:
             return None
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
         slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
-        series, slack = series.reshape(self.count, columns, -1), slack.reshape(self.count, columns)
+        sums, slack = EnclosedSeries(series.reshape(self.count, columns, -1), xp), slack.reshape(self.count, columns)
         for w, rows in self._rows(times):
             x = (self._centres[w] - times[rows]) / self.half
-            result[rows] = xp.widened(EnclosedSeries(series[w], xp)(x), slack[w])
+            result[rows] = xp.widened(sums(w, x), slack[w])
         return result
 
     def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:

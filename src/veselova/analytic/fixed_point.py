@@ -66,7 +66,7 @@ class Fixed:
             sums[i : i + most] += np.multiply(a[i], b[:most], out=products[:most])
         return Fixed(_carried(sums)[:count])
 
-    def __getitem__(self, where: tuple[slice | None, ...]) -> Fixed:
+    def __getitem__(self, where: tuple[slice | int | None, ...]) -> Fixed:
         return Fixed(self.limbs[:, *where])
 
     def polynomials(self, count: int) -> Fixed:

@@ -43,10 +43,13 @@ def _are_doubles(times: Any) -> bool:
     return isinstance(times, np.ndarray) and not isinstance(times, np.ma.MaskedArray) and times.ndim == 1 and times.dtype == float
 
 
-def exact_times(times: Any) -> tuple[tuple[Fraction, ...], Array]:
-    """Return the times as exact rationals, and as validated doubles; raises InvalidInput as above."""
+def exact_times(times: Any) -> tuple[tuple[Fraction | float, ...], Array]:
+    """Return the times as exact numbers, doubles that stand for themselves or rationals, and as validated doubles.
+
+    Raises InvalidInput as above.
+    """
     grid = validated_times(times)
-    return exact_vector(times, ("times",)), grid
+    return tuple(grid.tolist()) if _are_doubles(times) else exact_vector(times, ("times",)), grid
 
 
 def uniform_times(start: float, stop: float, count: int) -> Array:
