@@ -217,6 +217,14 @@ def test_a_frame_given_to_many_digits_is_made_orthogonal_to_all_of_them() -> Non
         assert all((symmetric - symmetric.T).ravel()[k].overlaps(flint.arb(0)) for k in range(16))
 
 
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_the_rate_of_the_clock_is_one_theta_quotient(n: int, rng: np.random.Generator) -> None:
+    solution = Solution(random_problem(rng, n, 100.0))
+    z = rng.uniform(-1, 1, (50, n - 1))
+    ratio = solution.quotients.stretch(z) / solution.rate.at(solution.inversion.invert(z))
+    assert np.max(np.abs(ratio / ratio[0] - 1)) < 1e-12
+
+
 def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> None:
     """At the edge of the strip, |Im v| = K'/2, the forms are evaluated with mpmath's elliptic functions."""
     with balls(20) as xp:

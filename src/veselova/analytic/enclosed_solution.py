@@ -102,10 +102,10 @@ class EnclosedSolution:
             if method == "theta":
                 theta = EnclosedTheta(inversion.periods.riemann_matrix, self.arithmetic)
                 self._quotients = ThetaQuotients(theta, self.frame)
-            position = None if self._quotients is None else self._quotients.position
+            stretch = None if self._quotients is None else self._quotients.stretch
             # Doubles do not see every direction that moves.
             coarse_rate = coarse.rate_at if coarse.moving.size == self.moving.size else None
-            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, position, coarse_rate)
+            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, stretch, coarse_rate)
 
     def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took.

@@ -108,6 +108,15 @@ class ThetaQuotients:
         values = self.theta.values(z, [self.functions[i] for i in (0, *self.places[:n].tolist())])
         return np.asarray(values[:, 1:] / values[:, :1] * constants)
 
+    def stretch(self, z: Array) -> Array:
+        """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a constant, and never zero.
+
+        For (q,Aq) = Π λ_s/Π I_i, and Π_s (λ_s − b) is a constant times (θ[η(b)]/θ)² at every branch point b.
+        """
+        of_zero = self.functions[self.places[2 * self.theta.genus]]
+        values = self.theta.values(z, [self.functions[0], of_zero])
+        return np.asarray(np.abs(values[:, 1] / values[:, 0]))
+
     def slopes(self, z: Array) -> Array:
         """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-8."""
         genus = self.theta.genus

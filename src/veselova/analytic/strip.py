@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.clock import ClockRate, clock_rate
+from veselova.analytic.clock import ClockRate
 from veselova.analytic.precision import Values
 from veselova.analytic.spectrum import Spectrum
 
@@ -34,15 +34,15 @@ _LARGEST_TURN = 0.4142
 class Orbit:
     """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls.
 
-    position: q at phases, by theta functions, where angles are not to be asked · coarse_rates: dt/dτ₁ at phases in doubles,
-    where these can give it
+    stretch: √(q,Aq) at phases but for a constant, by theta functions, where angles are not to be asked · coarse_rates: dt/dτ₁ at
+    phases in doubles, where these can give it
     """
 
     spectrum: Spectrum
     rate: ClockRate
     start: Values
     frequencies: Values
-    position: Callable[[Values], Values] | None
+    stretch: Callable[[Values], Values] | None
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
     def phases(self, tau1: Values) -> Values:
@@ -53,9 +53,15 @@ class Orbit:
     def rates(self, tau1: Values) -> Values:
         """Return dt/dτ₁ at Neumann times (N,)."""
         z = self.phases(tau1)
-        if self.position is None:
+        if self.stretch is None:
             return self.rate.at(self.rate.inversion.invert(z))
-        return 1 / clock_rate(self.spectrum, "t", self.rate.inversion.arithmetic)(self.position(z))
+        return np.asarray(self._unit * self.stretch(z))
+
+    @cached_property
+    def _unit(self) -> Any:
+        """Return dt/dτ₁ over the stretch, from the start."""
+        assert self.stretch is not None
+        return 1 / (self.rate.inversion.arithmetic.number(self.spectrum.clock_rate) * self.stretch(self.start[None, :])[0])
 
     @cached_property
     def strip(self) -> tuple[float, Any]:
