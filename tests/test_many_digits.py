@@ -118,7 +118,7 @@ def in_rationals(parts: list[Any]) -> list[Fraction]:
 @pytest.mark.parametrize(("digits", "terms"), [(15, 1), (20, 2), (30, 41), (60, 130), (100, 90)])
 def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng: np.random.Generator) -> None:
     """Of all sizes, zero and coefficients that are open to a digit among them; and the radii are not empty promises."""
-    sizes = [1, Fraction(1, 10**200), 10**200, 0, 3]
+    sizes = [1, Fraction(1, 10**140), 10**140, 0, 3]
     with balls(digits, True) as xp:
         decay = 10.0 ** (-digits / terms)
         rows = [
@@ -139,11 +139,20 @@ def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng:
             assert row[3] == 0 or abs(row[3]) < xp.number(10) ** -digits
 
 
-def test_series_beyond_the_range_of_scales_stay_in_balls() -> None:
-    with balls(30, False) as xp:
-        series = EnclosedSeries(np.array([[[xp.number(10) ** 400, xp.number(10) ** 399]]], dtype=object), xp)
-        assert series._in_fixed_point is None
-        assert series(0, xp.array([Fraction(1, 2)]))[0, 0].contains(xp.number(105) * xp.number(10) ** 398)
+def test_series_beyond_the_range_of_fixed_point_stay_in_balls() -> None:
+    """Those too large for doubles, those whose last digits are below them, and points that are not in [−1, 1]."""
+    with balls(80, False) as xp:
+        for size in (10**400, Fraction(1, 10**249)):
+            row = [xp.number(size), xp.number(size) / 3]
+            found = EnclosedSeries(np.array([[row]], dtype=object), xp)(0, xp.array([Fraction(1, 7)]))[0, 0]
+            assert (found - row[0] - row[1] / 7).contains(0)
+            assert found.rad() < xp.number(size) * xp.number(10) ** -78
+        polynomial = np.zeros((1, 1, 40), dtype=object)
+        polynomial[0, 0, 39] = xp.number(1)
+        series = EnclosedSeries(polynomial, xp)
+        wide = xp.widened(xp.array([Fraction(101, 100)]), xp.number(1) / 100)
+        assert series(0, wide)[0, 0].contains(1)  # at 1, which is a point of that ball
+        assert abs(series(0, xp.array([2]))[0, 0] / np.cosh(39 * np.arccosh(2.0)) - 1) < 1e-12
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3])

@@ -31,11 +31,14 @@ _RECURRENCE_DIGITS = 6
 #: Digits of fixed-point numbers beyond those of the series, and bits of a double that is one part of a number.
 _SPARE_DIGITS, _PART_BITS = 4, 52
 
-#: What an error ε of x and of every operation makes of 2x²−1, in ε.
+#: What an error ε of x and of every operation makes of 2x²−1, in ε: 4 and 1, and what is of second order.
 _OF_SQUARE = 6
 
-#: Sizes of series that doubles can be scaled to, and what makes up for the rounding of bounds in doubles.
-_LEAST, _LARGEST, _UPWARDS = 1e-250, 1e250, 1 + 1e-9
+#: Sizes of series that doubles can be scaled to, with all their digits.
+_LEAST, _LARGEST = 1e-150, 1e150
+
+#: Points beyond ±1 by more than the rounding of an end are left to balls. That, and bounds in doubles, change those by less.
+_ROUNDING, _UPWARDS = 1e-15, 1 + 1e-6
 
 
 class EnclosedSeries:
@@ -57,9 +60,15 @@ class EnclosedSeries:
         self._in_fixed_point = _InFixedPoint(self._coefficients, sizes, arithmetic) if fits else None
 
     def __call__(self, interval: int, x: Values) -> Values:
-        """Return the sums of an interval at points (N,), shape (N, C)."""
-        sums = self._in_fixed_point or self._in_balls
-        return np.concatenate([sums(interval, x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)])
+        """Return the sums of an interval at points (N,), one at least, shape (N, C)."""
+        return np.concatenate([self._at(interval, x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)])
+
+    def _at(self, interval: int, x: Values) -> Values:
+        spread = max(float(ball.rad()) for ball in x)
+        inside = float(np.max(np.abs(x.astype(float)))) + spread <= 1 + _ROUNDING
+        if inside and self._in_fixed_point is not None:
+            return self._in_fixed_point(interval, x, spread)
+        return self._in_balls(interval, x)
 
     def _in_balls(self, interval: int, x: Values) -> Values:
         xp, coefficients = self._xp, self._coefficients[:, interval]
@@ -86,14 +95,14 @@ class _InFixedPoint:
         self._steepness = (steepness.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * _UPWARDS
         self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(both).sum(axis=1)
 
-    def __call__(self, interval: int, x: Values) -> Values:
+    def __call__(self, interval: int, x: Values, spread: float) -> Values:
+        """Return the sums of an interval at points that are open by ``spread`` at most."""
         xp, scales, weights = self._xp, self._scales[interval], self._weights[:, interval]
-        spread, series = max(float(ball.rad()) for ball in x) + 2.0**-self._bits, len(scales)
+        series, slack = len(scales), (spread + 2.0**-self._bits) * xp.array(self._steepness[interval])
         point, one = self._fixed(x), Fixed.of([np.ones(len(x))], self._bits)
         sums = (point * (point + point) - one).polynomials(weights.limbs.shape[1]).weighted(weights)
         total = sums[:, :series] + point[:, None] * sums[:, series:]
-        slack = xp.around_zero(self._open[interval] + xp.array(spread * self._steepness[interval]))
-        result = np.broadcast_to(slack, (len(x), series))
+        result = np.broadcast_to(xp.around_zero(self._open[interval] + slack), (len(x), series))
         for part in total.parts():
             result = result + part * scales
         return np.asarray(result)

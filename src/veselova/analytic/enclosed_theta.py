@@ -85,7 +85,7 @@ class EnclosedTheta:
             heights, common, r, nearest = self._bells(z, delta_G)
             x, tables = (list(parts) for parts in zip(*map(self._crossing, families), strict=True))
             table = np.concatenate(tables, axis=1)
-            # Classes of k; real and imaginary parts of each x; points.
+            # Classes of k; for each family the real parts of its x, then the imaginary ones; points.
             products = np.stack([xp.product(heights[:, rows], table[rows]).T for _, rows in self._classes])
             # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
             y_F = z[:, F] - (r @ self._parts[1].T if F and G else 0)
@@ -161,6 +161,7 @@ class _Sums:
         total: Any = 0
         for sign, of_class in zip(signs, parts, strict=True):
             for turn, part in zip(turns, of_class, strict=True):
+                # i^2 and i^3 are −1 and −i.
                 total = total - part if (sign < 0) != (turn > 1) else total + part
         return np.asarray(total)
 

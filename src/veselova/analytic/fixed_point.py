@@ -1,8 +1,8 @@
 """Fixed-point numbers of many digits whose sums of products are products of matrices of doubles.
 
 A number is Σ_i a_i 2^(−22i), i = 0 … L−1, with whole a_i in doubles: a table of numbers is L tables of doubles. After a carry
-they are at most 2²¹, all but the first. Factors may be a little larger, a_i up to 2²³ in one and 2²² in the other, since sums of
-L products of limbs are exact in doubles as long as they stay below 2⁵³. What lies beyond the last limb is dropped.
+they are at most 2²¹, all but the first, after a sum of two 2²². Sums of L products of such limbs are far below 2⁵³, so they are
+exact in doubles. What lies beyond the last limb is dropped.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ Array = NDArray[np.float64]
 _BITS = 22
 _BASE, _OF_BASE = 2.0**_BITS, 2.0**-_BITS
 
-#: A product with L limbs is off by at most (L+1) 2^(23 − 22L): the products beyond the one after the last limb, and that one.
+#: A product with L limbs, one of the factors a sum, drops (L−1) 2^(21 − 22L), the products beyond the limb after the last, and
+#: that limb. With so many bits beyond those asked for, 22(L−1) or more in all, that is below 2^−bits for any L up to 2¹⁰.
 _DROPPED_BITS = 6
 
-#: Products of limbs up to 2²² and 2²¹ of which a sum is exact.
-_EXACT = 2**10
+#: Products of limbs up to 2²¹ of which a sum is exact.
+_EXACT = 2**11
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """A table of numbers below 2⁸, ``limbs`` of shape (L, …) with L at most 31."""
+    """A table of numbers below 2⁸, ``limbs`` of shape (L, …)."""
 
     limbs: Array
 
@@ -58,13 +59,7 @@ class Fixed:
         return Fixed(self.limbs - other.limbs)
 
     def __mul__(self, other: Fixed) -> Fixed:
-        a, b = self.limbs, other.limbs
-        count, shape = len(a), np.broadcast_shapes(a.shape[1:], b.shape[1:])
-        sums, products = np.zeros((count + 1, *shape)), np.empty((count, *shape))
-        for i in range(count):
-            most = min(count, count + 1 - i)
-            sums[i : i + most] += np.multiply(a[i], b[:most], out=products[:most])
-        return Fixed(_carried(sums)[:count])
+        return Fixed(_carried(_products(self.limbs, other.limbs))[:-1])
 
     def __getitem__(self, where: tuple[slice | int | None, ...]) -> Fixed:
         return Fixed(self.limbs[:, *where])
@@ -76,14 +71,18 @@ class Fixed:
         last = 1
         while last < count - 1:
             rows = min(last, count - 1 - last)
-            middle, upwards = Fixed(2 * table[:, last : last + 1]), Fixed(table[:, 1 : rows + 1])
-            table[:, last + 1 : last + 1 + rows] = (middle * upwards - Fixed(table[:, last - rows : last][:, ::-1])).limbs
+            sums = _products(2 * table[:, last : last + 1], table[:, 1 : rows + 1])
+            sums[:-1] -= table[:, last - rows : last][:, ::-1]
+            table[:, last + 1 : last + 1 + rows] = _carried(sums)[:-1]
             last += rows
         return Fixed(table[:, :count])
 
     @staticmethod
     def growth(count: int, error: float) -> Array:
-        """Return what those polynomials make of an error of their numbers, in units of that of an operation."""
+        """Return the errors of these polynomials, |x| ≤ 1, to first order, in units of that of an operation.
+
+        ``error``: that of their numbers.
+        """
         errors = np.zeros(count)
         errors[1:2], last = error, 1
         while last < count - 1:
@@ -108,6 +107,16 @@ class Fixed:
             sums = factors.reshape(-1, size).T @ shifted.reshape(-1, (count + 1) * columns)
             total += _carried(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
         return Fixed(_carried(total) if terms > most else total)
+
+
+def _products(a: Array, b: Array) -> Array:
+    """Return the products of two tables of limbs, L and one more, not carried."""
+    count, shape = len(a), np.broadcast_shapes(a.shape[1:], b.shape[1:])
+    sums, products = np.zeros((count + 1, *shape)), np.empty((count, *shape))
+    for i in range(count):
+        most = min(count, count + 1 - i)
+        sums[i : i + most] += np.multiply(a[i], b[:most], out=products[:most])
+    return sums
 
 
 def _carried(limbs: Array) -> Array:
