@@ -6,7 +6,7 @@ Gaussians and waves share one product of matrices: ε_G only gives signs to clas
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import Coordinates, centred_points, half_of, lattice_points, small_norm
+from veselova.analytic.lattice import Coordinates, Halves, Member, centred_points, half_of, lattice_points, small_norm
 from veselova.analytic.precision import Values
 from veselova.mechanics.errors import Unsolved
 
@@ -79,32 +79,33 @@ class EnclosedTheta:
 
         The first characteristic must be zero: what the sums leave out is measured against its values, which have no zeros.
         """
-        xp, F, G = self._xp, self._F, self._G
         result, z = np.empty((len(z), len(characteristics)), dtype=object), self._coordinates.points(z)
         for delta_G, families in self._coordinates.families(characteristics).items():
-            heights, common, r, nearest = self._bells(z, delta_G)
-            x, tables = (list(parts) for parts in zip(*map(self._crossing, families), strict=True))
-            table = np.concatenate(tables, axis=1)
-            # Classes of k; for each family the real parts of its x, then the imaginary ones; points.
-            products = np.stack([xp.product(heights[:, rows], table[rows]).T for _, rows in self._classes])
-            # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
-            y_F = z[:, F] - (r @ self._parts[1].T if F and G else 0)
-            waves = xp.waves(np.concatenate(x), xp.turns(y_F / 2)) if F else None
-            first = 0
-            for orders, members in zip(x, families.values(), strict=True):
-                rows, first = slice(first, first + len(orders)), first + len(orders)
-                parts = products[:, 2 * rows.start : 2 * rows.stop]
-                sums = _Sums(orders, parts[:, : len(orders)], parts[:, len(orders) :], waves and (waves[0][rows], waves[1][rows]))
-                for place, characteristic, sign in members:
-                    epsilon, delta = (
-                        np.array([of[i] for i in places], dtype=np.int64)
-                        for of, places in ((characteristic.epsilon, G), (characteristic.delta, F))
-                    )
-                    value = common * sums.of([-1 if parity @ epsilon % 2 else 1 for parity, _ in self._classes], delta)
-                    flipped = (nearest @ epsilon % 2 == 1) ^ (sign < 0)
-                    value[flipped] = -value[flipped]
-                    result[:, place] = value
-        return np.asarray(xp.widened(result, np.abs(result[:, :1]) * xp.epsilon))
+            self._fill(result, z, delta_G, families)
+        return np.asarray(self._xp.widened(result, np.abs(result[:, :1]) * self._xp.epsilon))
+
+    def _fill(self, result: Values, z: Values, delta_G: Halves, families: Mapping[Halves, Sequence[Member]]) -> None:
+        """Write the values of the characteristics with one δ_G, which share their Gaussians, to their places."""
+        xp, F, G = self._xp, self._F, self._G
+        heights, common, r, nearest = self._bells(z, delta_G)
+        x, tables = (list(parts) for parts in zip(*map(self._crossing, families), strict=True))
+        table = np.concatenate(tables, axis=1)
+        # Classes of k; for each family the real parts of its x, then the imaginary ones; points.
+        products = np.stack([xp.product(heights[:, rows], table[rows]).T for _, rows in self._classes])
+        # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
+        y_F = z[:, F] - (r @ self._parts[1].T if F and G else 0)
+        waves = xp.waves(np.concatenate(x), xp.turns(y_F / 2)) if F else None
+        first = 0
+        for orders, members in zip(x, families.values(), strict=True):
+            rows, first = slice(first, first + len(orders)), first + len(orders)
+            real, imaginary = np.split(products[:, 2 * rows.start : 2 * rows.stop], 2, axis=1)
+            sums = _Sums(orders, real, imaginary, waves and (waves[0][rows], waves[1][rows]))
+            for place, characteristic, sign in members:
+                epsilon, delta = _at(characteristic.epsilon, G), _at(characteristic.delta, F)
+                values = common * sums.of([-1 if parity @ epsilon % 2 else 1 for parity, _ in self._classes], delta)
+                flipped = (nearest @ epsilon % 2 == 1) ^ (sign < 0)
+                values[flipped] = -values[flipped]
+                result[:, place] = values
 
     @cached_property
     def _classes(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
@@ -175,6 +176,10 @@ class _Sums:
                 terms = -(sines * real + cosines * imaginary) if odd else cosines * real - sines * imaginary
             self._parts[odd] = [[np.sum(of_class[rows], axis=0) for rows in self._rows] for of_class in terms]
         return self._parts[odd]
+
+
+def _at(entries: Halves, places: list[int]) -> NDArray[np.int64]:
+    return np.array([entries[i] for i in places], dtype=np.int64)
 
 
 def _symmetric(form: Values) -> Array:

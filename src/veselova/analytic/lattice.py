@@ -22,14 +22,28 @@ from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
 
-__all__ = ["RADIUS", "Coordinates", "centred_points", "half_of", "lattice_points", "points_within", "schur", "small_norm"]
+__all__ = [
+    "RADIUS",
+    "Coordinates",
+    "Halves",
+    "Member",
+    "centred_points",
+    "half_of",
+    "lattice_points",
+    "points_within",
+    "schur",
+    "small_norm",
+]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Some entries of a characteristic, in halves.
 Halves: TypeAlias = tuple[int, ...]
-Families: TypeAlias = Mapping[Halves, Mapping[Halves, list[tuple[int, Characteristic, int]]]]
+
+#: The place of a characteristic among those given, itself in these coordinates, and the sign of its reduction modulo one.
+Member: TypeAlias = tuple[int, Characteristic, int]
+Families: TypeAlias = Mapping[Halves, Mapping[Halves, list[Member]]]
 
 #: Radius, in the norm of T or T⁻¹, of the terms above e^(−39) = 1e-17 of the largest; the others are left out.
 RADIUS = math.sqrt(39.0 / math.pi)
@@ -94,9 +108,8 @@ class Coordinates:
         return [(Characteristic(tuple(e), tuple(d)), sign) for e, d, sign in rows]
 
     def families(self, characteristics: Sequence[Characteristic]) -> Families:
-        """Return the place, the characteristic in these coordinates and its sign, of each, by δ_G and then by ε_F: those together
-        that have the same Gaussians, and the same waves."""
-        families: dict[Halves, dict[Halves, list[tuple[int, Characteristic, int]]]] = defaultdict(lambda: defaultdict(list))
+        """Return the members by δ_G and then by ε_F: those together that have the same Gaussians, and the same waves."""
+        families: dict[Halves, dict[Halves, list[Member]]] = defaultdict(lambda: defaultdict(list))
         for place, (local, sign) in enumerate(self.characteristics(characteristics)):
             delta_G, epsilon_F = tuple(local.delta[i] for i in self.gaussians), tuple(local.epsilon[i] for i in self.waves)
             families[delta_G][epsilon_F].append((place, local, sign))

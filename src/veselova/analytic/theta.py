@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import RADIUS, Coordinates, centred_points, half_of, lattice_points, schur, small_norm
+from veselova.analytic.lattice import RADIUS, Coordinates, Member, centred_points, half_of, lattice_points, schur, small_norm
 from veselova.analytic.theta_sums import SIGNS, Blocks, Family, Group, in_blocks
 
 __all__ = ["Theta"]
@@ -182,7 +182,7 @@ class Theta:
         families = self._coordinates.families(characteristics).items()
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
-    def _group(self, delta_G: tuple[int, ...], members: list[list[tuple[int, Characteristic, int]]]) -> Group:
+    def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
         places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
         families = [self._family([c for _, c, _ in of]) for of in members]
         parities = self._parities(characteristics)
