@@ -38,11 +38,9 @@ _DIGITS_PER_TURN = 0.151
 _EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 _UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 
-#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero.
-_UNASKED_DIGITS = 5
-_UNASKED = 10**_UNASKED_DIGITS
-_HALF = _UNASKED // 2
-_ZERO = Decimal(0)
+#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero, and their power of ten.
+_UNASKED_DIGITS, _UNASKED = 5, 10**5
+_HALF, _ZERO = _UNASKED // 2, Decimal(0)
 
 _global = threading.RLock()
 
@@ -98,9 +96,6 @@ class Balls(Arithmetic):
         """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of a real one is 0."""
         polynomial: Any = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in coefficients])
         return [(self.rational(root.real), self.rational(root.imag), count) for root, count in polynomial.complex_roots()]
-
-    #: The angle of the point (x, y), arguments y, x, for nonnegative ones.
-    atan2 = staticmethod(np.frompyfunc(lambda y, x: flint.arb.atan2(y, x), 2, 1))
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z)."""
@@ -206,6 +201,10 @@ class Balls(Arithmetic):
         """
         products = _products(modes, turns, _conjugate)
         return np.asarray(_real(products)), np.asarray(_imaginary(products))
+
+    def cosines(self, modes: Values, turns: Values) -> Values:
+        """Return the first of these waves."""
+        return np.asarray(_real(_products(modes, turns, _conjugate)))
 
     @staticmethod
     def _array(matrix: Any) -> Values:

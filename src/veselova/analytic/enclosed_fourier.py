@@ -71,7 +71,7 @@ class EnclosedFourier:
         columns = ColumnsForModes(rate)
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
-            stacks = [xp.product(xp.waves(modes, xp.turns(G))[0], weights.T) for weights, G in columns(modes)]
+            stacks = [xp.product(xp.cosines(modes, xp.turns(G)), weights.T) for weights, G in columns(modes)]
             values = np.array([xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)], dtype=object)
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
