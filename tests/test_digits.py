@@ -25,7 +25,8 @@ from veselova.analytic.balls import balls
 from veselova.analytic.curve import Curve
 from veselova.analytic.enclosed_clock import EnclosedClock
 from veselova.analytic.enclosed_fourier import EnclosedFourier
-from veselova.analytic.enclosed_solution import EnclosedSolution, orthonormal
+from veselova.analytic.enclosed_frame import orthonormal
+from veselova.analytic.enclosed_solution import EnclosedSolution
 from veselova.analytic.enclosure import enclosed
 from veselova.analytic.interval import Interval
 from veselova.analytic.reduction import moving_part

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.enclosed_solution import frame_around, series_of
+from veselova.analytic.enclosed_frame import frame_around
+from veselova.analytic.enclosed_solution import series_of
 from veselova.analytic.enclosure import resting_spheroconic
 from veselova.analytic.precision import Values
 from veselova.analytic.reduction import moving_part

@@ -20,6 +20,7 @@ from veselova.analytic.curve import Curve
 from veselova.analytic.drift import Drift, expected_growth
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
 from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
+from veselova.analytic.enclosed_frame import across, along_axes, directions, frame_around
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosed_windows import EnclosedWindows
 from veselova.analytic.enclosure import enclosed, spheroconic
@@ -34,7 +35,7 @@ from veselova.analytic.start import start
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["EnclosedSolution", "frame_around", "series_of"]
+__all__ = ["EnclosedSolution", "series_of"]
 
 #: A rotation this near to a matrix of signs is one: beyond, constants of motion are so close together that the natural frame of
 #: the problem, in double precision, is taken for a given one.
@@ -114,10 +115,10 @@ class EnclosedSolution:
         """
         xp, moving, n = self.arithmetic, self.moving, self.problem.n
         tau1, attitude, details = self._motion(times, coarse)
-        q_dot = (attitude.q_prime * clock_rate(self.spectrum, "t", xp)(attitude.q)[:, None]) @ self._directions.T
+        q_dot = self._along_axes(attitude.q_prime * clock_rate(self.spectrum, "t", xp)(attitude.q)[:, None])
         frame = np.empty((len(times), n, n), dtype=object)
-        frame[:, :, 0] = attitude.q @ self._directions.T
-        frame[:, :, 1:] = self._directions @ (attitude.normals @ self._rotation) + self._frozen_part
+        frame[:, :, 0] = self._along_axes(attitude.q)
+        frame[:, :, 1:] = self._along_axes(attitude.normals @ self._rotation) + self._frozen_part
         points = attitude.spheroconic
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
@@ -152,9 +153,9 @@ class EnclosedSolution:
             if found is not None:
                 q, components, rest = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
                 if size == 3:
-                    handed = (_across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1])[0]
+                    handed = (across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1])[0]
                     side = 1 if handed > 0 else -1 if handed < 0 else 1 / handed  # of a ball that holds zero, nothing known
-                    rest = np.stack([rest, _across(q, rest) * side], axis=2)
+                    rest = np.stack([rest, across(q, rest) * side], axis=2)
                 return found[:, 0], Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]), details
             windows = windows.finer()
         return self._evaluated(times, coarse)
@@ -181,13 +182,11 @@ class EnclosedSolution:
 
     @cached_property
     def _directions(self) -> Values:
-        """Return the orthonormal directions that move, shape (n, m)."""
-        xp, moving = self.arithmetic, self.moving
-        directions = xp.array(np.zeros((moving.n, moving.size)))
-        for column, vector in zip(directions.T, moving.vectors, strict=True):
-            length = xp.sqrt(xp.number(sum((x * x for x in vector.values()), Fraction())))
-            column[list(vector)] = xp.array(list(vector.values())) / length
-        return np.asarray(directions)
+        return directions(self.moving, self.arithmetic)
+
+    def _along_axes(self, vectors: Values) -> Values:
+        """Return vectors (N, m, …) along the directions that move by their components along the principal axes, (N, n, …)."""
+        return along_axes(self.moving, self._directions, vectors)
 
     @cached_property
     def _start_frame(self) -> Values:
@@ -243,11 +242,6 @@ class EnclosedSolution:
         return self._start_frame - self._directions @ (self._directions.T @ self._start_frame)
 
 
-def _across(a: Values, b: Values) -> Values:
-    """Return the vector products of vectors (N, 3)."""
-    return np.asarray(a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]])
-
-
 def _digits_of_least(given: Moving, digits: int) -> int:
     """Return the digits beyond which branch points are to coincide, so that the direction that moves least is kept."""
     share = given.least_share
@@ -278,23 +272,3 @@ def _with_derived(q_dot: Values, frame: Values, spheroconic: Values, tau1: Value
     product = frame[:, :, :1] * q_dot[:, None, :]
     omega = product - np.swapaxes(product, 1, 2)
     return {"q": frame[:, :, 0], "q_dot": q_dot, "frame": frame, "omega": omega, "spheroconic": spheroconic, "tau1": tau1}
-
-
-def frame_around(q: Values, rows: Any, arithmetic: Any) -> Values:
-    """Return the frame with first column q, a unit vector, and the other columns of ``rows`` made exactly orthonormal."""
-    normals = arithmetic.array(rows)[:, 1:]
-    return orthonormal(np.column_stack([q, normals - np.outer(q, q @ normals)]), arithmetic)
-
-
-def orthonormal(frame: Values, arithmetic: Any) -> Values:
-    """Return the polar factor P of a nearly orthogonal X = PS, by Newton–Schulz steps E(3 − EᵀE)/2.
-
-    For the E found, |E − P| ≤ |EᵀE − 1| + 2|EᵀX − XᵀE|, both zero for P itself (entries summed, S within a half of 1).
-    """
-    one = np.eye(frame.shape[0], dtype=int)
-    nearly = arithmetic.midpoints(frame)
-    for _ in range(3 + arithmetic.digits.bit_length()):
-        nearly = arithmetic.midpoints(nearly @ (3 * one - nearly.T @ nearly) / 2)
-    product = nearly.T @ frame
-    bound = np.sum(np.abs(nearly.T @ nearly - one)) + 2 * np.sum(np.abs(product - product.T))
-    return np.asarray(arithmetic.widened(nearly, bound))
