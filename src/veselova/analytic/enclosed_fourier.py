@@ -95,7 +95,6 @@ class EnclosedFourier:
         xp: Any = self._xp
         uniform = times / self._mean
         z = self._orbit.phases(uniform)
-        z = z - xp.floor(z)
 
         def excess(delta: Values) -> tuple[Values, Values]:
             value, slope = self._periodic(z + delta[:, None] * self._orbit.frequencies)

@@ -99,8 +99,9 @@ class _InFixedPoint:
         """Return the sums of an interval at points that are open by ``spread`` at most."""
         xp, scales, weights = self._xp, self._scales[interval], self._weights[:, interval]
         series, slack = len(scales), (spread + 2.0**-self._bits) * xp.array(self._steepness[interval])
-        point, one = self._fixed(x), Fixed.of([np.ones(len(x))], self._bits)
-        sums = (point * (point + point) - one).polynomials(weights.limbs.shape[1]).weighted(weights)
+        point = self._fixed(x)
+        square = point.polynomials(3)[2, :]  # 2x² − 1
+        sums = square.polynomials(weights.limbs.shape[1]).weighted(weights)
         total = sums[:, :series] + point[:, None] * sums[:, series:]
         result = np.broadcast_to(xp.around_zero(self._open[interval] + slack), (len(x), series))
         for part in total.parts():

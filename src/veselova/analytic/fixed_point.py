@@ -8,7 +8,7 @@ exact in doubles. What lies beyond the last limb is dropped.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +55,6 @@ class Fixed:
     def __add__(self, other: Fixed) -> Fixed:
         return Fixed(self.limbs + other.limbs)
 
-    def __sub__(self, other: Fixed) -> Fixed:
-        return Fixed(self.limbs - other.limbs)
-
     def __mul__(self, other: Fixed) -> Fixed:
         return Fixed(_carried(_products(self.limbs, other.limbs))[:-1])
 
@@ -68,13 +65,10 @@ class Fixed:
         """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i − T_{h−i} for a whole range of i."""
         table = np.zeros((len(self.limbs), max(count, 2), self.limbs.shape[1]))
         table[0, 0], table[:, 1] = 1, self.limbs
-        last = 1
-        while last < count - 1:
-            rows = min(last, count - 1 - last)
+        for last, rows in _ranges(count):
             sums = _products(2 * table[:, last : last + 1], table[:, 1 : rows + 1])
             sums[:-1] -= table[:, last - rows : last][:, ::-1]
             table[:, last + 1 : last + 1 + rows] = _carried(sums)[:-1]
-            last += rows
         return Fixed(table[:, :count])
 
     @staticmethod
@@ -84,11 +78,10 @@ class Fixed:
         ``error``: that of their numbers.
         """
         errors = np.zeros(count)
-        errors[1:2], last = error, 1
-        while last < count - 1:
-            rows = min(last, count - 1 - last)
+        errors[1:2] = error
+        for last, rows in _ranges(count):
             sums = 2 * errors[last] + 2 * errors[1 : rows + 1] + errors[last - rows : last][::-1] + 1
-            errors[last + 1 : last + 1 + rows], last = sums, last + rows
+            errors[last + 1 : last + 1 + rows] = sums
         return errors
 
     def weighted(self, weights: Fixed) -> Fixed:
@@ -107,6 +100,15 @@ class Fixed:
             sums = factors.reshape(-1, size).T @ shifted.reshape(-1, (count + 1) * columns)
             total += _carried(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
         return Fixed(_carried(total) if terms > most else total)
+
+
+def _ranges(count: int) -> Iterator[tuple[int, int]]:
+    """Return the h from which T_{h+i} follow, and how many of them, until there are so many polynomials."""
+    last = 1
+    while last < count - 1:
+        rows = min(last, count - 1 - last)
+        yield last, rows
+        last += rows
 
 
 def _products(a: Array, b: Array) -> Array:
