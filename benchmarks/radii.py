@@ -3,7 +3,7 @@
     python benchmarks/radii.py [SECONDS] [SEED]        default 300 seconds
 
 Problems of n = 2, 3, 4: random, with A's far apart, nearly equal or equal, with a direction at rest, next to a separatrix; 16 to
-104 digits, 3 to 900 times, both routes for n = 3. Prints every difference above the sum of both radii, what was refused, and at
+104 digits, 3 to 900 times, some of them far out, both routes for n = 3. Prints every difference above the sum of both radii, what was refused, and at
 the end the problems and the largest difference over that sum for each series: at most one, and near it, since radii are those
 of the rounding to decimals where nothing else is in them.
 """
@@ -45,7 +45,8 @@ def drawn(rng: np.random.Generator, kind: str, n: int) -> Veselova:
 def ratios(rng: np.random.Generator, kind: str) -> dict[str, float]:
     """Return the largest difference over the radii for each series of a problem; raises VeselovaError where it is refused."""
     n, digits, count = int(rng.choice([2, 3, 3, 3, 4])), int(rng.integers(16, 105)), int(rng.choice([3, 40, 320, 900]))
-    body, reach = drawn(rng, kind, n), 10 ** rng.uniform(-2, 1.3 if n < 4 else 0.5)
+    far = rng.uniform() < 0.3 and (n < 4 or digits < 30)
+    body, reach = drawn(rng, kind, n), 10 ** (rng.uniform(1.3, 12) if far else rng.uniform(-2, 1.3 if n < 4 else 0.5))
     times = np.sort(rng.uniform(-reach * rng.integers(0, 2), reach, count))
     method = [None, "theta", "angles"][rng.integers(3)] if n == 3 else None
     chosen = np.unique(rng.integers(0, count, 3))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
 from veselova.analytic.enclosed_series import EnclosedSeries
+from veselova.analytic.increasing import doublings
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -35,9 +36,6 @@ _MOST_NODES = 100_000
 
 #: Panels looked at to see how fast series fall.
 _SAMPLED_PANELS = 200
-
-#: Newton's steps double the digits from those of a double, but for what they lose.
-_FIRST_DIGITS, _LOST_DIGITS = 12, 2
 
 #: Terms beyond those that the digits of a step ask for.
 _EXTRA_TERMS = 6
@@ -140,12 +138,6 @@ def expected_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
     return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
 
 
-def _doublings(digits: int) -> list[int]:
-    """Return the digits of Newton's steps from a double to the one before the last."""
-    half = math.ceil(digits / 2) + _LOST_DIGITS
-    return [*_doublings(half), half] if half > _FIRST_DIGITS else []
-
-
 @dataclass(frozen=True)
 class _Panels:
     """Series in cos mθ of dt/dx on panels x = centre − half·cos θ from 0 on, x = |τ₁|.
@@ -189,7 +181,7 @@ class _Panels:
         """Return x with t(x) = times, from approximate values."""
         places = np.searchsorted(self._ends[1:].astype(float), times.astype(float))
         panels, places = np.unique(np.minimum(places, len(self.centres) - 1), return_inverse=True)
-        steps = {digits: self._series(panels, digits) for digits in [*_doublings(self.arithmetic.digits), self.arithmetic.digits]}
+        steps = {digits: self._series(panels, digits) for digits in [*doublings(self.arithmetic.digits), self.arithmetic.digits]}
         result = np.empty(times.shape, dtype=object)
         for place, panel in enumerate(panels.tolist()):
             rows = np.flatnonzero(places == place)
@@ -219,7 +211,7 @@ class _Panels:
 
         lowest, highest = xp.midpoints(xp.array([centre - self.half, centre + self.half]))
         x = xp.array(np.clip(approximate, float(lowest), float(highest)))
-        for digits in _doublings(xp.digits):
+        for digits in doublings(xp.digits):
             value, rate = clock(x, digits)
             x = xp.midpoints(x - (value - times) / rate)
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))

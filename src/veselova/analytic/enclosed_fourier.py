@@ -9,35 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.enclosed_waves import SumsOverModes, SumsOverPoints
 from veselova.analytic.fourier_clock import ColumnsForModes, grown
-from veselova.analytic.increasing import Rows, increasing_root
-from veselova.analytic.precision import Values
+from veselova.analytic.increasing import Rows, doublings, increasing_root
+from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.strip import Orbit
+from veselova.analytic.waves import waves_at
 
-__all__ = ["MOST_MODES", "EnclosedFourier", "expected_modes"]
-
-#: Modes that a clock of 15 digits has, by genus; they grow with the genus-th power of the digits.
-_MODES = {1: 12, 2: 200, 3: 1500, 4: 10_000}
-_OF_DIGITS = 15
+__all__ = ["MOST_MODES", "EnclosedFourier"]
 
 #: Modes looked at before giving up: minutes.
 MOST_MODES = 200_000
 
-#: Modes that bring the inverse clock near its answer in double precision, where Newton's method settles at this step (in cycles).
-_FIRST_MODES = 4000
-_SETTLED = 1e-7
+#: A step of Newton's method in double precision, in cycles, that leaves as many digits; and waves that are in memory at once.
+_SETTLED, _BLOCK = 1e-7, 2_000_000
 
-#: Digits that Newton's method in balls starts from.
-_FIRST_DIGITS = 10
+#: Digits of modes, and of slopes, beyond those of a step.
+_MODE_DIGITS, _SLOPE_DIGITS = 2, 2
+
+#: Part of the slope at the approximate root that is certain next to it.
+_SLOPE = 0.5
 
 #: What the modes left out add up to, in units of the smallest kept, each over 1/(π m·f), and what those next to them do: others
 #: fall off as fast as they came.
 _TAIL = 4
-
-
-def expected_modes(genus: int, digits: int) -> float:
-    """Return about how many modes a clock has; infinite where there would be too many."""
-    return _MODES[genus] * (digits / _OF_DIGITS) ** genus if genus in _MODES else math.inf
 
 
 class EnclosedFourier:
@@ -47,12 +42,16 @@ class EnclosedFourier:
 
     def __init__(self, orbit: Orbit) -> None:
         self._orbit = orbit
-        self._xp: Any = orbit.rate.inversion.arithmetic
-        self._mean = orbit.rate.mean
+        xp: Any = orbit.rate.inversion.arithmetic
+        self._xp, self._mean = xp, orbit.rate.mean
         self._modes, coefficients, edge = self._significant()
         rates = self._modes @ orbit.frequencies
-        self._amplitudes = coefficients / (self._xp.pi * rates)
-        self._slopes = 2 * coefficients
+        self._amplitudes, self._slopes = coefficients / (xp.pi * rates), 2 * coefficients
+        self._bend = np.sum(xp.at_most(2 * xp.pi * rates * self._slopes))
+        fastest = 2 * math.pi * float(np.max(np.abs(orbit.frequencies.astype(float))))
+        sizes = np.abs(np.stack([self._slopes, fastest * self._amplitudes]).astype(float))
+        #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
+        self._weights = np.max(sizes, axis=0) / float(self._mean)
         slowness = np.array(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies), dtype=float)
         self._tail = _TAIL * self._smallest * float(np.linalg.norm(slowness))
 
@@ -68,10 +67,10 @@ class EnclosedFourier:
     def _significant(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision and F_m, the largest first, and the modes next to them."""
         rate, xp = self._orbit.rate, self._xp
-        columns = ColumnsForModes(rate)
+        columns = ColumnsForModes(rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp))
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
-            stacks = [xp.product(xp.cosines(modes, xp.turns(G)), weights.T) for weights, G in columns(modes)]
+            stacks = [column.cosines(modes) for column in columns(modes)]
             values = np.array([xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)], dtype=object)
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
@@ -80,43 +79,53 @@ class EnclosedFourier:
         order = np.argsort([-abs(float(value)) for value in values], kind="stable")
         return modes[order], values[order], edge
 
-    def _periodic(self, z: Values) -> tuple[Values, Values]:
-        """Return Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰) and its derivative in τ₁ at z (N, g)."""
-        if not self.size:  # a circle: the rate is constant
-            zero = self._xp.array(np.zeros(len(z)))
-            return zero, zero
-        cosines, sines = self._xp.waves(self._modes, self._xp.turns(np.concatenate([z, self._orbit.start[None, :]])))
-        columns = np.stack([self._amplitudes, self._slopes], axis=1)
-        values, slopes = self._xp.product(sines.T, columns), self._xp.product(cosines.T, columns)
-        return values[:-1, 0] - values[-1, 0], slopes[:-1, 1]
-
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
-        """Return τ₁ = t/F_0 + δ at times (N,) given exactly."""
-        xp: Any = self._xp
+        """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""
+        xp = self._xp
         uniform = times / self._mean
         z = self._orbit.phases(uniform)
-
-        def excess(delta: Values) -> tuple[Values, Values]:
-            value, slope = self._periodic(z + delta[:, None] * self._orbit.frequencies)
-            return self._mean * delta + value, self._mean + slope
-
         delta = xp.array(self._near(z.astype(float)))
-        for _ in range(math.ceil(math.log2(xp.digits / _FIRST_DIGITS))):
-            value, slope = excess(delta)
-            delta = xp.midpoints(delta - value / slope)
-        value, slope = excess(delta)
-        return np.asarray(uniform + delta + xp.around_zero((abs(value) + self._tail) / slope))
+        for digits in doublings(xp.digits):
+            with xp.at(digits):
+                value, slope = self._excess(digits, z, delta)
+                delta = xp.midpoints(delta - value / slope)
+        value, slope = self._excess(xp.digits, z, delta)
+        value = xp.widened(value, self._tail)
+        # The root is δ less the value over a slope between the two.
+        reach = xp.around_zero(value / (_SLOPE * slope))
+        return np.asarray(uniform + delta - value / xp.widened(slope, reach * self._bend))
+
+    def _excess(self, digits: int, z: Values, delta: Values) -> tuple[Values, Values]:
+        """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step asks for no more."""
+        xp, half, start = self._xp, math.ceil(digits / 2) + _SLOPE_DIGITS, self._orbit.start[None, :]
+        turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
+        kept = self._kept(digits)
+        waves = SumsOverModes(self._modes[kept], self._amplitudes[kept], xp.at(digits)).sines(turns)
+        value = self._mean * delta + waves[1:] - waves[0]
+        kept = self._kept(half)
+        with xp.at(half) as fewer:
+            waves = SumsOverModes(self._modes[kept], self._slopes[kept], fewer).cosines(turns[1:])
+            return value, xp.widened(self._mean + waves, np.sum(xp.at_most(self._slopes[~kept])))
+
+    def _kept(self, digits: int) -> NDArray[np.bool_]:
+        """Return the modes that matter to so many digits."""
+        return np.asarray(self._weights > 10.0 ** -(digits + _MODE_DIGITS))
 
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return δ in double precision, from the uniform phases."""
-        modes = self._modes[:_FIRST_MODES].astype(float)
-        amplitudes, slopes = self._amplitudes[:_FIRST_MODES].astype(float), self._slopes[:_FIRST_MODES].astype(float)
+        """Return δ in double precision, from the uniform phases (N, g)."""
+        kept = self._kept(DOUBLE.digits)
+        modes, amplitudes, slopes = self._modes[kept], self._amplitudes[kept].astype(float), self._slopes[kept].astype(float)
         frequencies, mean = self._orbit.frequencies.astype(float), float(self._mean)
         begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
-        reach = np.full(len(z), 2 * float(np.sum(np.abs(amplitudes))) / mean)
+        reach, settled = 2 * float(np.sum(np.abs(amplitudes))) / mean, _SETTLED / float(np.max(np.abs(frequencies)))
+        highest, block = int(np.max(np.abs(modes), initial=0)), max(1, _BLOCK // max(1, len(modes)))
 
-        def excess(delta: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            angles = 2 * np.pi * ((z[rows] + delta[:, None] * frequencies) @ modes.T)
-            return mean * delta + np.sin(angles) @ amplitudes - begin, mean + np.cos(angles) @ slopes
+        def root(z: NDArray[np.float64]) -> NDArray[np.float64]:
+            def excess(delta: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                cosines, sines = waves_at(2 * np.pi * (z[rows] + delta[:, None] * frequencies), modes, highest)
+                return mean * delta + amplitudes @ sines - begin, mean + slopes @ cosines
 
-        return increasing_root(excess, np.zeros(len(z)), -reach, reach, _SETTLED / float(np.max(np.abs(frequencies))))
+            bounds = np.full(len(z), reach)
+            return increasing_root(excess, np.zeros(len(z)), -bounds, bounds, settled)
+
+        return np.concatenate([root(z[first : first + block]) for first in range(0, len(z), block)])

@@ -28,17 +28,17 @@ _POINTS = 1000
 #: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
 _RECURRENCE_DIGITS = 6
 
-#: Digits of fixed-point numbers beyond those of the series, and bits of a double that is one part of a number.
-_SPARE_DIGITS, _PART_BITS = 4, 52
+#: Digits of fixed-point numbers beyond those of the series.
+_SPARE_DIGITS = 4
 
 #: What an error ε of x and of every operation makes of 2x²−1, in ε: 4 and 1, and what is of second order.
 _OF_SQUARE = 6
 
 #: Sizes of series that doubles can be scaled to, with all their digits.
-_LEAST, _LARGEST = 1e-150, 1e150
+LEAST, LARGEST = 1e-150, 1e150
 
 #: Points beyond ±1 by more than the rounding of an end are left to balls. That, and bounds in doubles, change those by less.
-_ROUNDING, _UPWARDS = 1e-15, 1 + 1e-6
+_ROUNDING, UPWARDS = 1e-15, 1 + 1e-6
 
 
 class EnclosedSeries:
@@ -56,7 +56,7 @@ class EnclosedSeries:
         odd[0] = odd[0] / 2
         self._coefficients = np.concatenate([even, odd], axis=2)
         sizes = np.sum(np.abs(self._coefficients.astype(float)), axis=0).reshape(intervals, 2, series).sum(axis=1)
-        fits = arithmetic.digits <= _MOST_FIXED and np.all((sizes == 0) | ((sizes > _LEAST) & (sizes < _LARGEST)))
+        fits = arithmetic.digits <= _MOST_FIXED and np.all((sizes == 0) | ((sizes > LEAST) & (sizes < LARGEST)))
         self._in_fixed_point = _InFixedPoint(self._coefficients, sizes, arithmetic) if fits else None
 
     def __call__(self, interval: int, x: Values) -> Values:
@@ -87,19 +87,19 @@ class _InFixedPoint:
         #: Powers of two above the sums.
         self._scales = np.exp2(np.ceil(np.log2(np.where(sizes > 0, sizes, 1.0))) + 1)
         middle = arithmetic.midpoints(coefficients)
-        self._weights = self._fixed(middle / np.tile(self._scales, 2))
+        self._weights = Fixed.of_numbers(middle / np.tile(self._scales, 2), self._bits)
         # What an error of x and of every operation does, and what the coefficients leave open.
         growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None, None] + 2
         steepness = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
         both = (*sizes.shape[:1], 2, *sizes.shape[1:])
-        self._steepness = (steepness.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * _UPWARDS
+        self._steepness = (steepness.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * UPWARDS
         self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(both).sum(axis=1)
 
     def __call__(self, interval: int, x: Values, spread: float) -> Values:
         """Return the sums of an interval at points that are open by ``spread`` at most."""
         xp, scales, weights = self._xp, self._scales[interval], self._weights[:, interval]
         series, slack = len(scales), (spread + 2.0**-self._bits) * xp.array(self._steepness[interval])
-        point = self._fixed(x)
+        point = Fixed.of_numbers(x, self._bits)
         square = point.polynomials(3)[2, :]  # 2x² − 1
         sums = square.polynomials(weights.limbs.shape[1]).weighted(weights)
         total = sums[:, :series] + point[:, None] * sums[:, series:]
@@ -107,13 +107,6 @@ class _InFixedPoint:
         for part in total.parts():
             result = result + part * scales
         return np.asarray(result)
-
-    def _fixed(self, values: Values) -> Fixed:
-        parts = []
-        for _ in range(math.ceil(self._bits / _PART_BITS) + 1):
-            parts.append(values.astype(float))
-            values = values - parts[-1]
-        return Fixed.of(parts, self._bits)
 
 
 def _polynomials(one: Values, y: Values, count: int) -> list[Values]:

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import Clock, ClockRate, clock_rate
+from veselova.analytic.costs import expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.drift import Drift, expected_growth
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
-from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier, expected_modes
+from veselova.analytic.enclosed_fourier import MOST_MODES, EnclosedFourier
 from veselova.analytic.enclosed_frame import across, along_axes, directions, frame_around
 from veselova.analytic.enclosed_theta import EnclosedTheta
 from veselova.analytic.enclosed_windows import EnclosedWindows
@@ -56,8 +57,10 @@ _LEAST_WIDTH = 1e-290
 #: Digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
 
-#: What a mode of the Fourier clock costs in nodes of panels, at once and with every time.
-_NODES_PER_MODE, _TIMES_PER_NODE = 5, 100
+#: Milliseconds with some 60 digits (less and more change all of them alike): a node of panels, by genus; a mode of the Fourier
+#: clock at once; a time of it, and a mode with every time.
+_NODE, _NODE_OF_HIGH_GENUS = {1: 0.05, 2: 0.1, 3: 0.35}, 0.5
+_MODE, _TIME, _MODE_AT_TIME = 0.22, 0.1, 1.5e-4
 
 
 class EnclosedSolution:
@@ -172,13 +175,19 @@ class EnclosedSolution:
         return tau1, attitude, {"clock": clock.name, "clock_size": clock.size, "evaluations": len(times)}
 
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
-        """Return the cheaper clock; only that of panels is bounded."""
-        nodes = expected_nodes(self.orbit, approximate)
-        modes = expected_modes(self.moving.size - 1, self.arithmetic.digits)
-        worth = modes * (_NODES_PER_MODE + approximate.size / _TIMES_PER_NODE)
-        if self.arithmetic.certified or self._coarse.near_separatrix or nodes < worth or modes > MOST_MODES:
-            return EnclosedClock(self.orbit, approximate, self.arithmetic.certified)
-        return EnclosedFourier(self.orbit)
+        """Return the cheaper clock; only that of panels is bounded, and only that of modes goes to any time."""
+        xp, T = self.arithmetic, self.frame.periods.riemann_matrix
+        modes = expected_modes(len(T), float(xp.log(xp.determinant(T))), xp.digits)
+        has_modes = not (xp.certified or self._coarse.near_separatrix) and modes <= MOST_MODES
+        by_panels = expected_nodes(self.orbit, approximate) * _NODE.get(len(T), _NODE_OF_HIGH_GENUS)
+        if has_modes and modes * (_MODE + approximate.size * _MODE_AT_TIME) + approximate.size * _TIME < by_panels:
+            return EnclosedFourier(self.orbit)
+        try:
+            return EnclosedClock(self.orbit, approximate, xp.certified)
+        except Unsolved:
+            if has_modes:  # too far for panels
+                return EnclosedFourier(self.orbit)
+            raise
 
     @cached_property
     def _directions(self) -> Values:

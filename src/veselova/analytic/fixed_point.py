@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ _BASE, _OF_BASE = 2.0**_BITS, 2.0**-_BITS
 #: A product with L limbs, one of the factors a sum, drops (L−1) 2^(21 − 22L), the products beyond the limb after the last, and
 #: that limb. With so many bits beyond those asked for, 22(L−1) or more in all, that is below 2^−bits for any L up to 2¹⁰.
 _DROPPED_BITS = 6
+
+#: Bits of a double that is one part of a number.
+_PART_BITS = 52
 
 #: Products of limbs up to 2²¹ of which a sum is exact.
 _EXACT = 2**11
@@ -47,6 +51,15 @@ class Fixed:
                 rest = rest - whole * _OF_BASE**i
         return cls(_carried(limbs))
 
+    @classmethod
+    def of_numbers(cls, values: NDArray[Any], bits: int) -> Fixed:
+        """Return numbers of any kind that turn into doubles, and of which doubles can be taken off."""
+        parts = []
+        for _ in range(math.ceil(bits / _PART_BITS) + 1):
+            parts.append(values.astype(float))
+            values = values - parts[-1]
+        return cls.of(parts, bits)
+
     def parts(self) -> list[Array]:
         """Return doubles whose sums are the numbers, exactly."""
         weighted = self.limbs * _OF_BASE ** np.arange(len(self.limbs)).reshape(-1, *(1,) * (self.limbs.ndim - 1))
@@ -61,6 +74,15 @@ class Fixed:
     def __getitem__(self, where: tuple[slice | int | None, ...]) -> Fixed:
         return Fixed(self.limbs[:, *where])
 
+    def part_of_product(self, other: Fixed, part: int) -> Fixed:
+        """Return the real part (0) or the imaginary part (1) of products of complex numbers, whose parts come first, (2, …)."""
+        a, b = self.limbs, other.limbs
+        if part == 0:
+            sums = _products(a[:, 0], b[:, 0]) - _products(a[:, 1], b[:, 1])
+        else:
+            sums = _products(a[:, 0], b[:, 1]) + _products(a[:, 1], b[:, 0])
+        return Fixed(_carried(sums)[:-1])
+
     def polynomials(self, count: int) -> Fixed:
         """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i − T_{h−i} for a whole range of i."""
         table = np.zeros((len(self.limbs), max(count, 2), self.limbs.shape[1]))
@@ -70,6 +92,19 @@ class Fixed:
             sums[:-1] -= table[:, last - rows : last][:, ::-1]
             table[:, last + 1 : last + 1 + rows] = _carried(sums)[:-1]
         return Fixed(table[:, :count])
+
+    def turns(self, sines: Fixed, count: int) -> Fixed:
+        """Return cos mφ and sin mφ, m = 0 … count−1, shape (2, count, N), of cosines (N,) and sines: w^{h+i} = w^h w^i.
+
+        An error ε of w and δ, that of two operations in both parts, make (mε + (m−1)δ) max(1, |w|)^{m−1} of an error of w^m.
+        """
+        table = np.zeros((len(self.limbs), 2, max(count, 2), self.limbs.shape[1]))
+        table[0, 0, 0], table[:, 0, 1], table[:, 1, 1] = 1, self.limbs, sines.limbs
+        for last, rows in _ranges(count):
+            known, power = Fixed(table[:, :, 1 : rows + 1]), Fixed(table[:, :, last : last + 1])
+            for part in (0, 1):
+                table[:, part, last + 1 : last + 1 + rows] = known.part_of_product(power, part).limbs
+        return Fixed(table[:, :, :count])
 
     @staticmethod
     def growth(count: int, error: float) -> Array:
@@ -83,6 +118,20 @@ class Fixed:
             sums = 2 * errors[last] + 2 * errors[1 : rows + 1] + errors[last - rows : last][::-1] + 1
             errors[last + 1 : last + 1 + rows] = sums
         return errors
+
+    def dot(self, other: Fixed) -> Fixed:
+        """Return Σ_k x_…k y_…k over the last axis."""
+        count, terms = len(self.limbs), self.limbs.shape[-1]
+        x, y, most = np.moveaxis(self.limbs, 0, -2), np.moveaxis(other.limbs, 0, -1), _EXACT // count
+        total = np.zeros((count, *np.broadcast_shapes(x.shape[:-2], y.shape[:-2])))
+        for first in range(0, terms, most):
+            pairs = x[..., first : first + most] @ y[..., first : first + most, :]  # of limbs i and j, which go to place i + j
+            sums = np.zeros((count + 1, *total.shape[1:]))
+            for i in range(count):
+                placed = np.moveaxis(pairs[..., i, : count + 1 - i], -1, 0)
+                sums[i : i + len(placed)] += placed
+            total += _carried(sums)[:-1]
+        return Fixed(_carried(total))
 
     def weighted(self, weights: Fixed) -> Fixed:
         """Return Σ_k x_kn w_kj, shape (N, J), for numbers (K, N) and weights (K, J)."""

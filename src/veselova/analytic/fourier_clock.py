@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +29,16 @@ __all__ = ["ColumnsForModes", "FourierClock", "grown"]
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+T = TypeVar("T")
+
 #: Modes below this fraction of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
 #: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
-#: Nodes beyond those that modes ask for: room for the next layers.
-_SPARE_NODES = 32
+#: Entries of modes beyond those asked for: room for the next layers.
+_SPARE_ENTRIES = 16
 
 #: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and their part.
 _FIRST_MODES, _FIRST_PART = 64, 1 / 16
@@ -199,10 +201,11 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
 
 def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
     """Return the modes m (first nonzero entry positive) with |F_m| above rounding, F_m, and the modes next to them."""
-    columns, threshold = ColumnsForModes(rate), _SMALLEST_MODE * float(rate.mean)
+    threshold = _SMALLEST_MODE * float(rate.mean)
+    columns = ColumnsForModes(rate, lambda weights, G, _: (weights.T, 2 * np.pi * G.T))
 
     def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
-        matrices = np.stack([np.cos(2 * np.pi * (modes @ G.T)) @ weights.T for weights, G in columns(modes)], axis=2)
+        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
         values = float(rate.scale) * np.linalg.det(matrices)
         return values, np.abs(values) > threshold
 
@@ -210,19 +213,23 @@ def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
     return modes, values.astype(np.float64), edge
 
 
-class ColumnsForModes:
-    """``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more."""
+class ColumnsForModes(Generic[T]):
+    """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more.
 
-    def __init__(self, rate: Rate[Any]) -> None:
-        self._rate = rate
-        self._count, self._columns = 0, list[tuple[Values, Values]]()
+    ``made``: what is made of weights, G_s and the largest entry that modes may have
+    """
 
-    def __call__(self, modes: Integers) -> list[tuple[Values, Values]]:
+    def __init__(self, rate: Rate[Any], made: Callable[[Values, Values, int], T]) -> None:
+        self._rate, self._made = rate, made
+        self._largest, self._columns = -1, list[T]()
+
+    def __call__(self, modes: Integers) -> list[T]:
         """Return the columns for modes (M, g)."""
-        needed = 2 * (max(self._rate.needed_nodes) + int(np.max(np.abs(modes))))
-        if needed > self._count:
-            self._count = needed + _SPARE_NODES
-            self._columns = self._rate.columns(self._count)
+        largest = int(np.max(np.abs(modes)))
+        if largest > self._largest:
+            self._largest = largest + _SPARE_ENTRIES
+            columns = self._rate.columns(2 * (max(self._rate.needed_nodes) + self._largest))
+            self._columns = [self._made(*column, self._largest) for column in columns]
         return self._columns
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -9,12 +10,15 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["Rows", "increasing_root"]
+__all__ = ["Rows", "doublings", "increasing_root"]
 
 Array = NDArray[np.float64]
 
 #: Entries along the first axis: all of them, or some by their places.
 Rows = slice | NDArray[np.intp]
+
+#: Newton's steps double the digits from those of a double, but for what they lose.
+_FIRST_DIGITS, _LOST_DIGITS = 12, 2
 
 #: Bisection alone needs 53 steps from any bracket to one rounding.
 _MOST_STEPS = 80
@@ -57,6 +61,12 @@ def increasing_root(
                 rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]
                 low, high, before, x = low[open_], high[open_], before[open_], x[open_]
     raise InternalContradiction("inversion of an increasing function did not settle")
+
+
+def doublings(digits: int) -> list[int]:
+    """Return the digits of Newton's steps from a root in doubles to the one before the last."""
+    half = math.ceil(digits / 2) + _LOST_DIGITS
+    return [*doublings(half), half] if half > _FIRST_DIGITS else []
 
 
 def _with(result: Array, rows: Rows, found: Array) -> Array:

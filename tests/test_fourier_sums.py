@@ -1,0 +1,137 @@
+"""Fourier sums beyond 15 digits, in fixed point and in balls, and their clock where that of panels does not reach."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from test_many_digits import in_rationals
+from veselova.analytic import enclosed_clock, enclosed_waves
+from veselova.analytic.balls import Balls, balls
+from veselova.analytic.enclosed_waves import SumsOverModes, SumsOverPoints
+from veselova.analytic.fixed_point import Fixed
+
+SIZES = [Fraction(1, 10**120), 1, 10**120]
+
+
+def complex_products(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    """Return the products of complex numbers, all real parts first."""
+    half = len(a) // 2
+    pairs = list(zip(a[:half], a[half:], b[:half], b[half:], strict=True))
+    return [x * u - y * v for x, y, u, v in pairs] + [x * v + y * u for x, y, u, v in pairs]
+
+
+@pytest.mark.parametrize("bits", [60, 216, 800])
+def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np.random.Generator) -> None:
+    count, unit = 40, Fraction(1, 2**bits)
+    angles = rng.uniform(0, 7, 3)
+    first = Fixed.of([np.stack([np.cos(angles), np.sin(angles)])], bits)
+    table = first[0, :].turns(first[1, :], count)
+    found, w = np.array(in_rationals(table.parts()), dtype=object).reshape(2, count, 3), in_rationals(first.parts())
+    power = [Fraction(1)] * 3 + [Fraction(0)] * 3
+    for m in range(count):
+        for got, exact in zip(found[:, m].ravel(), power, strict=True):
+            assert abs(got - exact) <= 3 * max(m - 1, 0) * unit, m
+        power = complex_products(power, w)
+    x, y = Fixed(table.limbs[:, 0].swapaxes(1, 2)), Fixed(table.limbs[:, 1].swapaxes(1, 2))
+    for n, got in enumerate(in_rationals(x.dot(y).parts())):
+        assert abs(got - sum(found[0, :, n] * found[1, :, n])) <= count * unit
+    many = Fixed(np.tile(x.limbs[:, :1], (1, 1, 60)))  # more than one product of matrices takes
+    once = sum(found[0, :, 0] ** 2)
+    assert abs(in_rationals(many.dot(many).parts())[0] - 60 * once) <= 60 * count * unit
+
+
+def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[Any, Any, Any]:
+    """Return modes of which no two are opposite, their coefficients, of which one may be open, and points, exact numbers."""
+    modes = np.unique(rng.integers(-9, 10, (60, genus)), axis=0)
+    first = modes[np.arange(len(modes)), np.argmax(modes != 0, axis=1)]
+    modes = rng.permutation(modes[first > 0]) * -1
+    coefficients = xp.array(rng.normal(size=len(modes))) * xp.number(size) / xp.number(3)
+    if size != 1:
+        coefficients[-1] = xp.widened(coefficients[-1], coefficients[-1] * xp.epsilon)
+    return modes, coefficients, xp.midpoints(xp.array(rng.uniform(-2, 2, (11, genus))) / xp.number(7))
+
+
+@pytest.mark.parametrize("digits", [18, 61, 130])
+@pytest.mark.parametrize("genus", [1, 2, 3])
+def test_sums_over_modes_hold_those_in_balls(
+    genus: int, digits: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With coefficients of all sizes, some places of the box at a time too; and the radii are not empty promises."""
+    with balls(digits, False) as xp:
+        for size, places in zip(SIZES, (300, 7, 1), strict=True):
+            monkeypatch.setattr(enclosed_waves, "_PLACES", places)
+            modes, coefficients, points = drawn(genus, size, xp, rng)
+            sums, turns = SumsOverModes(modes, coefficients, xp), xp.turns(points)
+            assert sums._in_fixed_point is not None
+            with xp.at(digits + 30) as finer:
+                waves = finer.waves(modes, finer.turns(points))
+                exact = [finer.product(wave.T, xp.midpoints(coefficients)[:, None])[:, 0] for wave in waves]
+            for found, expected in zip((sums.cosines(turns), sums.sines(turns)), exact, strict=True):
+                assert all(a.contains(b) for a, b in zip(found, expected, strict=True))
+                assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
+
+
+@pytest.mark.parametrize("digits", [18, 61, 130])
+@pytest.mark.parametrize("genus", [1, 2, 3])
+def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.random.Generator) -> None:
+    with balls(digits, False) as xp:
+        modes, _, points = drawn(genus, 1, xp, rng)
+        weights = np.stack([xp.array(rng.normal(size=len(points))) * xp.number(size) / xp.number(3) for size in SIZES])
+        sums = SumsOverPoints(xp.turns(points), weights, 9, xp)
+        assert sums._in_fixed_point is not None
+        with xp.at(digits + 30) as finer:
+            expected = finer.product(finer.cosines(modes, finer.turns(points)), xp.midpoints(weights).T)
+        for rows in (slice(0, 1), slice(None)):  # rows of modes are kept from the first to the second
+            for found, plain in zip(sums.cosines(modes[rows]), expected[rows], strict=True):
+                for a, b, size in zip(found, plain, SIZES, strict=True):
+                    assert a.contains(b)
+                    assert float(a.rad() / xp.number(size)) < 1e3 * 10.0**-digits
+
+
+def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Generator) -> None:
+    """Of more digits than doubles have room for, of no size, of no modes, and at points that are open to a digit or two."""
+    for digits, size, slack in ((300, 1, 0), (30, 0, 0), (30, 10**200, 0), (30, 1, Fraction(1, 1000))):
+        with balls(digits, False) as xp:
+            modes, coefficients, _ = drawn(2, size, xp, rng)
+            turns = xp.turns(xp.widened(xp.array(rng.uniform(-1, 1, (4, 2))), xp.number(slack)))
+            sums, points = SumsOverModes(modes, coefficients, xp), SumsOverPoints(turns, coefficients[None, :4], 9, xp)
+            assert (sums._in_fixed_point is None) == (slack == 0)
+            assert points._in_fixed_point is None
+            expected = xp.product(xp.waves(modes, turns)[1].T, coefficients[:, None])[:, 0]
+            for a, b in zip(sums.sines(turns), expected, strict=True):
+                assert (a - b).contains(0)
+            assert points.cosines(modes).shape == (len(modes), 1)
+            none = SumsOverModes(modes[:0], coefficients[:0], xp)
+            assert none.sines(turns).tolist() == none.cosines(turns).tolist() == [0] * 4
+
+
+@pytest.mark.parametrize("A", [["3", "2", "1.2"], ["4", "3", "2", "1"]])
+def test_modes_take_over_where_panels_do_not_reach(A: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    body, times = vs.Veselova(A, [1, 1, 1, 1][-len(A) :], [1, -2, 3, 1][-len(A) :], normalize=True), ["-1e-30", "0.5", 7]
+    by_panels = vs.solve(body, times, digits=20)
+    monkeypatch.setattr(enclosed_clock, "_MOST_NODES", 10)
+    by_modes = vs.solve(body, times, digits=20)
+    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert by_panels.decimals is not None
+    assert by_modes.decimals is not None
+    difference = np.abs(by_panels.decimals.midpoints["frame"] - by_modes.decimals.midpoints["frame"])
+    assert np.max(difference) < 1e-20
+    assert float(max(by_modes.decimals.error)) < 1e-20
+    with pytest.raises(vs.Unsolved) as caught:
+        vs.solve(body, times, digits=20, certified=True)
+    assert caught.value.outcome == "too-far"
+
+
+def test_many_times_far_out_are_those_of_each() -> None:
+    """Ten thousand times over [0, 1000] with 50 digits are more than panels reach; some of them here."""
+    body, times = vs.Veselova([3, 2, 1], [1, 1, 1], [1, -2, 1], normalize=True), np.linspace(900, 1000, 600)
+    many, single = vs.solve(body, times, digits=50), vs.solve(body, times[::100], digits=50)
+    assert many.provenance.details["clock"] == single.provenance.details["clock"] == "fourier"
+    assert many.decimals is not None
+    assert single.decimals is not None
+    assert np.max(np.abs(many.decimals.midpoints["frame"][::100] - single.decimals.midpoints["frame"])) < 1e-50
