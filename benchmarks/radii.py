@@ -3,9 +3,9 @@
     python benchmarks/radii.py [SECONDS] [SEED]        default 300 seconds
 
 Problems of n = 2, 3, 4: random, with A's far apart, nearly equal or equal, with a direction at rest, next to a separatrix; 16 to
-104 digits, 3 to 900 times, some of them far out, both routes for n = 3. Prints every difference above the sum of both radii, what was refused, and at
-the end the problems and the largest difference over that sum for each series: at most one, and near it, since radii are those
-of the rounding to decimals where nothing else is in them.
+104 digits, 3 to 900 times, some of them far out, both routes for n = 3. Prints every difference above the sum of both radii, what
+was refused, and at the end the problems and the largest difference over that sum for each series: at most one, and near it, since
+radii are those of the rounding to decimals where nothing else is in them.
 """
 
 from __future__ import annotations
