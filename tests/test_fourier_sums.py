@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 import veselova as vs
 from test_many_digits import in_rationals
-from veselova.analytic import enclosed_clock, enclosed_waves
+from veselova.analytic import enclosed_clock, enclosed_solution, enclosed_waves
 from veselova.analytic.balls import Balls, balls
-from veselova.analytic.enclosed_waves import SumsOverModes, SumsOverPoints
+from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fixed_point import Fixed
 
+KINDS: tuple[Literal["cosines"], Literal["sines"]] = ("cosines", "sines")
 SIZES = [Fraction(1, 10**120), 1, 10**120]
 
 
@@ -66,18 +68,19 @@ def test_sums_over_modes_hold_those_in_balls(
         for size, places in zip(SIZES, (300, 7, 1), strict=True):
             monkeypatch.setattr(enclosed_waves, "_PLACES", places)
             modes, coefficients, points = drawn(genus, size, xp, rng)
-            sums, turns = SumsOverModes(modes, coefficients, xp), xp.turns(points)
-            assert sums._in_fixed_point is not None
             with xp.at(digits + 30) as finer:
                 waves = finer.waves(modes, finer.turns(points))
                 exact = [finer.product(wave.T, xp.midpoints(coefficients)[:, None])[:, 0] for wave in waves]
-            for found, expected in zip((sums.cosines(turns), sums.sines(turns)), exact, strict=True):
+            for kind, expected in zip(KINDS, exact, strict=True):
+                with monkeypatch.context() as without:
+                    without.setattr(Balls, "waves", None)  # nothing is left to balls
+                    found = sums_over_modes(kind, modes, coefficients, xp.turns(points), xp)
                 assert all(a.contains(b) for a, b in zip(found, expected, strict=True))
                 assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
 
 
 @pytest.mark.parametrize("digits", [18, 61, 130])
-@pytest.mark.parametrize("genus", [1, 2, 3])
+@pytest.mark.parametrize("genus", [2, 3])
 def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.random.Generator) -> None:
     with balls(digits, False) as xp:
         modes, _, points = drawn(genus, 1, xp, rng)
@@ -95,19 +98,20 @@ def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.r
 
 def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Generator) -> None:
     """Of more digits than doubles have room for, of no size, of no modes, and at points that are open to a digit or two."""
-    for digits, size, slack in ((300, 1, 0), (30, 0, 0), (30, 10**200, 0), (30, 1, Fraction(1, 1000))):
+    for digits, size, slack, genus in ((300, 1, 0, 3), (30, 0, 0, 2), (30, 10**200, 0, 1), (30, 1, Fraction(1, 1000), 2)):
         with balls(digits, False) as xp:
-            modes, coefficients, _ = drawn(2, size, xp, rng)
-            turns = xp.turns(xp.widened(xp.array(rng.uniform(-1, 1, (4, 2))), xp.number(slack)))
-            sums, points = SumsOverModes(modes, coefficients, xp), SumsOverPoints(turns, coefficients[None, :4], 9, xp)
-            assert (sums._in_fixed_point is None) == (slack == 0)
+            modes, coefficients, _ = drawn(genus, size, xp, rng)
+            turns = xp.turns(xp.widened(xp.array(rng.uniform(-1, 1, (4, genus))), xp.number(slack)))
+            weights = coefficients[None, :4]
+            points = SumsOverPoints(turns, weights, 9, xp)
             assert points._in_fixed_point is None
-            expected = xp.product(xp.waves(modes, turns)[1].T, coefficients[:, None])[:, 0]
-            for a, b in zip(sums.sines(turns), expected, strict=True):
-                assert (a - b).contains(0)
-            assert points.cosines(modes).shape == (len(modes), 1)
-            none = SumsOverModes(modes[:0], coefficients[:0], xp)
-            assert none.sines(turns).tolist() == none.cosines(turns).tolist() == [0] * 4
+            of_points = xp.product(xp.cosines(modes, turns), weights.T)
+            assert all((a - b).contains(0) for a, b in zip(points.cosines(modes)[:, 0], of_points[:, 0], strict=True))
+            for kind, waves in zip(KINDS, xp.waves(modes, turns), strict=True):
+                expected = xp.product(waves.T, coefficients[:, None])[:, 0]
+                for a, b in zip(sums_over_modes(kind, modes, coefficients, turns, xp), expected, strict=True):
+                    assert (a - b).contains(0)
+                assert sums_over_modes(kind, modes[:0], coefficients[:0], turns, xp).tolist() == [0] * 4
 
 
 @pytest.mark.parametrize("A", [["3", "2", "1.2"], ["4", "3", "2", "1"]])
@@ -135,3 +139,15 @@ def test_many_times_far_out_are_those_of_each() -> None:
     assert many.decimals is not None
     assert single.decimals is not None
     assert np.max(np.abs(many.decimals.midpoints["frame"][::100] - single.decimals.midpoints["frame"])) < 1e-50
+
+
+def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = vs.Veselova(["2.1", "2"], ["0.6", "0.8"], ["0.8", "-0.6"], normalize=True)
+    by_modes = vs.solve(body, ["20"], digits=350)
+    monkeypatch.setattr(enclosed_solution, "MOST_MODES", 0)
+    by_panels = vs.solve(body, ["20"], digits=350)
+    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert by_panels.decimals is not None
+    assert by_modes.decimals is not None
+    assert max(by_modes.decimals.error) < Decimal("1e-350")
+    assert np.max(np.abs(by_modes.decimals.midpoints["frame"] - by_panels.decimals.midpoints["frame"])) < Decimal("1e-350")

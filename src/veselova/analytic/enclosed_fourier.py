@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.enclosed_waves import SumsOverModes, SumsOverPoints
+from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fourier_clock import ColumnsForModes, grown
 from veselova.analytic.increasing import Rows, doublings, increasing_root
 from veselova.analytic.precision import DOUBLE, Values
@@ -48,10 +48,9 @@ class EnclosedFourier:
         rates = self._modes @ orbit.frequencies
         self._amplitudes, self._slopes = coefficients / (xp.pi * rates), 2 * coefficients
         self._bend = np.sum(xp.at_most(2 * xp.pi * rates * self._slopes))
-        fastest = 2 * math.pi * float(np.max(np.abs(orbit.frequencies.astype(float))))
-        sizes = np.abs(np.stack([self._slopes, fastest * self._amplitudes]).astype(float))
+        fastest = 2 * xp.pi * np.max(np.abs(orbit.frequencies.astype(float)))
         #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
-        self._weights = np.max(sizes, axis=0) / float(self._mean)
+        self._weights = np.maximum(xp.at_most(self._slopes), xp.at_most(fastest * self._amplitudes)) / self._mean
         slowness = np.array(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies), dtype=float)
         self._tail = _TAIL * self._smallest * float(np.linalg.norm(slowness))
 
@@ -65,7 +64,7 @@ class EnclosedFourier:
         return self._mean * self._xp.epsilon
 
     def _significant(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
-        """Return the modes m with |F_m| above the precision and F_m, the largest first, and the modes next to them."""
+        """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
         rate, xp = self._orbit.rate, self._xp
         columns = ColumnsForModes(rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp))
 
@@ -75,9 +74,7 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        modes, values, edge = grown(rate.inversion.periods.genus, determinants, MOST_MODES)
-        order = np.argsort([-abs(float(value)) for value in values], kind="stable")
-        return modes[order], values[order], edge
+        return grown(rate.inversion.periods.genus, determinants, MOST_MODES)
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""
@@ -100,16 +97,16 @@ class EnclosedFourier:
         xp, half, start = self._xp, math.ceil(digits / 2) + _SLOPE_DIGITS, self._orbit.start[None, :]
         turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
         kept = self._kept(digits)
-        waves = SumsOverModes(self._modes[kept], self._amplitudes[kept], xp.at(digits)).sines(turns)
+        waves = sums_over_modes("sines", self._modes[kept], self._amplitudes[kept], turns, xp.at(digits))
         value = self._mean * delta + waves[1:] - waves[0]
         kept = self._kept(half)
         with xp.at(half) as fewer:
-            waves = SumsOverModes(self._modes[kept], self._slopes[kept], fewer).cosines(turns[1:])
+            waves = sums_over_modes("cosines", self._modes[kept], self._slopes[kept], turns[1:], fewer)
             return value, xp.widened(self._mean + waves, np.sum(xp.at_most(self._slopes[~kept])))
 
     def _kept(self, digits: int) -> NDArray[np.bool_]:
         """Return the modes that matter to so many digits."""
-        return np.asarray(self._weights > 10.0 ** -(digits + _MODE_DIGITS))
+        return np.asarray(self._weights > self._xp.number(10) ** -(digits + _MODE_DIGITS), dtype=bool)
 
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return δ in double precision, from the uniform phases (N, g)."""

@@ -57,10 +57,11 @@ _LEAST_WIDTH = 1e-290
 #: Digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
 
-#: Milliseconds with some 60 digits (less and more change all of them alike): a node of panels, by genus; a mode of the Fourier
-#: clock at once; a time of it, and a mode with every time.
+#: Milliseconds with some 60 digits (less and more change all of them alike), by genus: a node of panels, and a mode of the
+#: Fourier clock at once; and a time of that clock, and a mode with every time.
 _NODE, _NODE_OF_HIGH_GENUS = {1: 0.05, 2: 0.1, 3: 0.35}, 0.5
-_MODE, _TIME, _MODE_AT_TIME = 0.22, 0.1, 1.5e-4
+_MODE, _MODE_OF_HIGH_GENUS = {1: 1.0}, 0.22
+_TIME, _MODE_AT_TIME = 0.1, 1.5e-4
 
 
 class EnclosedSolution:
@@ -177,10 +178,12 @@ class EnclosedSolution:
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
         """Return the cheaper clock; only that of panels is bounded, and only that of modes goes to any time."""
         xp, T = self.arithmetic, self.frame.periods.riemann_matrix
-        modes = expected_modes(len(T), float(xp.log(xp.determinant(T))), xp.digits)
+        genus, times = len(T), approximate.size
+        modes = expected_modes(genus, float(xp.log(xp.determinant(T))), xp.digits)
         has_modes = not (xp.certified or self._coarse.near_separatrix) and modes <= MOST_MODES
-        by_panels = expected_nodes(self.orbit, approximate) * _NODE.get(len(T), _NODE_OF_HIGH_GENUS)
-        if has_modes and modes * (_MODE + approximate.size * _MODE_AT_TIME) + approximate.size * _TIME < by_panels:
+        by_modes = modes * (_MODE.get(genus, _MODE_OF_HIGH_GENUS) + times * _MODE_AT_TIME) + times * _TIME
+        by_panels = expected_nodes(self.orbit, approximate) * _NODE.get(genus, _NODE_OF_HIGH_GENUS)
+        if has_modes and by_modes < by_panels:
             return EnclosedFourier(self.orbit)
         try:
             return EnclosedClock(self.orbit, approximate, xp.certified)

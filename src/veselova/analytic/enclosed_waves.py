@@ -8,7 +8,7 @@ both are formed in fixed point.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from veselova.analytic.enclosed_series import LARGEST, LEAST, UPWARDS
 from veselova.analytic.fixed_point import Fixed
 from veselova.analytic.precision import Values
 
-__all__ = ["SumsOverModes", "SumsOverPoints"]
+__all__ = ["SumsOverPoints", "sums_over_modes"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -31,6 +31,9 @@ _SPARE_DIGITS = 4
 #: Points, places of the box along all axes but the first, and rows of modes that are looked at together: some megabytes.
 _POINTS, _PLACES, _ROWS = 500, 300, 30
 
+#: Waves in balls that are in memory at once.
+_WAVES = 1_000_000
+
 #: What rounding in both parts makes of a power (see Fixed.turns), and of a term of a sum along with all its products, at most.
 _OF_POWER, _OF_TERM = 4.5, 10
 
@@ -38,47 +41,48 @@ _OF_POWER, _OF_TERM = 4.5, 10
 _OPEN = 1e-3
 
 
-class SumsOverModes:
-    """Sums over modes (M, g), of which no two are opposite, with coefficients (M,), balls."""
+def sums_over_modes(
+    kind: Literal["cosines", "sines"], modes: Integers, coefficients: Values, turns: Values, arithmetic: Any
+) -> Values:
+    """Return Σ c_m cos 2πm·z or Σ c_m sin 2πm·z at turns e^{2πiz} (N, g), shape (N,), for modes (M, g) and coefficients (M,).
 
-    def __init__(self, modes: Integers, coefficients: Values, arithmetic: Any) -> None:
-        self._xp, self._modes, self._coefficients = arithmetic, modes, coefficients
-        fits = _fit(coefficients[:, None], arithmetic)
-        self._in_fixed_point = _OverModes(modes, coefficients, arithmetic) if fits else None
-
-    def sines(self, turns: Values) -> Values:
-        """Return Σ c_m sin 2πm·z at turns e^{2πiz} (N, g), shape (N,)."""
-        return self._sums(turns, 1)
-
-    def cosines(self, turns: Values) -> Values:
-        """Return Σ c_m cos 2πm·z at turns e^{2πiz} (N, g), shape (N,)."""
-        return self._sums(turns, 0)
-
-    def _sums(self, turns: Values, part: int) -> Values:
-        fixed, result = self._in_fixed_point, np.empty(len(turns), dtype=object)
-        for first in range(0, len(turns), _POINTS):
-            some = slice(first, first + _POINTS)
-            if fixed is None or (found := fixed(turns[some], part)) is None:
-                waves = self._xp.waves(self._modes, turns[some])[part]
-                found = self._xp.product(waves.T, self._coefficients[:, None])[:, 0]
-            result[some] = found
-        return result
+    No two modes are opposite.
+    """
+    part, fixed = ("cosines", "sines").index(kind), None
+    if _fit(coefficients[:, None], arithmetic):
+        fixed = _OverModes(part, modes, coefficients, arithmetic)
+    result = np.empty(len(turns), dtype=object)
+    points = max(1, min(_POINTS, _WAVES // max(1, len(modes))))
+    for first in range(0, len(turns), points):
+        some = slice(first, first + points)
+        if fixed is None or (found := fixed(turns[some])) is None:
+            waves = arithmetic.waves(modes, turns[some])[part]
+            found = arithmetic.product(waves.T, coefficients[:, None])[:, 0]
+        result[some] = found
+    return result
 
 
 class SumsOverPoints:
     """Sums over turns e^{2πiz} (J, g) with weights (K, J), balls, for modes of entries up to ``highest``."""
 
     def __init__(self, turns: Values, weights: Values, highest: int, arithmetic: Any) -> None:
-        self._xp, self._turns, self._weights, self._in_fixed_point = arithmetic, turns, weights, None
-        if _fit(weights.T, arithmetic):
+        self._in_fixed_point: _OverPoints | None = None
+        if turns.shape[1] > 1 and _fit(weights.T, arithmetic):  # modes of one entry have nothing to share
             fixed = _OverPoints(turns, weights, highest, arithmetic)
             self._in_fixed_point = fixed if fixed.are_narrow else None
+        if self._in_fixed_point is None:
+            self._xp, self._weights, entries = arithmetic, weights.T, np.arange(highest + 1)[:, None]
+            self._powers = [arithmetic.waves(entries, turn[:, None]) for turn in turns.T]
 
     def cosines(self, modes: Integers) -> Values:
         """Return Σ_j w_kj cos 2πm·z_j for modes (M, g), shape (M, K)."""
         if self._in_fixed_point is not None:
             return self._in_fixed_point(modes)
-        return np.asarray(self._xp.product(self._xp.cosines(modes, self._turns), self._weights.T))
+        cosine, sine = 1, 0
+        for (cosines, sines), entries in zip(self._powers, modes.T, strict=True):
+            x, y = cosines[np.abs(entries)], sines[np.abs(entries)] * np.sign(entries)[:, None]
+            cosine, sine = cosine * x - sine * y, cosine * y + sine * x
+        return np.asarray(self._xp.product(cosine, self._weights))
 
 
 def _fit(coefficients: Values, arithmetic: Any) -> bool:
@@ -128,47 +132,52 @@ class _Turns:
 
 
 class _OverModes:
-    def __init__(self, modes: Integers, coefficients: Values, arithmetic: Any) -> None:
+    def __init__(self, part: int, modes: Integers, coefficients: Values, arithmetic: Any) -> None:
         highest = self._highest = np.max(np.abs(modes), axis=0)
         # m and −m are one wave: the first entry is made positive. The box has 0 … B along the first axis, −B … B along others.
         signs = np.where(modes[:, 0] < 0, -1, 1)
-        modes = modes * signs[:, None]
-        shape = (int(highest[0]) + 1, *(2 * highest[1:] + 1).tolist())
-        self._scaled = _Scaled(coefficients[:, None], math.prod(shape), arithmetic)
-        places = (modes[:, 0], *(modes[:, 1:] + highest[1:]).T)
-        limbs = self._scaled.numbers.limbs[:, :, 0]
-        self._boxes = []
-        for sign in (np.ones_like(signs), signs):  # for cosines and for sines, which change sign with m
-            box = np.zeros((len(limbs), *shape))
-            box[:, *places] = limbs * sign
-            self._boxes.append(box)
+        self._shape = (int(highest[0]) + 1, *(2 * highest[1:] + 1).tolist())
+        self._scaled = _Scaled(coefficients[:, None], math.prod(self._shape), arithmetic)
+        self._part, self._limbs = part, self._scaled.numbers.limbs[:, :, 0] * signs**part  # a sine changes sign with m
+        self._places = (modes * signs[:, None]).T
+        self._places[1:] += highest[1:, None]
         self._steepness = np.abs(modes).T @ self._scaled.sizes
 
-    def __call__(self, points: Values, part: int) -> Values | None:
-        """Return the real parts (0) or imaginary parts (1) at turns (N, g); None where these are too open."""
+    def __call__(self, points: Values) -> Values | None:
+        """Return the sums at turns (N, g); None where these are too open."""
         turns = _Turns(points, self._highest, self._scaled.bits)
         if not turns.are_narrow:
             return None
-        return self._scaled.balls(self._summed(turns, part)[:, None], turns.errors @ self._steepness)[:, 0]
+        return self._scaled.balls(self._summed(turns)[:, None], turns.errors @ self._steepness)[:, 0]
 
-    def _summed(self, turns: _Turns, part: int) -> Fixed:
+    def _summed(self, turns: _Turns) -> Fixed:
         """Return one part of Σ c_m w^m, shape (N,), places along the second axis of the box some at a time."""
-        box, first, size = self._boxes[part], turns.powers(0).limbs, len(turns.errors)
-        count, genus = len(box), len(self._highest)
+        first, size, part = turns.powers(0).limbs, len(turns.errors), self._part
+        count, genus = len(self._limbs), len(self._shape)
         table = Fixed(np.moveaxis(first, 2, 1).reshape(count, -1, 2 * size))
         if genus == 1:
-            return table.weighted(Fixed(box[:, :, None]))[part * size : (part + 1) * size, 0]
+            weights = np.zeros((count, self._shape[0], 1))
+            weights[:, self._places[0], 0] = self._limbs
+            return table.weighted(Fixed(weights))[part * size : (part + 1) * size, 0]
         others = [_from_lowest(turns.powers(k)) for k in range(1, genus)]
-        step = max(1, _PLACES // math.prod(box.shape[3:], start=1))
+        step = max(1, _PLACES // math.prod(self._shape[2:], start=1))
         total = np.zeros((count, size))
-        for start in range(0, box.shape[2], step):
-            places = box[:, :, start : start + step]
-            sums = table.weighted(Fixed(places.reshape(*places.shape[:2], -1)))
-            inner = sums.limbs.reshape(count, 2, size, *places.shape[2:])
+        for start in range(0, self._shape[1], step):
+            box = self._box(start, min(step, self._shape[1] - start))
+            sums = table.weighted(Fixed(box.reshape(*box.shape[:2], -1)))
+            inner = sums.limbs.reshape(count, 2, size, *box.shape[2:])
             for power in reversed(others[1:]):
                 inner = np.stack([_contracted(inner, power, k) for k in (0, 1)], axis=1)
             total += _contracted(inner, others[0][..., start : start + step], part)
         return Fixed(total)
+
+    def _box(self, start: int, step: int) -> Array:
+        """Return limbs (L, B+1, step, …) of the coefficients with some places along the second axis, from the modes."""
+        chosen = (self._places[1] >= start) & (self._places[1] < start + step)
+        place = self._places[:, chosen]
+        box = np.zeros((len(self._limbs), self._shape[0], step, *self._shape[2:]))
+        box[:, place[0], place[1] - start, *place[2:]] = self._limbs[:, chosen]
+        return box
 
 
 def _from_lowest(powers: Fixed) -> Array:
@@ -214,7 +223,7 @@ class _OverPoints:
         """Form the sums of some rows."""
         numbers = self._scaled.numbers
         count, points, columns = numbers.limbs.shape
-        waves, last = self._leading(np.array(rows, dtype=np.int64).reshape(len(rows), -1)), self._powers[-1].limbs
+        waves, last = self._leading(np.array(rows)), self._powers[-1].limbs
         found = np.empty((count, 2, last.shape[2], len(rows), columns))
         for part in (0, 1):
             # Shape (L, J, rows, K), and in fixed point one of the factors is not a sum.
@@ -226,8 +235,6 @@ class _OverPoints:
 
     def _leading(self, modes: Integers) -> Fixed:
         """Return e^{2πi m'·z} of all axes but the last, shape (2, M, J)."""
-        if not modes.shape[1]:
-            return Fixed(self._powers[0].limbs[:, :, :1])
         waves = self._power(modes, 0)
         for axis in range(1, modes.shape[1]):
             factor = self._power(modes, axis)

@@ -37,7 +37,7 @@ _SMALLEST_MODE = 4e-16
 #: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
-#: Entries of modes beyond those asked for: room for the next layers.
+#: Entries of modes beyond those asked for, at least: room for the next layers.
 _SPARE_ENTRIES = 16
 
 #: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and their part.
@@ -227,7 +227,7 @@ class ColumnsForModes(Generic[T]):
         """Return the columns for modes (M, g)."""
         largest = int(np.max(np.abs(modes)))
         if largest > self._largest:
-            self._largest = largest + _SPARE_ENTRIES
+            self._largest = largest + max(_SPARE_ENTRIES, largest // 2)
             columns = self._rate.columns(2 * (max(self._rate.needed_nodes) + self._largest))
             self._columns = [self._made(*column, self._largest) for column in columns]
         return self._columns
