@@ -11,7 +11,7 @@ import pytest
 
 import veselova as vs
 from test_many_digits import in_rationals
-from veselova.analytic import enclosed_clock, enclosed_solution, enclosed_waves
+from veselova.analytic import enclosed_clock, enclosed_fourier, enclosed_solution, enclosed_waves
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fixed_point import Fixed
@@ -58,7 +58,7 @@ def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[A
     return modes, coefficients, xp.midpoints(xp.array(rng.uniform(-2, 2, (11, genus))) / xp.number(7))
 
 
-@pytest.mark.parametrize("digits", [18, 61, 130])
+@pytest.mark.parametrize("digits", [18, 61, 240])
 @pytest.mark.parametrize("genus", [1, 2, 3])
 def test_sums_over_modes_hold_those_in_balls(
     genus: int, digits: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
@@ -79,7 +79,7 @@ def test_sums_over_modes_hold_those_in_balls(
                 assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
 
 
-@pytest.mark.parametrize("digits", [18, 61, 130])
+@pytest.mark.parametrize("digits", [18, 61, 240])
 @pytest.mark.parametrize("genus", [2, 3])
 def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.random.Generator) -> None:
     with balls(digits, False) as xp:
@@ -129,6 +129,15 @@ def test_modes_take_over_where_panels_do_not_reach(A: list[str], monkeypatch: py
     with pytest.raises(vs.Unsolved) as caught:
         vs.solve(body, times, digits=20, certified=True)
     assert caught.value.outcome == "too-far"
+
+
+def test_panels_take_over_where_there_are_too_many_modes(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = vs.Veselova([3, 2, 1], [1, 1, 1], [1, -2, 1], normalize=True)
+    by_modes = vs.solve(body, [300], digits=20)
+    monkeypatch.setattr(enclosed_fourier, "MOST_MODES", 30)
+    by_panels = vs.solve(body, [300], digits=20)
+    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert np.max(np.abs(by_panels.frame - by_modes.frame)) < 1e-15
 
 
 def test_many_times_far_out_are_those_of_each() -> None:

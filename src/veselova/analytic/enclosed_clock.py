@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
 from veselova.analytic.enclosed_series import EnclosedSeries
-from veselova.analytic.increasing import doublings
+from veselova.analytic.increasing import doublings, interval_step, is_shown
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -39,9 +39,6 @@ _SAMPLED_PANELS = 200
 
 #: Terms beyond those that the digits of a step ask for.
 _EXTRA_TERMS = 6
-
-#: Part of the slope at the approximate root that is certain next to it.
-_SLOPE = 0.5
 
 #: Panels end a little beyond the last time, by a part of it and by cycles of the fastest phase: the end comes from a clock in
 #: doubles, which has a relative and an absolute error.
@@ -216,8 +213,7 @@ class _Panels:
             x = xp.midpoints(x - (value - times) / rate)
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
         value, rate = clock(x, xp.digits)
-        reach = xp.around_zero((value - times) / (_SLOPE * rate))
-        if self._certified and not xp.inside(reach * self.steepest, xp.around_zero((1 - _SLOPE) * xp.at_least(rate))).all():
+        step, reach = interval_step(value - times, rate, self._steepness[p], xp)
+        if self._certified and not is_shown(reach, rate, self.steepest, xp):
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
-        # The root is x less the residual over a slope between the two.
-        return np.asarray(x - (value - times) / xp.widened(rate, reach * self._steepness[p]))
+        return np.asarray(x - step)

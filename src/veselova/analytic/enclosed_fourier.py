@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fourier_clock import ColumnsForModes, grown
-from veselova.analytic.increasing import Rows, doublings, increasing_root
+from veselova.analytic.increasing import Rows, doublings, increasing_root, interval_step
 from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.strip import Orbit
 from veselova.analytic.waves import waves_at
@@ -21,17 +21,14 @@ __all__ = ["MOST_MODES", "EnclosedFourier"]
 #: Modes looked at before giving up: minutes.
 MOST_MODES = 200_000
 
-#: A step of Newton's method in double precision, in cycles, that leaves as many digits; and waves that are in memory at once.
+#: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double; and waves in memory at once.
 _SETTLED, _BLOCK = 1e-7, 2_000_000
 
 #: Digits of modes, and of slopes, beyond those of a step.
 _MODE_DIGITS, _SLOPE_DIGITS = 2, 2
 
-#: Part of the slope at the approximate root that is certain next to it.
-_SLOPE = 0.5
-
-#: What the modes left out add up to, in units of the smallest kept, each over 1/(π m·f), and what those next to them do: others
-#: fall off as fast as they came.
+#: What the modes left out add up to, in units of the smallest kept for 1/(m·f) or for the time elapsed, those kept and those next
+#: to them: others fall off as fast as they came.
 _TAIL = 4
 
 
@@ -51,8 +48,8 @@ class EnclosedFourier:
         fastest = 2 * xp.pi * np.max(np.abs(orbit.frequencies.astype(float)))
         #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
         self._weights = np.maximum(xp.at_most(self._slopes), xp.at_most(fastest * self._amplitudes)) / self._mean
-        slowness = np.array(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies), dtype=float)
-        self._tail = _TAIL * self._smallest * float(np.linalg.norm(slowness))
+        #: 1/|m·f| of those kept and of those next to them.
+        self._slowness = np.abs(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)).astype(float)
 
     @property
     def size(self) -> int:
@@ -87,10 +84,13 @@ class EnclosedFourier:
                 value, slope = self._excess(digits, z, delta)
                 delta = xp.midpoints(delta - value / slope)
         value, slope = self._excess(xp.digits, z, delta)
-        value = xp.widened(value, self._tail)
-        # The root is δ less the value over a slope between the two.
-        reach = xp.around_zero(value / (_SLOPE * slope))
-        return np.asarray(uniform + delta - value / xp.widened(slope, reach * self._bend))
+        tau1 = uniform + delta
+        tail = self._tail(float(np.max(np.abs(tau1.astype(float)))))
+        return np.asarray(tau1 - interval_step(xp.widened(value, tail), slope, self._bend, xp)[0])
+
+    def _tail(self, elapsed: float) -> Any:
+        """Return what the modes left out add up to: what a mode does to t grows until a half of its period, 1/(2 m·f)."""
+        return _TAIL * self._smallest * float(np.linalg.norm(np.minimum(self._slowness, math.pi * elapsed)))
 
     def _excess(self, digits: int, z: Values, delta: Values) -> tuple[Values, Values]:
         """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step asks for no more."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.fixed_point import Fixed
+from veselova.analytic.fixed_point import LARGEST, LEAST, UPWARDS, Fixed
 from veselova.analytic.precision import Values
 
 __all__ = ["EnclosedSeries"]
@@ -34,11 +34,8 @@ _SPARE_DIGITS = 4
 #: What an error ε of x and of every operation makes of 2x²−1, in ε: 4 and 1, and what is of second order.
 _OF_SQUARE = 6
 
-#: Sizes of series that doubles can be scaled to, with all their digits.
-LEAST, LARGEST = 1e-150, 1e150
-
-#: Points beyond ±1 by more than the rounding of an end are left to balls. That, and bounds in doubles, change those by less.
-_ROUNDING, UPWARDS = 1e-15, 1 + 1e-6
+#: Points beyond ±1 by more than the rounding of an end are left to balls; UPWARDS makes up for that.
+_ROUNDING = 1e-15
 
 
 class EnclosedSeries:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import Moving, moving_part
-from veselova.analytic.solution import Solution
+from veselova.analytic.solution import WIDEST_RATE, Solution
 from veselova.analytic.spectrum import Spectrum, resolved
 from veselova.analytic.start import start
 from veselova.analytic.strip import Orbit
@@ -57,11 +58,11 @@ _LEAST_WIDTH = 1e-290
 #: Digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
 
-#: Milliseconds with some 60 digits (less and more change all of them alike), by genus: a node of panels, and a mode of the
-#: Fourier clock at once; and a time of that clock, and a mode with every time.
-_NODE, _NODE_OF_HIGH_GENUS = {1: 0.05, 2: 0.1, 3: 0.35}, 0.5
-_MODE, _MODE_OF_HIGH_GENUS = {1: 1.0}, 0.22
-_TIME, _MODE_AT_TIME = 0.1, 1.5e-4
+#: Milliseconds with some 60 digits (fewer and more change all of them alike, about), by genus, the last for all above: a node of
+#: panels; a mode of the Fourier clock at once, and with every time, where those have more room between them as the genus grows; and
+#: a time of that clock.
+_NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
+_MODE_AT_TIME, _TIME = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1
 
 
 class EnclosedSolution:
@@ -176,21 +177,21 @@ class EnclosedSolution:
         return tau1, attitude, {"clock": clock.name, "clock_size": clock.size, "evaluations": len(times)}
 
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
-        """Return the cheaper clock; only that of panels is bounded, and only that of modes goes to any time."""
+        """Return the cheaper clock, or the other one where that has too many nodes or modes; only that of panels is bounded."""
         xp, T = self.arithmetic, self.frame.periods.riemann_matrix
-        genus, times = len(T), approximate.size
-        modes = expected_modes(genus, float(xp.log(xp.determinant(T))), xp.digits)
-        has_modes = not (xp.certified or self._coarse.near_separatrix) and modes <= MOST_MODES
-        by_modes = modes * (_MODE.get(genus, _MODE_OF_HIGH_GENUS) + times * _MODE_AT_TIME) + times * _TIME
-        by_panels = expected_nodes(self.orbit, approximate) * _NODE.get(genus, _NODE_OF_HIGH_GENUS)
-        if has_modes and by_modes < by_panels:
-            return EnclosedFourier(self.orbit)
-        try:
-            return EnclosedClock(self.orbit, approximate, xp.certified)
-        except Unsolved:
-            if has_modes:  # too far for panels
-                return EnclosedFourier(self.orbit)
-            raise
+        kind, times = min(len(T), max(_NODE)), approximate.size
+        modes = expected_modes(len(T), float(xp.log(xp.determinant(T))), xp.digits)
+        by_modes = modes * (_MODE[kind] + times * _MODE_AT_TIME[kind]) + times * _TIME
+        by_panels = expected_nodes(self.orbit, approximate) * _NODE[kind]
+        clocks: list[Callable[[], EnclosedClock | EnclosedFourier]]
+        clocks = [partial(EnclosedClock, self.orbit, approximate, xp.certified)]
+        smooth = not self._coarse.near_separatrix and self.moving.rate_variation < WIDEST_RATE
+        if smooth and modes <= MOST_MODES and not xp.certified:
+            clocks.insert(int(by_panels < by_modes), partial(EnclosedFourier, self.orbit))
+        for clock in clocks[:-1]:
+            with suppress(Unsolved):
+                return clock()
+        return clocks[-1]()
 
     @cached_property
     def _directions(self) -> Values:

@@ -1,7 +1,7 @@
 """Fourier sums in balls: over modes at many points, and over points for many modes.
 
 Sums over modes, Σ_m c_m sin 2πm·z and Σ_m c_m cos 2πm·z, put these into a box: along its first axis sums at all points are one
-product of matrices, along the others products of numbers. Sums over points are Σ_j w_kj cos 2πm·z_j. Up to a hundred digits
+product of matrices, along the others products of numbers. Sums over points are Σ_j w_kj cos 2πm·z_j. Up to 250 digits
 both are formed in fixed point.
 """
 
@@ -13,8 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.enclosed_series import LARGEST, LEAST, UPWARDS
-from veselova.analytic.fixed_point import Fixed
+from veselova.analytic.fixed_point import LARGEST, LEAST, UPWARDS, Fixed
 from veselova.analytic.precision import Values
 
 __all__ = ["SumsOverPoints", "sums_over_modes"]
@@ -22,22 +21,25 @@ __all__ = ["SumsOverPoints", "sums_over_modes"]
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Digits up to which numbers and their last limbs are doubles.
+#: Digits up to which the last limbs of numbers of size one are doubles.
 _MOST_FIXED = 250
 
 #: Digits of fixed-point numbers beyond those of the sums and of their terms.
 _SPARE_DIGITS = 4
 
-#: Points, places of the box along all axes but the first, and rows of modes that are looked at together: some megabytes.
+#: Points, places of the box along all axes but the first, and rows of modes that are looked at together; and limbs of a table of
+#: sums along the first axis, which fewer points take where a place of the second axis has many behind it.
 _POINTS, _PLACES, _ROWS = 500, 300, 30
+_TABLE = 4_000_000
 
 #: Waves in balls that are in memory at once.
 _WAVES = 1_000_000
 
-#: What rounding in both parts makes of a power (see Fixed.turns), and of a term of a sum along with all its products, at most.
+#: What rounding makes of a power, in both parts (see Fixed.turns); and of a term of a sum with all products behind it: up to four
+#: axes 12 at most, and a third of that, since no operation is off by more than a third of its bound at 250 digits.
 _OF_POWER, _OF_TERM = 4.5, 10
 
-#: Largest error of e^{2πi m·z} for the largest m of which multiples are of the first order.
+#: Largest error of e^{2πi m·z}, m the corner of the box, at which products of errors are below this part of errors.
 _OPEN = 1e-3
 
 
@@ -46,13 +48,13 @@ def sums_over_modes(
 ) -> Values:
     """Return Σ c_m cos 2πm·z or Σ c_m sin 2πm·z at turns e^{2πiz} (N, g), shape (N,), for modes (M, g) and coefficients (M,).
 
-    No two modes are opposite.
+    No two modes are equal or opposite.
     """
     part, fixed = ("cosines", "sines").index(kind), None
     if _fit(coefficients[:, None], arithmetic):
         fixed = _OverModes(part, modes, coefficients, arithmetic)
     result = np.empty(len(turns), dtype=object)
-    points = max(1, min(_POINTS, _WAVES // max(1, len(modes))))
+    points = max(1, _WAVES // max(1, len(modes)) if fixed is None else fixed.points)
     for first in range(0, len(turns), points):
         some = slice(first, first + points)
         if fixed is None or (found := fixed(turns[some])) is None:
@@ -94,7 +96,7 @@ def _fit(coefficients: Values, arithmetic: Any) -> bool:
 class _Scaled:
     """Coefficients (M, K) of sums over M as fixed-point numbers: of each column the absolute values add up to less than one.
 
-    ``bits``: their precision, enough for sums of so many terms · scales (K,): the units · open: what balls leave open, (K,)
+    ``bits``: their precision, enough for sums of so many terms · ``sizes`` (M, K): their absolute values
     """
 
     def __init__(self, coefficients: Values, terms: int, arithmetic: Any) -> None:
@@ -105,14 +107,16 @@ class _Scaled:
         middle = arithmetic.midpoints(coefficients)
         self.numbers = Fixed.of_numbers(middle / self._scales, self.bits)
         self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0)
+        self.sizes /= self._scales
 
     def balls(self, sums: Fixed, slack: Array) -> Values:
-        """Return sums (N, K) that their turns leave open by ``slack``, of which every term was rounded."""
-        xp, rounding = self._xp, _OF_TERM * self._terms * 2.0**-self.bits * self._scales
-        result = xp.widened(xp.around_zero(xp.array(slack * (1 + _OPEN) * UPWARDS + rounding)), self._open)
+        """Return sums (N, K) that their turns leave open by ``slack`` of a unit, of which every term was rounded."""
+        xp, rounding = self._xp, _OF_TERM * self._terms * 2.0**-self.bits
+        result = xp.around_zero(xp.array(slack * (1 + _OPEN) * UPWARDS + rounding))
         for values in sums.parts():
-            result = result + values * self._scales
-        return np.asarray(result)
+            result = result + values
+        # In doubles the last digits of small sums would be lost.
+        return np.asarray(xp.widened(result * xp.array(self._scales), self._open))
 
 
 class _Turns:
@@ -142,6 +146,9 @@ class _OverModes:
         self._places = (modes * signs[:, None]).T
         self._places[1:] += highest[1:, None]
         self._steepness = np.abs(modes).T @ self._scaled.sizes
+        self._behind = math.prod(self._shape[2:], start=1)
+        #: Points that are looked at together.
+        self.points = min(_POINTS, _TABLE // (2 * len(self._limbs) * self._behind))
 
     def __call__(self, points: Values) -> Values | None:
         """Return the sums at turns (N, g); None where these are too open."""
@@ -151,7 +158,7 @@ class _OverModes:
         return self._scaled.balls(self._summed(turns)[:, None], turns.errors @ self._steepness)[:, 0]
 
     def _summed(self, turns: _Turns) -> Fixed:
-        """Return one part of Σ c_m w^m, shape (N,), places along the second axis of the box some at a time."""
+        """Return the sums, shape (N,), places along the second axis of the box some at a time."""
         first, size, part = turns.powers(0).limbs, len(turns.errors), self._part
         count, genus = len(self._limbs), len(self._shape)
         table = Fixed(np.moveaxis(first, 2, 1).reshape(count, -1, 2 * size))
@@ -160,7 +167,7 @@ class _OverModes:
             weights[:, self._places[0], 0] = self._limbs
             return table.weighted(Fixed(weights))[part * size : (part + 1) * size, 0]
         others = [_from_lowest(turns.powers(k)) for k in range(1, genus)]
-        step = max(1, _PLACES // math.prod(self._shape[2:], start=1))
+        step = max(1, _PLACES // self._behind)
         total = np.zeros((count, size))
         for start in range(0, self._shape[1], step):
             box = self._box(start, min(step, self._shape[1] - start))
@@ -169,7 +176,7 @@ class _OverModes:
             for power in reversed(others[1:]):
                 inner = np.stack([_contracted(inner, power, k) for k in (0, 1)], axis=1)
             total += _contracted(inner, others[0][..., start : start + step], part)
-        return Fixed(total)
+        return Fixed(total).carried()
 
     def _box(self, start: int, step: int) -> Array:
         """Return limbs (L, B+1, step, …) of the coefficients with some places along the second axis, from the modes."""
@@ -226,7 +233,7 @@ class _OverPoints:
         waves, last = self._leading(np.array(rows)), self._powers[-1].limbs
         found = np.empty((count, 2, last.shape[2], len(rows), columns))
         for part in (0, 1):
-            # Shape (L, J, rows, K), and in fixed point one of the factors is not a sum.
+            # Of shape (L, J, rows, K).
             weights = Fixed(np.swapaxes(waves.limbs[:, part], 1, 2)[..., None]) * numbers[:, None]
             table = Fixed(np.swapaxes(last[:, part], 1, 2))
             sums = table.weighted(Fixed(weights.limbs.reshape(count, points, -1)))

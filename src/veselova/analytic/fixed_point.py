@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Fixed"]
+__all__ = ["LARGEST", "LEAST", "UPWARDS", "Fixed"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _BITS = 22
 _BASE, _OF_BASE = 2.0**_BITS, 2.0**-_BITS
 
 #: A product with L limbs, one of the factors a sum, drops (L−1) 2^(21 − 22L), the products beyond the limb after the last, and
-#: that limb. With so many bits beyond those asked for, 22(L−1) or more in all, that is below 2^−bits for any L up to 2¹⁰.
+#: that limb. With so many bits beyond those asked for, 22(L−1) or more in all, that is below 2^−bits for any L up to 2⁷.
 _DROPPED_BITS = 6
 
 #: Bits of a double that is one part of a number.
@@ -32,6 +32,13 @@ _PART_BITS = 52
 
 #: Products of limbs up to 2²¹ of which a sum is exact.
 _EXACT = 2**11
+
+#: Doubles of the weights that are spread out at once.
+_SPREAD = 4_000_000
+
+#: Sizes that doubles can be scaled from to one, and what makes up for rounding in bounds of doubles.
+LEAST, LARGEST = 1e-150, 1e150
+UPWARDS = 1 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,10 @@ class Fixed:
         weighted = self.limbs * _OF_BASE ** np.arange(len(self.limbs)).reshape(-1, *(1,) * (self.limbs.ndim - 1))
         return [weighted[:3].sum(axis=0), *(weighted[i : i + 2].sum(axis=0) for i in range(3, len(weighted), 2))]
 
+    def carried(self) -> Fixed:
+        """Return the same numbers with limbs that products take."""
+        return Fixed(_carried(self.limbs.copy()))
+
     def __add__(self, other: Fixed) -> Fixed:
         return Fixed(self.limbs + other.limbs)
 
@@ -96,7 +107,8 @@ class Fixed:
     def turns(self, sines: Fixed, count: int) -> Fixed:
         """Return cos mφ and sin mφ, m = 0 … count−1, shape (2, count, N), of cosines (N,) and sines: w^{h+i} = w^h w^i.
 
-        An error ε of w and δ, that of two operations in both parts, make (mε + (m−1)δ) max(1, |w|)^{m−1} of an error of w^m.
+        For |w| ≤ 1 the error of w^m is mε + (m−1)δ, but for products of errors, with that of w, ε, and that of two operations in
+        both parts, δ.
         """
         table = np.zeros((len(self.limbs), 2, max(count, 2), self.limbs.shape[1]))
         table[0, 0, 0], table[:, 0, 1], table[:, 1, 1] = 1, self.limbs, sines.limbs
@@ -136,11 +148,19 @@ class Fixed:
     def weighted(self, weights: Fixed) -> Fixed:
         """Return Σ_k x_kn w_kj, shape (N, J), for numbers (K, N) and weights (K, J)."""
         count, terms, columns = weights.limbs.shape
-        size, most = self.limbs.shape[2], _EXACT // count
+        most = min(terms, _EXACT // count)
+        width = max(1, _SPREAD // (count * (count + 1) * most))
+        parts = [self._weighted(weights.limbs[:, :, first : first + width], most) for first in range(0, columns, width)]
+        return Fixed(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
+
+    def _weighted(self, weights: Array, most: int) -> Array:
+        """Return limbs of the sums, which take so many terms at a time."""
+        count, terms, columns = weights.shape
+        size = self.limbs.shape[2]
         total = np.zeros((count, size, columns))
         for first in range(0, terms, most):
             some = slice(first, first + most)
-            factors, table = self.limbs[:, some], weights.limbs[:, some]
+            factors, table = self.limbs[:, some], weights[:, some]
             # Limb i of x times limb j of w goes to place i + j.
             shifted = np.zeros((*table.shape[:2], count + 1, columns))
             for i in range(count):
@@ -148,7 +168,7 @@ class Fixed:
                 shifted[i, :, i : i + placed.shape[1]] = placed
             sums = factors.reshape(-1, size).T @ shifted.reshape(-1, (count + 1) * columns)
             total += _carried(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
-        return Fixed(_carried(total) if terms > most else total)
+        return _carried(total) if terms > most else total
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:

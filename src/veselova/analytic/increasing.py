@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.precision import Values
 from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["Rows", "doublings", "increasing_root"]
+__all__ = ["Rows", "doublings", "increasing_root", "interval_step", "is_shown"]
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,9 @@ Rows = slice | NDArray[np.intp]
 
 #: Newton's steps double the digits from those of a double, but for what they lose.
 _FIRST_DIGITS, _LOST_DIGITS = 12, 2
+
+#: Part of the slope at an approximate root that is certain next to it.
+_SLOPE = 0.5
 
 #: Bisection alone needs 53 steps from any bracket to one rounding.
 _MOST_STEPS = 80
@@ -67,6 +72,22 @@ def doublings(digits: int) -> list[int]:
     """Return the digits of Newton's steps from a root in doubles to the one before the last."""
     half = math.ceil(digits / 2) + _LOST_DIGITS
     return [*doublings(half), half] if half > _FIRST_DIGITS else []
+
+
+def interval_step(value: Values, slope: Values, bend: Any, arithmetic: Any) -> tuple[Values, Values]:
+    """Return what takes approximate roots to balls that hold them, and balls around zero that hold the distances.
+
+    ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as far as a root may be, which is
+    shown where the distance times the bend is below the other half.
+    """
+    reach = arithmetic.around_zero(value / (_SLOPE * slope))
+    return np.asarray(value / arithmetic.widened(slope, reach * bend)), np.asarray(reach)
+
+
+def is_shown(reach: Values, slope: Values, bend: Any, arithmetic: Any) -> bool:
+    """Return whether half of the slopes is certain as far as that."""
+    rest = arithmetic.around_zero((1 - _SLOPE) * arithmetic.at_least(slope))
+    return bool(arithmetic.inside(reach * bend, rest).all())
 
 
 def _with(result: Array, rows: Rows, found: Array) -> Array:

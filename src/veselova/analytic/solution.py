@@ -34,7 +34,7 @@ from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
 from veselova.mechanics.torus_problem import TorusProblem
 
-__all__ = ["METHODS", "Solution"]
+__all__ = ["METHODS", "WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ _NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
 _MOST_CYCLES = 1e28
 
 #: By how much dt/dτ₁ may vary for a Fourier clock.
-_WIDEST_RATE = 1e10
+WIDEST_RATE = 1e10
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
@@ -154,7 +154,7 @@ class Solution:
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {GUARD_DIGITS} digits")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
-        if name is None and (self.near_separatrix or self.moving.rate_variation > _WIDEST_RATE):
+        if name is None and (self.near_separatrix or self.moving.rate_variation > WIDEST_RATE):
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
         if (name or self.costs(times).cheaper_clock(self.inversions(times, method))) == "fourier":
             return self._fourier(guarded)
@@ -166,7 +166,7 @@ class Solution:
         return PanelClock(rate, self.mean_rate, in_tau1, earliest, latest)
 
     def _fourier(self, guarded: bool) -> FourierClock:
-        if (variation := self.moving.rate_variation) > _WIDEST_RATE:
+        if (variation := self.moving.rate_variation) > WIDEST_RATE:
             raise Unsolved(
                 "beyond-floats", f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 of its mean"
             )
