@@ -284,6 +284,18 @@ def test_no_mode_is_looked_at_twice() -> None:
     assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5
 
 
+@pytest.mark.parametrize(("q_2", "q_dot_2"), [("3.735e-9", "3.758e-11"), ("2.029e-11", "2.01e-10"), ("1.352e-10", "3.89e-13")])
+def test_modes_end_where_rounding_has_none(q_2: str, q_dot_2: str) -> None:
+    """Next to a separatrix determinants are rounded to just the size below which modes are left out."""
+    problem = Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
+    found = solve(problem, [2000.0, 1e6])
+    assert found.provenance.details["clock"] == "fourier"
+    assert found.provenance.details["clock_size"] < 4000
+    assert np.max(found.error) < 1e-10
+    by_panels = solve_analytic(problem, [2000.0], clock="panels")
+    assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+
+
 def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:
     """Over twenty-five orders of A the least dt/dτ₁ is below the rounding of the mean, and sums over modes need not increase."""
     problem = Veselova([1e25, 30.0, 2.0, 1.0], [0.3, 0.5, 0.4, 0.7], [0.2, -0.4, 0.6, 0.1], normalize=True)

@@ -59,7 +59,7 @@ _LEAST_WIDTH = 1e-290
 _MOST_GROWTH = 1000
 
 #: Milliseconds with some 60 digits (fewer and more change all of them alike, about), by genus, the last for all above: a node of
-#: panels; a mode of the Fourier clock at once, and with every time, where those have more room between them as the genus grows; and
+#: panels; a mode of the Fourier clock at once, and with every time, which costs more as the genus grows; and
 #: a time of that clock.
 _NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
 _MODE_AT_TIME, _TIME = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1

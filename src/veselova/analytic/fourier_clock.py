@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -31,11 +32,12 @@ Integers = NDArray[np.int64]
 
 T = TypeVar("T")
 
-#: Modes below this fraction of F_0 are left out: there the determinants are rounding.
+#: Modes below this part of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
-#: Modes looked at before giving up.
+#: Modes looked at before giving up, and before looking whether a higher threshold has less than half of them.
 _MOST_MODES = 1_000_000
+_ENDLESS = (20_000, 200_000)
 
 #: Entries of modes beyond those asked for, at least: room for the next layers.
 _SPARE_ENTRIES = 16
@@ -63,7 +65,7 @@ class FourierClock(Clock):
     name: ClassVar[str] = "fourier"
 
     def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        modes, coefficients, edge = _significant_modes(rate)
+        modes, coefficients, edge, self._smallest = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
         modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
@@ -126,7 +128,7 @@ class FourierClock(Clock):
     def _swayed_for(self, elapsed: float) -> tuple[float, Array]:
         """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
         lengths = np.minimum(self._longest, elapsed)
-        of_modes = 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
+        of_modes = 4 * self._smallest * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
         shifts = self._pull * lengths[: self.size, None]
         return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt((shifts * shifts).sum(axis=0))
 
@@ -199,18 +201,27 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above rounding, F_m, and the modes next to them."""
-    threshold = _SMALLEST_MODE * float(rate.mean)
+def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
+    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0, F_m, modes next to them, and that part.
+
+    Where rounding reaches it there is no end of modes; a larger part has less than half of them then, and otherwise hardly fewer.
+    """
     columns = ColumnsForModes(rate, lambda weights, G, _: (weights.T, 2 * np.pi * G.T))
 
-    def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
-        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
-        values = float(rate.scale) * np.linalg.det(matrices)
-        return values, np.abs(values) > threshold
+    def modes_above(part: float, most: int) -> tuple[Integers, Array, Integers, float]:
+        def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
+            matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
+            values = float(rate.scale) * np.linalg.det(matrices)
+            return values, np.abs(values) > part * float(rate.mean)
 
-    modes, values, edge = grown(rate.inversion.periods.genus, determinants)
-    return modes, values.astype(np.float64), edge
+        modes, values, edge = grown(rate.inversion.periods.genus, determinants, most)
+        return modes, values.astype(np.float64), edge, part
+
+    for most in _ENDLESS:
+        for part, room in ((_SMALLEST_MODE, most), (2 * _SMALLEST_MODE, most // 2), (8 * _SMALLEST_MODE, most // 2)):
+            with suppress(Unsolved):
+                return modes_above(part, room)
+    return modes_above(_SMALLEST_MODE, _MOST_MODES)
 
 
 class ColumnsForModes(Generic[T]):
