@@ -120,6 +120,16 @@ def test_what_is_not_json_exits_2(body: bytes, monkeypatch: pytest.MonkeyPatch, 
     assert_refused(body, monkeypatch, capsys, "required one JSON document")
 
 
+def test_what_a_file_says_does_not_steer_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=BytesIO(b'{"problem": {"system": "x\\u001b[31m\\u0000"}}')))
+    monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])
+    with pytest.raises(SystemExit):
+        main()
+    told = capsys.readouterr().err
+    assert "\\x1b[31m" in told
+    assert told.rstrip("\n").isprintable()
+
+
 def assert_refused(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any, part: str) -> None:
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=BytesIO(body)))
     monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])

@@ -184,6 +184,21 @@ def test_another_media_type_gets_415(server: Server, media_type: str) -> None:
     is_problem(post(server, "/v1/tori", GOOD, **{"content-type": media_type}), 415, "unsupported-media-type")
 
 
+def test_a_coded_body_gets_415_and_a_byte_order_mark_is_none(server: Server) -> None:
+    is_problem(post(server, "/v1/tori", GOOD, **{"content-encoding": "gzip"}), 415, "unsupported-media-type")
+    assert post(server, "/v1/tori", b"\xef\xbb\xbf" + json.dumps(GOOD).encode()).status_code in (200, 422)
+    empty = is_problem(post(server, "/v1/tori", b" "), 400, "malformed-json")
+    assert empty["detail"] == "The body: required one JSON document; given nothing."
+
+
+@pytest.mark.parametrize("path", ["/v1/systems", "/healthz", "/readyz"])
+def test_head_is_get_without_a_body(server: Server, path: str) -> None:
+    asked, told = server.get(path), server.ask("HEAD", path)
+    assert asked.status_code == told.status_code == 200
+    assert told.content == b""
+    assert told.headers["content-length"] == asked.headers["content-length"]
+
+
 @pytest.mark.parametrize("accept", ["application/json", "application/*;q=0.5", "*/*", "text/html, */*;q=0.1"])
 def test_json_is_served_to_who_takes_it(server: Server, accept: str) -> None:
     assert post(server, "/v1/trajectories", GOOD, accept=accept).status_code == 200

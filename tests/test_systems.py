@@ -15,7 +15,7 @@ from conftest import Server
 from hostile import BUDGET_S
 from veselova import Client, InvalidInput, InvalidRequest, compare, solve
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
-from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
+from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 from veselova.service.systems import SYSTEMS
 
 TIMES = [-1.0, 0.0, 0.5, 2.0]
@@ -153,3 +153,11 @@ def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], messag
     with pytest.raises((InvalidInput, InvalidRequest)) as caught:
         requested_trajectory(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
     assert message in str(caught.value)
+
+
+def test_a_system_of_one_engine_cannot_be_compared() -> None:
+    from veselova.service.tasks import requested_comparison
+
+    with pytest.raises(InvalidInput) as caught:
+        requested_comparison(read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES}))
+    assert str(caught.value) == "problem: required a system that both engines solve; given lr, which numeric alone solves."

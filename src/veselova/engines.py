@@ -122,6 +122,9 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
 
 def compare(problem: Problem, times: Any, method: str | None = None) -> Comparison:
     """Return both engines' answers and their differences; ``method`` is the numerical one (``dop853`` or ``taylor``)."""
+    if isinstance(problem, Problem) and len(problem.engines) < len(ENGINES):
+        given = f"{problem.system}, which {' and '.join(problem.engines)} alone solves"
+        raise InvalidInput(("problem",), "a system that both engines solve", given)
     return Comparison(solve(problem, times, "analytic"), solve(problem, times, "numeric", method))
 
 
@@ -139,7 +142,7 @@ def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
     if not isinstance(problem, TorusProblem):
-        raise InvalidInput(("problem",), "a system with a closed form: veselova, neumann, ellipsoid-geodesic", problem.system)
+        raise InvalidInput(("problem",), "a system with a torus: veselova, neumann, ellipsoid-geodesic", problem.system)
     from veselova.analytic.torus import torus as torus_of
 
     return torus_of(problem, solution)

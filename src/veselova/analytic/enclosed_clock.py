@@ -117,7 +117,7 @@ class EnclosedClock:
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
             wanted = f"a clock of {self._xp.digits} digits would take {nodes:.3g} evaluations or more at that time"
-            raise Unsolved("too-far", wanted)
+            raise Unsolved("too-far", f"{wanted}; at most {_MOST_NODES} are made")
 
     def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         self._require_few(count * nodes)

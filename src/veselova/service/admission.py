@@ -30,6 +30,8 @@ async def read_json(request: Request, settings: Settings) -> Any:
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if media_type != "application/json" and not (media_type.startswith("application/") and media_type.endswith("+json")):
         raise Refused("unsupported-media-type", f"Content-Type: required application/json; given {media_type[:100] or 'none'}.")
+    if (coding := request.headers.get("content-encoding", "identity").strip().lower()) != "identity":
+        raise Refused("unsupported-media-type", f"Content-Encoding: required none; given {coding[:100]}.")
     limit = settings.max_body_bytes
     too_large = Refused("body-too-large", f"The body: required at most {limit} bytes; given more.")
     declared = request.headers.get("content-length", "")
@@ -61,8 +63,10 @@ def decoded(text: bytes) -> Any:
     NaN, Infinity and 1e999 are no JSON, but their sender is helped more by the name of the field: Python's own parser takes
     them, and the validation that follows refuses every number that is not finite. Of two fields of one name neither is taken.
     """
+    if not text.strip():
+        raise Refused("malformed-json", "The body: required one JSON document; given nothing.")
     try:
-        return _DECODER.decode(text.decode("utf-8"))
+        return _DECODER.decode(text.decode("utf-8-sig"))  # some editors put a byte order mark before it
     except InvalidInput:
         raise
     except (ValueError, RecursionError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -92,8 +93,14 @@ def _within_budget(document: Any) -> Iterator[None]:
 
 
 def _fail(message: str, status: int) -> None:
-    print(f"veselova: {message}", file=sys.stderr)
+    # What a file says is not to steer a terminal.
+    print("veselova: " + re.sub(r"[^\n]", _printable, message), file=sys.stderr)
     raise SystemExit(status)
+
+
+def _printable(letter: re.Match[str]) -> str:
+    text = letter.group()
+    return text if text.isprintable() else text.encode("unicode_escape").decode()
 
 
 @app.callback(invoke_without_command=True)

@@ -73,6 +73,9 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
             raise Refused("not-ready", " ".join(parts), retry_after=1)
         return _json({"status": "ready"})
 
+    for path, endpoint in (("/v1/systems", systems), ("/healthz", healthz), ("/readyz", readyz)):
+        routes.add_api_route(path, endpoint, methods=["HEAD"], include_in_schema=False)
+
     return routes
 
 

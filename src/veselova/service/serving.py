@@ -60,6 +60,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
         log_config=None,
         access_log=False,
         server_header=False,
+        loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
         http="h11",  # httptools, which uvicorn would take where it is installed, reads headers without end into memory
         proxy_headers=forwarded_allow_ips is not None,
         forwarded_allow_ips=forwarded_allow_ips,
