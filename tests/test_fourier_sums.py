@@ -15,6 +15,8 @@ from veselova.analytic import enclosed_clock, enclosed_fourier, enclosed_solutio
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fixed_point import Fixed
+from veselova.analytic.interval import Interval
+from veselova.analytic.periods import Periods
 
 KINDS: tuple[Literal["cosines"], Literal["sines"]] = ("cosines", "sines")
 SIZES = [Fraction(1, 10**120), 1, 10**120]
@@ -138,6 +140,24 @@ def test_panels_take_over_where_there_are_too_many_modes(monkeypatch: pytest.Mon
     by_panels = vs.solve(body, [300], digits=20)
     assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
     assert np.max(np.abs(by_panels.frame - by_modes.frame)) < 1e-15
+
+
+def test_the_choice_of_a_clock_takes_no_integral_over_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a closed cut they take digits² nodes in balls, which the route by angles does without."""
+    asked: list[int] = []
+    formed = Periods._forms_at_nodes
+
+    def recorded(periods: Periods, interval: Interval) -> Any:
+        if periods.arithmetic.has_radii and interval in periods.gaps:
+            asked.append(periods.arithmetic.digits)
+        return formed(periods, interval)
+
+    monkeypatch.setattr(Periods, "_forms_at_nodes", recorded)
+    body = vs.Veselova([2, 2, 1], ["2/3", "1/3", "2/3"], ["0.5", "0.5", "-0.75"])
+    assert vs.solve(body, [1, 3], digits=40, method="angles").provenance.details["regime"] == "closed-cut"
+    assert asked == []
+    vs.solve(body, [1, 3], digits=40, method="theta")
+    assert asked
 
 
 def test_many_times_far_out_are_those_of_each() -> None:

@@ -28,9 +28,8 @@ _GUARDED_GENUS = 3
 _LAST_RESORT_GENUS = 5
 _MOST_MODES = 2e5
 
-#: The coefficients fall below 4e-16 = e^−36, where 15 digits end, inside a convex body of volume (36/π)^g/det T times this, half
-#: of it counted; to more digits the body is as much larger.
-_EXPONENT, _OF_DIGITS = 36.0, 15
+#: The coefficients fall below 4e-16 = e^−36 inside a convex body of volume (36/π)^g/det T times this, half of it counted.
+_EXPONENT = 36.0
 _BODY = {1: 1.0, 2: 1.25, 3: 1.07, 4: 0.67}
 _HIGH_BODY = 0.29
 
@@ -51,9 +50,9 @@ _LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 48.0, 0.4
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 1.0
 
 
-def expected_modes(genus: int, log_determinant: float, digits: int = _OF_DIGITS) -> float:
-    """Return about how many modes the Fourier clock of so many digits has, for the Riemann matrix iT with log det T."""
-    exponent = genus * math.log(_EXPONENT * digits / (_OF_DIGITS * math.pi)) - log_determinant
+def expected_modes(genus: int, log_determinant: float) -> float:
+    """Return about how many modes the Fourier clock has, for the Riemann matrix iT with log det T."""
+    exponent = genus * math.log(_EXPONENT / math.pi) - log_determinant
     return _BODY.get(genus, _HIGH_BODY) * math.exp(exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT)
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.balls import balls
 from veselova.analytic.clock import Clock, ClockRate, clock_rate
-from veselova.analytic.costs import expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.drift import Drift, expected_growth
 from veselova.analytic.enclosed_clock import EnclosedClock, expected_nodes
@@ -178,9 +177,9 @@ class EnclosedSolution:
 
     def _clock(self, approximate: NDArray[np.float64]) -> EnclosedClock | EnclosedFourier:
         """Return the cheaper clock, or the other one where that has too many nodes or modes; only that of panels is bounded."""
-        xp, T = self.arithmetic, self.frame.periods.riemann_matrix
-        kind, times = min(len(T), max(_NODE)), approximate.size
-        modes = expected_modes(len(T), float(xp.log(xp.determinant(T))), xp.digits)
+        xp, genus, times = self.arithmetic, self.moving.size - 1, approximate.size
+        kind = min(genus, max(_NODE))
+        modes = self._coarse.modes * (xp.digits / DOUBLE.digits) ** genus
         by_modes = modes * (_MODE[kind] + times * _MODE_AT_TIME[kind]) + times * _TIME
         by_panels = expected_nodes(self.orbit, approximate) * _NODE[kind]
         clocks: list[Callable[[], EnclosedClock | EnclosedFourier]]

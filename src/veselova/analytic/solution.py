@@ -41,8 +41,7 @@ Array = NDArray[np.float64]
 #: The routes from phases to attitude; sums at every time, by products of matrices or transforms, are never cheaper than windows.
 METHODS = ("theta", "products", "nufft", "angles")
 
-#: Largest genus at which theta quotients cost less than inversion in angles (µs a point for g = 2 … 5: 0.4, 1.1, 4 and 24
-#: against 2.6, 3.6, 10 and 8).
+#: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10; for g = 5 it is 24 and 8.
 _THETA_GENUS = 4
 
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
@@ -185,10 +184,11 @@ class Solution:
 
     def costs(self, times: Array) -> Costs:
         """Return what the clocks cost for given times."""
-        return Costs(self.curve.genus, self._modes, self.cycles(times))
+        return Costs(self.curve.genus, self.modes, self.cycles(times))
 
     @cached_property
-    def _modes(self) -> float:
+    def modes(self) -> float:
+        """Return about how many modes a Fourier clock has."""
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
         return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
