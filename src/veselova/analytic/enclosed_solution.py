@@ -185,7 +185,8 @@ class EnclosedSolution:
         clocks: list[Callable[[], EnclosedClock | EnclosedFourier]]
         clocks = [partial(EnclosedClock, self.orbit, approximate, xp.certified)]
         smooth = not self._coarse.near_separatrix and self.moving.rate_variation < WIDEST_RATE
-        if smooth and modes <= MOST_MODES and not xp.certified:
+        seen = self._coarse.moving.size == self.moving.size  # of a direction that doubles do not see they say nothing
+        if smooth and seen and modes <= MOST_MODES and not xp.certified:
             clocks.insert(int(by_panels < by_modes), partial(EnclosedFourier, self.orbit))
         for clock in clocks[:-1]:
             with suppress(Unsolved):
