@@ -11,7 +11,7 @@ import pytest
 from draws import adversarial_start, random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova, solve
-from veselova.analytic.fourier_clock import FourierClock, grown
+from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock, grown
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
@@ -284,16 +284,37 @@ def test_no_mode_is_looked_at_twice() -> None:
     assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5
 
 
-@pytest.mark.parametrize(("q_2", "q_dot_2"), [("3.735e-9", "3.758e-11"), ("2.029e-11", "2.01e-10"), ("1.352e-10", "3.89e-13")])
-def test_modes_end_where_rounding_has_none(q_2: str, q_dot_2: str) -> None:
-    """Next to a separatrix determinants are rounded to just the size below which modes are left out."""
-    problem = Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
+NEAR_A_SEPARATRIX = [
+    ("3.735e-9", "3.758e-11"),
+    ("2.029e-11", "2.01e-10"),
+    ("1.352e-10", "3.89e-13"),
+    ("9.861674590037209e-11", "5.331159891578705e-13"),
+]
+
+
+def near_a_separatrix(q_2: str, q_dot_2: str) -> Veselova:
+    return Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
+
+
+@pytest.mark.parametrize(("q_2", "q_dot_2"), NEAR_A_SEPARATRIX)
+def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
+    problem = near_a_separatrix(q_2, q_dot_2)
     found = solve(problem, [2000.0, 1e6])
     assert found.provenance.details["clock"] == "fourier"
     assert found.provenance.details["clock_size"] < 4000
     assert np.max(found.error) < 1e-10
     by_panels = solve_analytic(problem, [2000.0], clock="panels")
     assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+
+
+def test_nodes_follow_modes_where_forms_are_steep() -> None:
+    """Next to a separatrix e^{−2πi m·G} turns far faster than the entries of m say, and too few nodes take it for a slow wave."""
+    rate = Solution(near_a_separatrix(*NEAR_A_SEPARATRIX[-1])).rate
+    columns = ColumnsForModes(rate, lambda weights, G, _: (weights, G))
+    for modes in (np.array([[1, 0]]), np.array([[20, 36], [16, 42], [14, 50], [58, 32], [0, 86]])):
+        for (weights, G), (finer, finer_G) in zip(columns(modes), rate.columns(4000), strict=True):
+            found, expected = (w @ np.cos(2 * np.pi * g @ modes.T) for w, g in ((weights, G), (finer, finer_G)))
+            assert np.max(np.abs(found - expected)) < 3e-14 * np.max(np.abs(finer).sum(axis=1))
 
 
 def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:

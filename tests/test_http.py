@@ -186,7 +186,7 @@ def test_another_media_type_gets_415(server: Server, media_type: str) -> None:
 
 def test_a_coded_body_gets_415_and_a_byte_order_mark_is_none(server: Server) -> None:
     is_problem(post(server, "/v1/tori", GOOD, **{"content-encoding": "gzip"}), 415, "unsupported-media-type")
-    assert post(server, "/v1/tori", b"\xef\xbb\xbf" + json.dumps(GOOD).encode()).status_code in (200, 422)
+    assert post(server, "/v1/trajectories", b"\xef\xbb\xbf" + json.dumps(GOOD).encode()).status_code == 200
     empty = is_problem(post(server, "/v1/tori", b" "), 400, "malformed-json")
     assert empty["detail"] == "The body: required one JSON document; given nothing."
 

@@ -202,10 +202,6 @@ class Balls(Arithmetic):
         products = _products(modes, turns, _conjugate)
         return np.asarray(_real(products)), np.asarray(_imaginary(products))
 
-    def cosines(self, modes: Values, turns: Values) -> Values:
-        """Return the first of these waves."""
-        return np.asarray(_real(_products(modes, turns, _conjugate)))
-
     @staticmethod
     def _array(matrix: Any) -> Values:
         entries = np.fromiter(matrix.entries(), dtype=object, count=matrix.nrows() * matrix.ncols())

@@ -172,7 +172,7 @@ class Fixed:
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
-    """Return the h from which T_{h+i} follow, and how many of them, until there are so many polynomials."""
+    """Return the h from which those of h + i follow, and how many, until there are so many polynomials or powers."""
     last = 1
     while last < count - 1:
         rows = min(last, count - 1 - last)

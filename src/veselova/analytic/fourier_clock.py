@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -35,12 +34,11 @@ T = TypeVar("T")
 #: Modes below this part of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
-#: Modes looked at before giving up, and before looking whether a higher threshold has less than half of them.
+#: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
-_ENDLESS = (20_000, 200_000)
 
-#: Entries of modes beyond those asked for, at least: room for the next layers.
-_SPARE_ENTRIES = 16
+#: Radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
+_SPARE_PACE = 16
 
 #: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and their part.
 _FIRST_MODES, _FIRST_PART = 64, 1 / 16
@@ -65,7 +63,7 @@ class FourierClock(Clock):
     name: ClassVar[str] = "fourier"
 
     def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        modes, coefficients, edge, self._smallest = _significant_modes(rate)
+        modes, coefficients, edge = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
         modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
@@ -128,7 +126,7 @@ class FourierClock(Clock):
     def _swayed_for(self, elapsed: float) -> tuple[float, Array]:
         """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
         lengths = np.minimum(self._longest, elapsed)
-        of_modes = 4 * self._smallest * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
+        of_modes = 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
         shifts = self._pull * lengths[: self.size, None]
         return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt((shifts * shifts).sum(axis=0))
 
@@ -201,27 +199,18 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0, F_m, modes next to them, and that part.
-
-    Where rounding reaches it there is no end of modes; a larger part has less than half of them then, and otherwise hardly fewer.
-    """
+def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
+    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0, F_m, and the modes next to them."""
     columns = ColumnsForModes(rate, lambda weights, G, _: (weights.T, 2 * np.pi * G.T))
+    smallest = _SMALLEST_MODE * float(rate.mean)
 
-    def modes_above(part: float, most: int) -> tuple[Integers, Array, Integers, float]:
-        def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
-            matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
-            values = float(rate.scale) * np.linalg.det(matrices)
-            return values, np.abs(values) > part * float(rate.mean)
+    def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
+        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
+        values = float(rate.scale) * np.linalg.det(matrices)
+        return values, np.abs(values) > smallest
 
-        modes, values, edge = grown(rate.inversion.periods.genus, determinants, most)
-        return modes, values.astype(np.float64), edge, part
-
-    for most in _ENDLESS:
-        for part, room in ((_SMALLEST_MODE, most), (2 * _SMALLEST_MODE, most // 2), (8 * _SMALLEST_MODE, most // 2)):
-            with suppress(Unsolved):
-                return modes_above(part, room)
-    return modes_above(_SMALLEST_MODE, _MOST_MODES)
+    modes, values, edge = grown(rate.inversion.periods.genus, determinants)
+    return modes, values.astype(np.float64), edge
 
 
 class ColumnsForModes(Generic[T]):
@@ -232,15 +221,23 @@ class ColumnsForModes(Generic[T]):
 
     def __init__(self, rate: Rate[Any], made: Callable[[Values, Values, int], T]) -> None:
         self._rate, self._made = rate, made
-        self._largest, self._columns = -1, list[T]()
+        self._form(0.0)
+
+    def _form(self, pace: float) -> None:
+        # A wave of k radians a radian takes k nodes more of half a period than the forms. It is analytic in their strip,
+        # where it is e^{πky/2} at most at height y (e^{ky}, but that G bends at the edge), and k nodes leave e^{−2ky} of it.
+        self._most = math.ceil(pace + max(_SPARE_PACE, pace / 2))
+        count = max(self._rate.needed_nodes) + self._most
+        columns = self._rate.columns(count)
+        self._columns = [self._made(*column, self._most) for column in columns]
+        #: Radians of 2πm·G_s by one of ψ for each entry of m, between nodes; entries count as well.
+        self._paces = [np.eye(len(columns)), *(2 * count * np.diff(G.astype(np.float64), axis=0).T for _, G in columns)]
 
     def __call__(self, modes: Integers) -> list[T]:
         """Return the columns for modes (M, g)."""
-        largest = int(np.max(np.abs(modes)))
-        if largest > self._largest:
-            self._largest = largest + max(_SPARE_ENTRIES, largest // 2)
-            columns = self._rate.columns(2 * (max(self._rate.needed_nodes) + self._largest))
-            self._columns = [self._made(*column, self._largest) for column in columns]
+        pace = max(float(np.max(np.abs(modes @ paces))) for paces in self._paces)
+        if pace > self._most:
+            self._form(pace)
         return self._columns
 
 

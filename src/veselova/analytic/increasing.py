@@ -1,4 +1,4 @@
-"""Inversion of increasing functions, many at once: Newton's method kept inside a bracket."""
+"""Inversion of increasing functions, many at once: Newton's method inside a bracket; beyond doubles, with a last interval."""
 
 from __future__ import annotations
 
