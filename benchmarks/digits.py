@@ -5,7 +5,7 @@
 Prints, per dimension and number of digits, the seconds of a whole call (set-up included), those until the frame is there in
 decimals, and those until all series are (decimals are made when they are asked for), the working digits, the clock and its
 evaluations, the largest error reported, and the largest difference of the frame from a run with ten digits more (decimals are
-rounded to three digits beyond those asked for).
+rounded to three digits beyond those asked for). The last bodies are next to a separatrix, with relative gaps of 1e-7 and 1e-17.
 """
 
 from __future__ import annotations
@@ -27,6 +27,10 @@ def problem(n: int) -> vs.Veselova:
     return vs.Veselova(A, q, q_dot, normalize=True)
 
 
+def near_separatrix(q_2: str, q_dot_2: str) -> vs.Veselova:
+    return vs.Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
+
+
 def main(most: int) -> None:
     print(
         "n   times               digits   certified   seconds   frame     all       working   clock      evaluations   "
@@ -38,8 +42,9 @@ def main(most: int) -> None:
     table += [(3, near, d, False) for d in (30, 100, 300, 990) if d <= most]
     table += [(n, many, 50, False) for n in (3, 4)] + [(3, far, 30, False), (2, far, 50, False)]
     table += [(3, orbit, 50, False) for orbit in orbits] + [(4, orbit, 50, False) for orbit in orbits[:2]]
-    for n, times, digits, certified in table:
-        body = problem(n)
+    rows = [(problem(n), times, digits, certified) for n, times, digits, certified in table]
+    rows += [(near_separatrix(*start), far[:1], 20, False) for start in (("1e-3", "1e-4"), ("3.735e-9", "3.758e-11"))]
+    for body, times, digits, certified in rows:
         began = time.perf_counter()
         found = vs.solve(body, times, digits=digits, certified=certified)
         seconds = [time.perf_counter() - began]
@@ -55,7 +60,7 @@ def main(most: int) -> None:
         spent = "   ".join(f"{x:7.2f}" for x in seconds)
         figures = f"{spent}   {details['working_digits']:7d}   {details['clock']:8s}   {details['clock_size']:11d}"
         errors = f"{max(found.decimals.error):8.1e}   {difference:8.1e}"
-        print(f"{n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
+        print(f"{body.n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
 
 
 if __name__ == "__main__":

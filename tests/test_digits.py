@@ -145,6 +145,19 @@ def test_a_separatrix_has_all_digits_of_exact_data() -> None:
         assert deviation(found, finer, "frame") < 1e-20
 
 
+def test_many_digits_reach_far_next_to_a_separatrix() -> None:
+    near = vs.Veselova(["3", "2", "1"], ["0.6", "1e-3", "0.8"], ["1", "1e-4", "-0.7"], normalize=True)
+    found, finer = (vs.solve(near, [50, 1e6], digits=digits) for digits in (16, 22))
+    assert found.provenance.details["clock"] == finer.provenance.details["clock"] == "fourier"
+    assert found.decimals is not None
+    assert finer.decimals is not None
+    assert deviation(found.decimals, finer.decimals, "frame") < 1e-16
+    soon = vs.solve(near, [50], digits=22)
+    assert soon.provenance.details["clock"] == "panels"
+    assert soon.decimals is not None
+    assert np.max(np.abs(soon.decimals.midpoints["frame"][0] - finer.decimals.midpoints["frame"][0])) < 1e-21
+
+
 def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
     with pytest.raises(vs.Unsolved) as caught:
         vs.solve(vs.Veselova([5, 4, 3, 2, 1], [1] * 5, [1, -2, 3, -4, 2], normalize=True), [1e6], digits=30)
