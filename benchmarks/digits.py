@@ -13,22 +13,22 @@ from __future__ import annotations
 import os
 import sys
 import time
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
 import veselova as vs
+from draws import near_unstable_circle
 
 
 def problem(n: int) -> vs.Veselova:
     rng = np.random.default_rng(n)
     A, q, q_dot = ([f"{x:.3f}" for x in values] for values in (rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n)))
     return vs.Veselova(A, q, q_dot, normalize=True)
-
-
-def near_separatrix(q_2: str, q_dot_2: str) -> vs.Veselova:
-    return vs.Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
 
 
 def main(most: int) -> None:
@@ -43,7 +43,7 @@ def main(most: int) -> None:
     table += [(n, many, 50, False) for n in (3, 4)] + [(3, far, 30, False), (2, far, 50, False)]
     table += [(3, orbit, 50, False) for orbit in orbits] + [(4, orbit, 50, False) for orbit in orbits[:2]]
     rows = [(problem(n), times, digits, certified) for n, times, digits, certified in table]
-    rows += [(near_separatrix(*start), far[:1], 20, False) for start in (("1e-3", "1e-4"), ("3.735e-9", "3.758e-11"))]
+    rows += [(near_unstable_circle(*start), far[:1], 20, False) for start in (("1e-3", "1e-4"), ("3.735e-9", "3.758e-11"))]
     for body, times, digits, certified in rows:
         began = time.perf_counter()
         found = vs.solve(body, times, digits=digits, certified=certified)

@@ -12,6 +12,11 @@ from veselova import Veselova
 from veselova.analytic.solution import Solution
 
 
+def near_unstable_circle(q_2: str, q_dot_2: str) -> Veselova:
+    """Return a motion of n = 3 next to the great circle across the middle axis, a separatrix, by q_2 and q̇_2."""
+    return Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
+
+
 def random_problem(rng: np.random.Generator, n: int, ratio: float = 100.0, *, framed: bool = True) -> Veselova:
     """Return a problem with A log-uniform up to the ratio, a uniform start of unit speed and a random frame."""
     A = np.exp(rng.uniform(0, np.log(ratio), n))

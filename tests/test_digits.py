@@ -17,7 +17,7 @@ import pytest
 
 import veselova as vs
 from conftest import Server, slow
-from draws import random_problem
+from draws import near_unstable_circle, random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
 from veselova.analytic.abel_jacobi import AbelJacobi
@@ -146,7 +146,7 @@ def test_a_separatrix_has_all_digits_of_exact_data() -> None:
 
 
 def test_many_digits_reach_far_next_to_a_separatrix() -> None:
-    near = vs.Veselova(["3", "2", "1"], ["0.6", "1e-3", "0.8"], ["1", "1e-4", "-0.7"], normalize=True)
+    near = near_unstable_circle("1e-3", "1e-4")
     found, finer = (vs.solve(near, [50, 1e6], digits=digits) for digits in (16, 22))
     assert found.provenance.details["clock"] == finer.provenance.details["clock"] == "fourier"
     assert found.decimals is not None

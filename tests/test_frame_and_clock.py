@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from draws import adversarial_start, random_problem
+from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova, solve
 from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock, grown
@@ -292,13 +292,9 @@ NEAR_A_SEPARATRIX = [
 ]
 
 
-def near_a_separatrix(q_2: str, q_dot_2: str) -> Veselova:
-    return Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
-
-
 @pytest.mark.parametrize(("q_2", "q_dot_2"), NEAR_A_SEPARATRIX)
 def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
-    problem = near_a_separatrix(q_2, q_dot_2)
+    problem = near_unstable_circle(q_2, q_dot_2)
     found = solve(problem, [2000.0, 1e6])
     assert found.provenance.details["clock"] == "fourier"
     assert found.provenance.details["clock_size"] < 4000
@@ -309,7 +305,7 @@ def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
 
 def test_nodes_follow_modes_where_forms_are_steep() -> None:
     """Next to a separatrix e^{−2πi m·G} turns far faster than the entries of m say, and too few nodes take it for a slow wave."""
-    rate = Solution(near_a_separatrix(*NEAR_A_SEPARATRIX[-1])).rate
+    rate = Solution(near_unstable_circle(*NEAR_A_SEPARATRIX[-1])).rate
     columns = ColumnsForModes(rate, lambda weights, G, _: (weights, G))
     for modes in (np.array([[1, 0]]), np.array([[20, 36], [16, 42], [14, 50], [58, 32], [0, 86]])):
         for (weights, G), (finer, finer_G) in zip(columns(modes), rate.columns(4000), strict=True):

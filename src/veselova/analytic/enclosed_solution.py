@@ -57,11 +57,14 @@ _LEAST_WIDTH = 1e-290
 #: Digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
 
-#: Milliseconds with some 60 digits (fewer and more change all of them alike, about), by genus, the last for all above: a node of
-#: panels; a mode of the Fourier clock at once, where the longest cut takes some _NODES in doubles, and with every time, which
-#: costs more as the genus grows; and a time of that clock.
+#: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the last for all above: a node of
+#: panels; a mode of the Fourier clock at once, where no cut takes more than _NODES in doubles, and with every time, which costs
+#: more as the genus grows; and a time of that clock.
 _NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
-_MODE_AT_TIME, _TIME, _NODES = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1, 30
+_MODE_AT_TIME, _TIME, _NODES = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1, 36
+
+#: The digits of those, and milliseconds beyond which modes are not begun: minutes.
+_DIGITS, _LONGEST = 60, 120_000
 
 
 class EnclosedSolution:
@@ -180,13 +183,15 @@ class EnclosedSolution:
         xp, genus, times = self.arithmetic, self.moving.size - 1, approximate.size
         kind = min(genus, max(_NODE))
         modes = self._coarse.modes * (xp.digits / DOUBLE.digits) ** genus
-        long = max(1.0, max(self._coarse.rate.needed_nodes) / _NODES)  # next to a separatrix cuts take many nodes
-        by_modes = modes * (long * _MODE[kind] + times * _MODE_AT_TIME[kind]) + times * _TIME
+        # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.
+        forming = modes * _MODE[kind] * max(1.0, max(self._coarse.rate.needed_nodes) / _NODES) ** 2
+        by_modes = forming + times * (modes * _MODE_AT_TIME[kind] + _TIME)
         by_panels = expected_nodes(self.orbit, approximate) * _NODE[kind]
         clocks: list[Callable[[], EnclosedClock | EnclosedFourier]]
         clocks = [partial(EnclosedClock, self.orbit, approximate, xp.certified)]
-        seen = self._coarse.moving.size == self.moving.size  # of a direction that doubles do not see they say nothing
-        if seen and self.moving.rate_variation < WIDEST_RATE and long * modes <= MOST_MODES and not xp.certified:
+        # Of a direction that doubles do not see they say nothing.
+        known = self._coarse.moving.size == self.moving.size and self.moving.rate_variation < WIDEST_RATE
+        if known and modes <= MOST_MODES and forming * (xp.digits / _DIGITS) ** 1.5 <= _LONGEST and not xp.certified:
             clocks.insert(int(by_panels < by_modes), partial(EnclosedFourier, self.orbit))
         for clock in clocks[:-1]:
             with suppress(Unsolved):
