@@ -68,6 +68,14 @@ def test_the_method_of_the_closed_form_can_be_chosen(method: str) -> None:
     assert document["provenance"]["method"] == method
 
 
+def test_tables_have_no_negative_zeros_and_count_times() -> None:
+    told = run("solve", "-", stdin=request(times=[-1e-12])).stdout.decode()
+    assert "one time, -1e-12" in told
+    assert "-0.000000" not in told
+    assert " 0.000000 " in told
+    assert "2 times from 0 to 1" in run("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
+
+
 @pytest.mark.parametrize("command", ["solve", "compare", "torus"])
 def test_files_and_standard_input_are_the_same(command: str, tmp_path: Path) -> None:
     (tmp_path / "body.json").write_bytes(request())

@@ -48,7 +48,8 @@ def _heading(console: Console, text: str) -> None:
 
 def _describe(trajectory: Trajectory) -> str:
     problem, provenance = trajectory.problem, trajectory.provenance
-    span = f"{trajectory.times.size} times from {trajectory.times[0]:g} to {trajectory.times[-1]:g}"
+    count, first, last = trajectory.times.size, trajectory.times[0], trajectory.times[-1]
+    span = f"{count} times from {first:g} to {last:g}" if count > 1 else f"one time, {first:g}"
     return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
 
 
@@ -65,8 +66,8 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     for i in np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int)):
         components = [
-            *(f"{trajectory.series(name)[i]:.6f}" for name in clock),
-            *(f"{x: .9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
+            *(f"{trajectory.series(name)[i]:z.6f}" for name in clock),
+            *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
         ]
         table.add_row(f"{trajectory.times[i]:g}", *components, *more, f"{error[i]:.1e}")
     console.print(table)
