@@ -303,6 +303,17 @@ def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
     assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
 
 
+def test_modes_end_where_one_column_stays_and_the_other_is_rounding() -> None:
+    """Next to a separatrix of wide A's determinants never fall below the rounding of angles, which grow with the modes."""
+    A, q = [1.0, 390.21320456884774, 1.6904640691868722], [1.4480029447187863, 1.8618863684064193, -9.235342032590449e-09]
+    problem = Veselova(A, q, [-1.0297444583406776, 0.2868748135792803, 8.900348438623115e-11], normalize=True)
+    found = solve(problem, [2000.0, 1e8])
+    assert found.provenance.details["clock_size"] < 8000
+    assert np.max(found.error) < 1e-9
+    by_panels = solve_analytic(problem, [2000.0], clock="panels")
+    assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+
+
 def test_nodes_follow_modes_where_forms_are_steep() -> None:
     """Next to a separatrix e^{−2πi m·G} turns far faster than the entries of m say, and too few nodes take it for a slow wave."""
     rate = Solution(near_unstable_circle(*NEAR_A_SEPARATRIX[-1])).rate

@@ -34,6 +34,9 @@ T = TypeVar("T")
 #: Modes below this part of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
+#: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is hardly ever exceeded.
+_COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
+
 #: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
@@ -63,7 +66,7 @@ class FourierClock(Clock):
     name: ClassVar[str] = "fourier"
 
     def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        modes, coefficients, edge = _significant_modes(rate)
+        modes, coefficients, edge, self._off = _significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
         modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
@@ -126,7 +129,7 @@ class FourierClock(Clock):
     def _swayed_for(self, elapsed: float) -> tuple[float, Array]:
         """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
         lengths = np.minimum(self._longest, elapsed)
-        of_modes = 4 * _SMALLEST_MODE * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
+        of_modes = self._off * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
         shifts = self._pull * lengths[: self.size, None]
         return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt((shifts * shifts).sum(axis=0))
 
@@ -199,18 +202,30 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0, F_m, and the modes next to them."""
-    columns = ColumnsForModes(rate, lambda weights, G, _: (weights.T, 2 * np.pi * G.T))
-    smallest = _SMALLEST_MODE * float(rate.mean)
+def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
+    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0 and above its rounding, F_m, the modes
+    next to them, and by what part of F_0 each is off.
+
+    Next to a separatrix there are directions in which one column stays, and a determinant is rounding without end.
+    """
+
+    def made(weights: Array, G: Array, _: int) -> tuple[Array, Array, float, Array]:
+        angles = 2 * np.pi * G.T
+        return weights.T, angles, _COLUMN_ROUNDING * float(np.linalg.norm(weights)), np.abs(angles).max(axis=1)
+
+    columns, mean = ColumnsForModes(rate, made), float(rate.mean)
 
     def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
-        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles in columns(modes)], axis=2)
-        values = float(rate.scale) * np.linalg.det(matrices)
-        return values, np.abs(values) > smallest
+        sizes, found = np.abs(modes), columns(modes)
+        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles, _, _ in found], axis=2)
+        lengths, others = np.linalg.norm(matrices, axis=1), ~np.eye(len(found), dtype=bool)
+        # An angle is off by a rounding for each entry of m, and so is its cosine.
+        off = sum(one * (1 + sizes @ wide) * lengths[:, others[s]].prod(axis=1) for s, (_, _, one, wide) in enumerate(found))
+        values = float(rate.scale) / mean * np.stack([np.linalg.det(matrices), off])
+        return values.T, np.abs(values[0]) > np.maximum(_SMALLEST_MODE, values[1])
 
     modes, values, edge = grown(rate.inversion.periods.genus, determinants)
-    return modes, values.astype(np.float64), edge
+    return modes, mean * values[:, 0], edge, max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2)
 
 
 class ColumnsForModes(Generic[T]):
