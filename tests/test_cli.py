@@ -74,6 +74,13 @@ def test_tables_have_no_negative_zeros_and_count_times() -> None:
     assert "-0.000000" not in told
     assert " 0.000000 " in told
     assert "2 times from 0 to 1" in run("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
+    assert "one time, 0;" in run("solve", "-", stdin=request(times=[-0.0])).stdout.decode()
+
+
+def test_tables_tell_times_apart() -> None:
+    told = run("solve", "-", stdin=request(times=[1e6, 1e6 + 0.001, 1e6 + 0.002])).stdout.decode()
+    assert "3 times from 1000000 to 1000000.002" in told
+    assert "\n1000000.001 " in told
 
 
 @pytest.mark.parametrize("command", ["solve", "compare", "torus"])

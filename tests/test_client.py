@@ -251,6 +251,14 @@ def test_bad_times_are_refused_before_anything_is_sent() -> None:
         Client("http://nowhere.invalid").trajectory(PROBLEM, [0, float("nan")])
 
 
+def test_a_job_without_an_id_is_refused_and_an_id_is_one_part_of_the_address() -> None:
+    client = Client("http://nowhere.invalid")
+    for nothing in ("", "..", None):
+        with pytest.raises(InvalidInput, match="job_id: required the id of a job"):
+            client.job(nothing)  # type: ignore[arg-type]
+    assert client.job("../systems")._link() == "/v1/jobs/..%2Fsystems"
+
+
 def test_requests_are_what_the_openapi_document_says() -> None:
     bodies: list[Any] = []
 

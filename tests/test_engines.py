@@ -14,7 +14,7 @@ from conftest import slow
 from draws import adversarial_start, random_problem
 from problems import TABLE, Case, tagged
 from truth import true_motion
-from veselova import Unsolved, Veselova, compare, solve, torus
+from veselova import EulerPoisson, Unsolved, Veselova, compare, solve, torus
 from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 
@@ -264,6 +264,10 @@ def test_too_far_is_a_named_outcome() -> None:
     with pytest.raises(Unsolved) as raised:
         solve(problem, [1e9])
     assert raised.value.outcome == "too-far"
+    for system, closed_form in ((problem, True), (EulerPoisson([1, 2, 3], [0.6, 0, 0.8], [1, 1, 1]), False)):
+        with pytest.raises(Unsolved, match="integration goes to") as raised:
+            solve(system, [1e10], "numeric")
+        assert ("the closed form farther" in str(raised.value)) is closed_form
 
 
 def test_one_time_is_the_same_as_many() -> None:

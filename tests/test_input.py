@@ -14,9 +14,16 @@ from hypothesis import strategies as st
 
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
-from veselova.mechanics.errors import VeselovaError
+from veselova.mechanics.errors import VeselovaError, shown
 from veselova.mechanics.exact import exact_number, plain
 from veselova.mechanics.times import uniform_times, validated_times
+
+
+def test_numerals_given_as_texts_are_shown_as_texts() -> None:
+    assert [shown(value) for value in ("50", " 1e3", "inf", "", "None", "abc", 50, Fraction(1, 10), Decimal("0.5"))] == [
+        "'50'", "' 1e3'", "'inf'", "''", "'None'", "abc", "50", "1/10", "0.5",
+    ]  # fmt: skip
+
 
 GOOD: dict[str, Any] = {"A": [3, 2, 1], "q": [0.6, 0.0, 0.8], "q_dot": [0.8, 1.0, -0.6]}
 

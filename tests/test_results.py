@@ -14,7 +14,7 @@ import pytest
 
 from problems import tagged
 from test_engines import METHODS
-from veselova import BackendMissing, Comparison, Trajectory, Unsolved, compare, solve, torus
+from veselova import BackendMissing, Comparison, InvalidInput, StiefelFlow, Trajectory, Unsolved, compare, solve, torus
 from veselova.mechanics.archive import read_archive
 from veselova.mechanics.trajectory import Provenance
 
@@ -181,6 +181,23 @@ def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_pat
     assert again.provenance == trajectory.provenance
     for name, values in trajectory.columns().items():
         assert np.array_equal(again.columns()[name], values)
+
+
+@pytest.mark.parametrize("write", ["to_csv", "to_npz", "to_parquet", "to_arrow"])
+def test_files_of_what_is_no_output_are_refused_before_anything_is_written(trajectory: Trajectory, write: str) -> None:
+    for outputs, field in ((["tau1", "tau"], "outputs[1]"), ([], "outputs"), ("tau1", "outputs")):
+        stream = io.BytesIO()
+        with pytest.raises(InvalidInput, match="tau1") as raised:
+            getattr(trajectory, write)(stream, outputs=outputs)
+        assert raised.value.field == field
+        assert not stream.getvalue()
+    with pytest.raises(InvalidInput, match="required one of q, "):
+        trajectory.series("tau")
+
+
+def test_one_vector_in_space_has_a_picture() -> None:
+    sphere = StiefelFlow({"special": [3, 2, 1]}, [[1], [0], [0]], [[0], [1], [0]])
+    assert solve(sphere, [0.0, 1.0, 2.0]).plot().axes[0].name == "3d"
 
 
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])

@@ -14,6 +14,8 @@ VeselovaError
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 __all__ = [
@@ -32,20 +34,29 @@ __all__ = [
 #: Longest rendering of a given value in a message: enough to recognise it, short enough for one line.
 _SHOWN_CHARACTERS = 60
 
-#: Texts that are shown in quotes: without them they would read as nothing, or as another value.
+#: Texts besides numerals that are shown in quotes.
 _QUOTED = ("", "None", "True", "False")
 
 
 def shown(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
     try:
-        bare = isinstance(value, str) and value.strip() not in _QUOTED
+        bare = isinstance(value, (Fraction, Decimal)) or (isinstance(value, str) and not _reads_otherwise(value))
         text = str(value) if bare else repr(value)
     except ValueError:  # an int of more digits than Python is willing to print
         text = f"an integer of about {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else "a value"
     # Lone surrogates, which JSON strings can carry, cannot be written as UTF-8.
     text = " ".join(text.encode("utf-8", "backslashreplace").decode("utf-8").split())
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+def _reads_otherwise(text: str) -> bool:
+    """Return whether a text without quotes reads as nothing, or as another value."""
+    try:
+        float(text)
+    except ValueError:
+        return text.strip() in _QUOTED
+    return True
 
 
 class VeselovaError(Exception):

@@ -121,6 +121,12 @@ class LRSystem(Problem):
         system._set(n=group.size, rank=None, given=given)
         return system
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the problem as given, JSON-ready; raises InvalidInput for one that stands on a group of matrices."""
+        if self.rank is None:
+            raise InvalidInput(("problem",), "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent", repr(self))
+        return super().as_dict()
+
     def _become(self, distribution: Distribution, inertia: Inertia, g: Any, omega: Any, potential: Any, homogeneous: Any) -> None:
         require_truth_value(homogeneous, "homogeneous")
         group = distribution.group

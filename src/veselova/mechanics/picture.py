@@ -78,7 +78,7 @@ def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
     """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six times, standing on the curve."""
     latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
     name = trajectory.problem.portrait
-    curve = trajectory.series(name)
+    curve = trajectory.series(name).reshape(-1, 3)
     radii = trajectory.problem.semiaxes
     a, b, c = np.full(3, np.max(np.linalg.norm(curve, axis=1))) if radii is None else radii
     x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)

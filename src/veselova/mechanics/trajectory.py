@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.archive import write_archive
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
-from veselova.mechanics.errors import BackendMissing, Unsolved
+from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.table import Table, Target, flat_columns, opened, row_blocks
 from veselova.version import __version__
@@ -93,8 +93,9 @@ class Trajectory:
         return cls(problem, times, error, arrays, provenance, dense, decimals)
 
     def series(self, name: str) -> Array:
-        """Return one of the problem's outputs by name."""
+        """Return one of the problem's outputs by name; raises InvalidInput for another."""
         if name not in self.arrays:
+            self._chosen([name])
             values = self.problem.derive(name, self.arrays)
             values.setflags(write=False)
             self.arrays[name] = values  # type: ignore[index]
@@ -135,7 +136,18 @@ class Trajectory:
     def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
         """Return the flat table of all or the chosen series: time, error, every component, named like ``frame_1_2`` (from 1), and
         every integral of motion, like ``integral_energy``."""
-        return self._table(self.error, {name: self.series(name) for name in outputs or self.problem.outputs})
+        return self._table(self.error, {name: self.series(name) for name in self._chosen(outputs)})
+
+    def _chosen(self, outputs: Iterable[str] | None) -> tuple[str, ...]:
+        """Return the names of the chosen series, all where none are named; raises InvalidInput for others, and for none."""
+        names = self.problem.outputs
+        chosen = tuple(names if outputs is None else outputs)
+        if isinstance(outputs, str) or not chosen:
+            raise InvalidInput(("outputs",), f"a list of one or more of {', '.join(names)}", shown(outputs))
+        for i, name in enumerate(chosen):
+            if name not in names:
+                raise InvalidInput(("outputs", i), f"one of {', '.join(names)}", shown(name))
+        return chosen
 
     def _table(self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         table: dict[str, NDArray[Any]] = {self.problem.time: self.times, "error": error}
@@ -147,15 +159,16 @@ class Trajectory:
 
     def to_npz(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
+        chosen = self._chosen(outputs)
         with opened(target) as stream:
-            write_archive(self, stream, outputs or self.problem.outputs)
+            write_archive(self, stream, chosen)
 
     def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table as comma-separated values, one row per time: doubles to the last bit, or all of the decimals."""
-        table: Mapping[str, NDArray[Any]] = self.columns(outputs)
+        chosen = self._chosen(outputs)
+        table: Mapping[str, NDArray[Any]] = self.columns(chosen)
         if self.decimals is not None:
-            midpoints = self.decimals.midpoints
-            table = self._table(self.decimals.error, {name: midpoints[name] for name in outputs or self.problem.outputs})
+            table = self._table(self.decimals.error, {name: self.decimals.midpoints[name] for name in chosen})
         Table(table, self.provenance.as_dict()).to_csv(target)
 
     def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:

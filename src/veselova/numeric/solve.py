@@ -69,7 +69,12 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     if not problem.moves:
         provenance = Provenance.since(began, "numeric", method, details)
         return Trajectory.at_rest(problem, grid, provenance, again)
-    series, error, steps = _integrate_twice(problem.flow(chosen), problem.bounded, grid, backend)
+    flow = problem.flow(chosen)
+    farthest = float(np.max(np.abs(grid / flow.time_unit)))
+    if not farthest <= _FARTHEST:
+        further = ", the closed form farther" if "analytic" in problem.engines else ""
+        raise Unsolved("too-far", f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}{further}")
+    series, error, steps = _integrate_twice(flow, problem.bounded, grid, backend)
     series, details = problem.completed(series), {**details, "steps": steps}
     provenance = Provenance.since(began, "numeric", method, details)
     return Trajectory(problem, grid, problem.bound(series, error), series, provenance, dense=again)
@@ -77,11 +82,6 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
 
 def _integrate_twice(flow: Flow, bounded: tuple[str, ...], grid: Array, backend: type[Integrator]) -> tuple[Series, Array, int]:
     asked = grid / flow.time_unit
-    farthest = float(np.max(np.abs(asked)))
-    if not farthest <= _FARTHEST:
-        raise Unsolved(
-            "too-far", f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}, the closed form farther"
-        )
     # Two runs may agree by chance at the few times asked for, not at all of these too.
     scaled = np.union1d(asked, np.linspace(min(asked[0], 0.0), max(asked[-1], 0.0), _CHECKPOINTS))
     neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)

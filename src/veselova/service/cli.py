@@ -191,7 +191,7 @@ def torus(file: _File, json: _Json = False) -> None:
     if json:
         print_json(answer.as_dict())
     else:
-        print_torus(terminal(), answer)
+        print_torus(terminal(), answer, request.problem.problem_class.time)
 
 
 @app.command()

@@ -48,9 +48,19 @@ def _heading(console: Console, text: str) -> None:
 
 def _describe(trajectory: Trajectory) -> str:
     problem, provenance = trajectory.problem, trajectory.provenance
-    count, first, last = trajectory.times.size, trajectory.times[0], trajectory.times[-1]
-    span = f"{count} times from {first:g} to {last:g}" if count > 1 else f"one time, {first:g}"
+    count, shown = trajectory.times.size, _told_apart(trajectory.times[[0, -1]])
+    span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
     return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
+
+
+def _told_apart(times: Any) -> list[str]:
+    """Return times in the fewest digits, six or more, in which no two are the same."""
+    different = np.unique(times).size
+    for digits in range(6, 18):
+        texts = [f"{time:z.{digits}g}" for time in times.tolist()]
+        if len(set(texts)) == different:
+            break
+    return texts
 
 
 def print_trajectory(console: Console, trajectory: Trajectory) -> None:
@@ -64,12 +74,13 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     clock = ["tau1"] if "tau1" in problem.outputs else []
     table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
-    for i in np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int)):
+    shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
+    for i, time in zip(shown, _told_apart(trajectory.times[shown]), strict=True):
         components = [
             *(f"{trajectory.series(name)[i]:z.6f}" for name in clock),
             *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
         ]
-        table.add_row(f"{trajectory.times[i]:g}", *components, *more, f"{error[i]:.1e}")
+        table.add_row(time, *components, *more, f"{error[i]:.1e}")
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
 
@@ -107,8 +118,8 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     console.print(f"\n{verdict}", highlight=False)
 
 
-def print_torus(console: Console, torus: Torus) -> None:
-    """Print the torus: constants, branch points, frequencies, periods."""
+def print_torus(console: Console, torus: Torus, time: str) -> None:
+    """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own ``time``, periods."""
     console.print(f"n = {torus.n}, genus {torus.phases.size}, energy {torus.energy:.12g}, regime {torus.regime}", highlight=False)
     _heading(console, "Branch points")
     table = _table("b", "origin", "value")
@@ -116,7 +127,7 @@ def print_torus(console: Console, torus: Torus) -> None:
         table.add_row(f"b_{j}", origin, f"{value:.15g}")
     console.print(table)
     _heading(console, "Phases (cycles)")
-    table = _table("s", "z⁰", "per unit τ₁", "per unit t", "action J_s")
+    table = _table("s", "z⁰", "per unit τ₁", f"per unit {time}", "action J_s")
     columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
     for s, row in enumerate(zip(*columns, strict=True), start=1):
         table.add_row(str(s), *(f"{x:.15g}" for x in row))

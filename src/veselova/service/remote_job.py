@@ -8,8 +8,9 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
+from urllib.parse import quote
 
-from veselova.mechanics.errors import ServiceError
+from veselova.mechanics.errors import InvalidInput, ServiceError, shown
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.table import Target
 from veselova.service.calls import Call
@@ -50,6 +51,8 @@ class RemoteJob:
     """
 
     def __init__(self, client: Client | AsyncClient, job_id: str) -> None:
+        if not isinstance(job_id, str) or not job_id.strip("."):  # no part of an address is empty, or dots alone
+            raise InvalidInput(("job_id",), "the id of a job", shown(job_id))
         self._client = client
         self.id = job_id
 
@@ -84,7 +87,7 @@ class RemoteJob:
         return self._client.run(self._dataset(progress))
 
     def _link(self, more: str = "") -> str:
-        return f"/v1/jobs/{self.id}{more}"
+        return f"/v1/jobs/{quote(self.id, safe='')}{more}"
 
     def _get(self) -> Call[dict[str, Any]]:
         return Call(self._link(), None, 0.0, dict, method="GET")
