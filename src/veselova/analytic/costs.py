@@ -86,9 +86,12 @@ class Costs:
         seconds = {name: self.seconds(name, inversions) for name in ("fourier", "panels")}
         return {name: round(value, 5) for name, value in seconds.items() if math.isfinite(value)}
 
-    def cheaper_clock(self, inversions: int) -> Literal["fourier", "panels"]:
-        """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits."""
+    def cheaper_clock(self, inversions: int, keeping: bool = True) -> Literal["fourier", "panels"]:
+        """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the one that keeps the digits.
+
+        Not ``keeping``: the cheaper there too, as next to a separatrix, where modes are many and take more nodes each.
+        """
         fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))
-        keeps = self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < math.inf
+        keeps = keeping and self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < math.inf
         beyond = panels == math.inf and self.genus <= _LAST_RESORT_GENUS
         return "fourier" if keeps or beyond or fourier < panels else "panels"

@@ -153,9 +153,9 @@ class Solution:
             raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {GUARD_DIGITS} digits")
         if self.problem.time == "tau1":
             return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
-        if name is None and (self.near_separatrix or self.moving.rate_variation > WIDEST_RATE):
+        if name is None and self.moving.rate_variation > WIDEST_RATE:
             name = "fourier" if cycles > PANEL_CYCLES else "panels"
-        if (name or self.costs(times).cheaper_clock(self.inversions(times, method))) == "fourier":
+        if (name or self.costs(times).cheaper_clock(self.inversions(times, method), not self.near_separatrix)) == "fourier":
             return self._fourier(guarded)
         if cycles > PANEL_CYCLES:
             reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
