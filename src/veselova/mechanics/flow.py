@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
-__all__ = ["FLOATS", "Flow", "Operations", "PointFlow"]
+__all__ = ["FLOATS", "Flow", "Operations", "PointFlow", "restoring_step"]
 
 Array = NDArray[np.float64]
+
+#: What an energy is rounded to, ε of its size, over what a state has gathered since it was last put back, about 10 ε. With more,
+#: energies would drift; with less, their rounding would show in the states.
+_ENERGY_ROUNDING = 0.1
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,17 @@ class Flow(ABC):
     def vector_field(self, _time: float, state: Array) -> Array:
         """Return the derivative of a state in floating point."""
         return np.asarray(self.field(state, self.parameters, FLOATS), dtype=np.float64)
+
+
+def restoring_step(excess: Array, steepness: Array, size: Array) -> Array:
+    """Return s = excess/(|∇E|² + (size/10)²): the step −s∇E takes the excess of energy from a state as far as E tells, shape (…).
+
+    steepness = |∇E|²; size: the sum of the absolute values of E's parts, so that E is rounded to ε·size. At a distance δ from an
+    equilibrium ∇E is of order δ, and excess/|∇E|² would move the state by ε·size/δ, which may be all of δ. Least squares over
+    both roundings move it by at most 5 ε for each ε·size of excess: where E tells nothing, the state is left as integrated.
+    """
+    weight = np.asarray(steepness + (_ENERGY_ROUNDING * size) ** 2)
+    return np.divide(excess, weight, out=np.zeros_like(weight), where=weight >= np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,10 @@ class GroupPotential:
             total = total + _product(c, factors)
         return total
 
+    def magnitude(self, g: Array) -> Array:
+        """Return Σ |c_k| Π |g_ij|^p at matrices (…, N, N), of which ε is the rounding of a value."""
+        return np.asarray(replace(self, coefficients=np.abs(self.coefficients)).value(np.abs(g)), dtype=np.float64)
+
     def slope(self, g: Any, coefficients: Any) -> Any:
         """Return the matrix ∂v/∂g_ij, (…, N, N), for given coefficients, in numbers or symbols."""
         slope = 0.0 * g

@@ -92,6 +92,10 @@ class LaurentPolynomial:
         """Return the values at points (..., 3), shape (...)."""
         return np.asarray(monomials(self.exponents, gamma) @ self.coefficients, dtype=np.float64)
 
+    def magnitude(self, gamma: Array) -> Array:
+        """Return Σ|c_k| Π_j |γ_j|^{p_kj} at points (..., 3), shape (...), of which ε is the rounding of a value."""
+        return np.asarray(monomials(self.exponents, np.abs(gamma)) @ np.abs(self.coefficients), dtype=np.float64)
+
     def gradient(self, gamma: Array) -> Array:
         """Return the gradients in R³ at points (..., 3), shape (..., 3)."""
         exponents, coefficients, components = self.slopes

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.distribution import Distribution, combined
-from veselova.mechanics.flow import FLOATS, Operations
+from veselova.mechanics.flow import FLOATS, Operations, restoring_step
 from veselova.mechanics.group_potential import GroupPotential
 from veselova.mechanics.inertia import Inertia, applied
 from veselova.mechanics.singular_flow import SingularFlow
@@ -23,10 +23,6 @@ Array = NDArray[np.float64]
 
 #: dim G up to which a field is written in symbols (SO(12)): the expressions grow like its square.
 _LARGEST_SYMBOLIC = 66
-
-#: The energy is restored along its gradient where that is at least this part of |ω||𝓘ω|: near a steady rotation it vanishes.
-_STEEP = 1e-2
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -161,7 +157,7 @@ class MomentumFlow(LRFlow):
     def _restored(self, states: Array) -> tuple[Array, Array]:
         """Return g and m_k of states (…, m) with g on the group and the energy of the start, by one step along its gradient.
 
-        The gradient at constant momentum is [ω,𝓘ω] + y(v).
+        The gradient at constant momentum is [ω,𝓘ω] + y(v); it vanishes at steady rotations too.
         """
         group, (g, along) = self.distribution.group, self._split(states)
         g, m = group.project(g), along if self.potential else self.along
@@ -170,9 +166,9 @@ class MomentumFlow(LRFlow):
         omega = self.omega(g, m)
         momentum, excess = self.inertia(omega), self.jacobi(g, omega) - self._energy
         turn = group.bracket(omega, momentum) - self._torque(g, self.parameters, FLOATS)
-        steepness = np.sum(turn * turn, axis=-1)
-        enough = np.maximum(_STEEP**2 * np.sum(omega * omega, axis=-1) * np.sum(momentum * momentum, axis=-1), _TINY)
-        step = np.divide(-excess, steepness, out=np.zeros_like(excess), where=steepness >= enough)[..., None]
+        # Twice the kinetic part: constants of the constraints add one like it.
+        size = np.sum(np.abs(omega * momentum), axis=-1) + (self.potential.magnitude(g) if self.potential else 0.0)
+        step = restoring_step(-excess, np.sum(turn * turn, axis=-1), size)[..., None]
         return group.project(g + g @ group.element(step * turn)), along
 
     def project(self, state: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import Operations, PointFlow
+from veselova.mechanics.flow import Operations, PointFlow, restoring_step
 from veselova.mechanics.integrals import neumann_velocity
 from veselova.mechanics.natural_frame import orthonormalized
 
@@ -25,18 +25,17 @@ class NeumannFlow(PointFlow):
         return _neumann_field(state, parameters, ops)
 
     def project(self, state: Array) -> Array:
-        """Return the state with E orthonormal, q' tangent, and the energy of the start by one step along its gradient."""
+        """Return the state with E orthonormal, q' tangent, and, by one step along its gradient, the energy of the start."""
         (v, E), (v_start, E_start) = _on_sphere(state, self.n), _on_sphere(self.initial, self.n)
         q = E[:, 0]
-        excess = self._energy(q, v) - self._energy(E_start[:, 0], v_start)
+        energy = self._energy(q, v)
         force = self.parameters * q - (q @ (self.parameters * q)) * q
-        size = float(force @ force + v @ v)
-        step = excess / size if size > 0 else 0.0
+        step = restoring_step(energy - self._energy(E_start[:, 0], v_start), force @ force + v @ v, energy)
         E = np.column_stack([q - step * force, E[:, 1:]])
         return np.concatenate(_flat(_on_sphere(np.concatenate([v - step * v, E.ravel()]), self.n)))
 
-    def _energy(self, q: Array, v: Array) -> float:
-        return float(v @ v + q @ (self.parameters * q)) / 2
+    def _energy(self, q: Array, v: Array) -> Array:
+        return np.asarray(v @ v + q @ (self.parameters * q)) / 2
 
     def neighbour(self, distance: float) -> NeumannFlow:
         """Return the flow of a start moved by about ``distance``."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import Operations
+from veselova.mechanics.flow import Operations, restoring_step
 from veselova.mechanics.laurent import LaurentPolynomial, monomials
 from veselova.mechanics.natural_frame import orthonormalized
 from veselova.mechanics.singular_flow import SingularFlow
@@ -95,11 +95,11 @@ class RigidBodyFlow(SingularFlow):
         """
         first, E = state[..., :3], orthonormalized(_frames(state))
         if not self.spatial:
-            values, slopes = self._constants(first, E)
-            sizes = np.linalg.norm(slopes, axis=-1)
-            sizes = np.where(sizes > 0, sizes, 1.0)  # at rest
-            lack = (self._wanted - values) / sizes
-            step = (np.linalg.pinv(slopes / sizes[..., None], rcond=_PARALLEL) @ lack[..., None])[..., 0]
+            values, slopes, sizes = self._constants(first, E)
+            lengths = np.linalg.norm(slopes, axis=-1)
+            lack = restoring_step(self._wanted - values, lengths**2, sizes) * lengths
+            rows = _by(1 / np.where(lengths > 0, lengths, 1.0), slopes)  # no slopes at rest
+            step = (np.linalg.pinv(rows, rcond=_PARALLEL) @ lack[..., None])[..., 0]
             E = orthonormalized(E + np.cross(E, step[..., None, 3:], axisa=-2, axisc=-2))
             first = self._on_constraint(first + step[..., :3], E[..., 0])
         return np.concatenate([first, E.reshape(*E.shape[:-2], 9)], axis=-1)
@@ -108,13 +108,17 @@ class RigidBodyFlow(SingularFlow):
     def _wanted(self) -> Array:
         return self._constants(self.Omega, self.frame)[0]
 
-    def _constants(self, Omega: Array, E: Array) -> tuple[Array, Array]:
-        """Return the constants (..., 2) and their derivatives by Ω and by a rotation x → x + x×δ of the frame, (..., 2, 6)."""
+    def _constants(self, Omega: Array, E: Array) -> tuple[Array, Array, Array]:
+        """Return the constants (..., 2), their derivatives by Ω and by a rotation x → x + x×δ, (..., 2, 6), and sizes (..., 2).
+
+        Sizes are those of ``restoring_step``, 0 for the linear constant: its slope never vanishes, and it is restored in full.
+        """
         gamma, M, across = E[..., 0], Omega @ self.inertia, E[..., 0] @ self.inertia
-        energy, by_Omega, by_gamma = _dot(Omega, M) / 2 + self.potential.value(gamma), M, self.potential.gradient(gamma)
+        kinetic, by_Omega, by_gamma = _dot(Omega, M) / 2, M, self.potential.gradient(gamma)
+        energy, size = kinetic + self.potential.value(gamma), kinetic + self.potential.magnitude(gamma)
         if self.constrained:
             linear, along = _dot(Omega, gamma), _dot(M, gamma)
-            energy = energy - linear * along
+            energy, size = energy - linear * along, size + np.abs(linear * along)
             by_Omega = by_Omega - _by(along, gamma) - _by(linear, across)
             by_gamma = by_gamma - _by(along, Omega) - _by(linear, M)
             rows = [(gamma, Omega), (by_Omega, by_gamma)]
@@ -122,7 +126,8 @@ class RigidBodyFlow(SingularFlow):
             linear = _dot(M, gamma)
             rows = [(across, M), (by_Omega, by_gamma)]
         slopes = [np.concatenate([row, np.cross(force, gamma)], axis=-1) for row, force in rows]
-        return np.stack([linear, energy], axis=-1), np.stack(slopes, axis=-2)
+        sizes = np.stack([np.zeros_like(size), size], axis=-1)
+        return np.stack([linear, energy], axis=-1), np.stack(slopes, axis=-2), sizes
 
     def _on_constraint(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω with the start's value of the linear constant, to the last bit."""

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import FLOATS, Operations, PointFlow
+from veselova.mechanics.flow import FLOATS, Operations, PointFlow, restoring_step
 from veselova.mechanics.integrals import sliding_velocity, unit_scale
 from veselova.mechanics.singular_flow import SingularFlow
 
@@ -73,12 +73,14 @@ class SeparableFlow(PointFlow, SingularFlow):
         """Return the dimension and where there are walls."""
         return type(self), self.n, tuple(np.flatnonzero(self._walls))
 
-    def _energy(self, q: Array, p: Array) -> float:
+    def _energies(self, q: Array, p: Array) -> Array:
+        """Return the parts of the energy."""
         n, parameters = self.n, self.parameters
         A, inverse, betas = parameters[:n], parameters[n : 2 * n], self._walls
         moment, live = inverse @ (q * q), betas != 0
-        potential = parameters[3 * n] * ((inverse * inverse) @ (q * q) - moment * moment) + parameters[3 * n + 1] * moment
-        return float(p @ (inverse * p) / (2 * (q @ (A * q))) + potential + np.sum(betas[live] / q[live] ** 2))
+        quartic = parameters[3 * n] * np.array([(inverse * inverse) @ (q * q), -moment * moment])
+        kinetic = p @ (inverse * p) / (2 * (q @ (A * q)))
+        return np.array([kinetic, *quartic, parameters[3 * n + 1] * moment, *(betas[live] / q[live] ** 2)])
 
     def _on_sphere(self, state: Array) -> tuple[Array, Array]:
         q, p = state[: self.n], state[self.n :]
@@ -94,8 +96,9 @@ class SeparableFlow(PointFlow, SingularFlow):
         by_q = -(p @ (inverse * p) / qAq**2) * (A * q) - self._force(q, self.parameters, FLOATS)
         by_p = inverse * p / qAq
         by_q, by_p = by_q - (by_q @ q) * q, by_p - (by_p @ q) * q
-        size = float(by_q @ by_q + by_p @ by_p)
-        step = (self._energy(q, p) - self._energy(*self._on_sphere(self.initial))) / size if size > 0 else 0.0
+        parts = self._energies(q, p)
+        excess = parts.sum() - self._energies(*self._on_sphere(self.initial)).sum()
+        step = restoring_step(excess, by_q @ by_q + by_p @ by_p, np.abs(parts).sum())
         return np.concatenate(self._on_sphere(np.concatenate([q - step * by_q, p - step * by_p])))
 
     def neighbour(self, distance: float) -> SeparableFlow:
