@@ -13,6 +13,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ import sqlalchemy as sa
 import xarray
 import zarr
 from distributed import Nanny
+from distributed.nanny import WorkerProcess
 from pyarrow import parquet
 
 import veselova as vs
@@ -522,25 +525,134 @@ def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(t
     asyncio.run(run())
 
 
-def test_a_worker_that_does_not_come_back_holds_up_no_cancellation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cancellation_waits_for_no_word_of_a_worker_and_for_no_successor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker has nothing but two chunks of the cancelled job, and hears nothing; it is ended once."""
     settings = local_settings(tmp_path, 1)
     job = Jobs(settings).submit(request(**ENDLESS))
-    instantiate = Nanny.instantiate
+    instantiate, successors = Nanny.instantiate, []
 
     async def run() -> None:
         may_come_back = asyncio.Event()
 
         async def late(nanny: Any) -> Any:
+            successors.append(nanny)
             await may_come_back.wait()
             return await instantiate(nanny)
 
         async with open_cluster(settings) as client:
             monkeypatch.setattr(Nanny, "instantiate", late)
-            monkeypatch.setattr(dispatch, "_PATIENCE_S", 1)
+            monkeypatch.setattr(dispatch, "_PATIENCE_S", PATIENCE)
+            waiting = [asyncio.create_task(answers(client, job, start, start + 5, lambda: False)) for start in (0, 5)]
+            while sorted((await client.run(stages_of_chunks)).popitem()[1]) != ["executing", "ready"]:
+                await asyncio.sleep(0.01)
+            deaf = asyncio.create_task(client.run(time.sleep, PATIENCE, on_error="ignore"))
+            await asyncio.sleep(0.1)
+            for task in waiting:
+                task.cancel()
             async with asyncio.timeout(60):
-                await cancelled_once(client, job, "executing")
+                await asyncio.gather(*waiting, deaf, return_exceptions=True)
             may_come_back.set()
-            await client.wait_for_workers(1)
+            assert await client.submit(os.getpid)
+            assert len(successors) == 1
+
+    asyncio.run(run())
+
+
+def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Waits of more than ten seconds, Dask's before it looks among them, pass thirty times faster here."""
+    instantiate = Nanny.instantiate
+
+    async def run() -> None:
+        loop, may_come_back = asyncio.get_running_loop(), asyncio.Event()
+        later = loop.call_later
+
+        async def late(nanny: Any) -> Any:
+            await may_come_back.wait()
+            return await instantiate(nanny)
+
+        async with open_cluster(local_settings(tmp_path, 1)) as client:
+            (nanny,) = client.cluster.workers.values()
+            monkeypatch.setattr(Nanny, "instantiate", late)
+            monkeypatch.setattr(loop, "call_later", lambda s, *rest, **more: later(s / 30 if s > 10 else s, *rest, **more))
+            os.kill(nanny.pid, signal.SIGKILL)
+            while await client.nthreads():
+                await asyncio.sleep(0.01)
+            await asyncio.sleep(1)
+            assert list(client.cluster.workers.values()) == [nanny]
+            assert nanny.status.name == "running"
+            may_come_back.set()
+            assert await client.submit(os.getpid)
+
+    asyncio.run(run())
+
+
+def test_a_worker_whose_successor_cannot_be_started_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its nanny gives up then, for good."""
+    start, failures = WorkerProcess.start, [OSError("no process can be started")]
+
+    async def failing_once(process: Any) -> Any:
+        if failures:
+            raise failures.pop()
+        return await start(process)
+
+    async def run() -> None:
+        async with open_cluster(local_settings(tmp_path, 1)) as client:
+            (nanny,) = client.cluster.workers.values()
+            monkeypatch.setattr(WorkerProcess, "start", failing_once)
+            os.kill(nanny.pid, signal.SIGKILL)
+            while nanny.status.name != "closed":
+                await asyncio.sleep(0.01)
+            async with asyncio.timeout(60):
+                assert await client.submit(os.getpid)
+
+    asyncio.run(run())
+
+
+def test_a_job_says_when_there_is_no_worker_and_sends_two_chunks_for_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 1)
+    monkeypatch.setattr(running, "_LOOK_S", 0.02, raising=False)
+    workers: dict[str, int] = {}
+    sent: list[int] = []
+
+    class Client:
+        async def nthreads(self) -> dict[str, int]:
+            return workers
+
+        def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+            return {"workers": {}}  # as an asynchronous client of Dask has it
+
+    @asynccontextmanager
+    async def opened(*_: Any) -> AsyncIterator[Client]:
+        yield Client()
+
+    async def unanswered(client: Any, job: Job, start: int, *rest: Any) -> Any:
+        sent.append(start)
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(running, "open_cluster", opened)
+    monkeypatch.setattr(running, "answers", unanswered)
+    settings = local_settings(tmp_path, 3)
+    jobs = Jobs(settings)
+    job = jobs.submit(request())
+
+    async def run() -> None:
+        sweeps = running.Sweeps(settings, jobs)
+        sweeps.begin(job.id)
+        async with asyncio.timeout(60):
+            while not ((progress := sweeps.progress(job.id)) and progress.waits_for):
+                await asyncio.sleep(0.01)
+            assert progress.waits_for == "a worker of the cluster"
+            workers.update(one=1, two=1, three=1)
+            while len(sent) < 6:
+                await asyncio.sleep(0.01)
+            assert progress.waits_for == ""
+            await asyncio.sleep(0.1)
+            assert len(sent) == 6
+        await sweeps.close()
 
     asyncio.run(run())
 

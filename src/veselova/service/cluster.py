@@ -19,6 +19,11 @@ __all__ = ["open_cluster", "require_scheduler"]
 #: Seconds for a connection to the scheduler, and for the first worker to come up.
 _CONNECT_S = 30
 
+#: Seconds between two looks at whether workers of this machine are lost.
+_LOOK_S = 5
+
+_LOG = logging.getLogger("veselova.sweeps")
+
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -78,7 +83,26 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
             async with await starting:
                 raise
         async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
-            yield client
+            keeping = asyncio.create_task(_keep_workers(cluster))
+            try:
+                yield client
+            finally:
+                keeping.cancel()
+
+
+async def _keep_workers(cluster: Any) -> None:
+    """Replace, for ever, workers that have ended for good, which Dask leaves to whoever made the cluster.
+
+    A nanny ends when a successor of its worker could not be started.
+    """
+    from distributed.core import Status
+
+    while True:
+        await asyncio.sleep(_LOOK_S)
+        for name in [name for name, nanny in cluster.workers.items() if nanny.status in (Status.closed, Status.failed)]:
+            _LOG.warning("worker %s of the cluster has ended for good; another is started", name)
+            del cluster.workers[name]
+        cluster.scale(len(cluster.worker_spec))  # starts those that are not there
 
 
 def _preload(niceness: int) -> list[str]:
@@ -97,6 +121,9 @@ def _configuration(preload: list[str]) -> dict[str, Any]:
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.scheduler.allowed-failures": 2,
+        # So long after a worker was lost Dask looks whether there is a successor. Where that one is just being replaced itself,
+        # or takes long to start, its nanny would be closed, for good.
+        "distributed.deploy.lost-worker-timeout": "1000 days",
         "distributed.comm.timeouts.connect": _CONNECT_S,
         # As often as Dask looks after itself by default, a cluster without work takes a seventh of a processor.
         "distributed.admin.tick.interval": "1s",

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelled
 from contextlib import suppress
 from typing import Any
+from uuid import uuid4
 
 from veselova.service.database import reason_of
 from veselova.service.jobs import Job
@@ -18,8 +19,11 @@ __all__ = ["ChunkFailed", "answers"]
 #: Seconds between two looks at a worker that has not heard yet that work was cancelled.
 _LOOK_AGAIN_S = 0.02
 
-#: Seconds after which workers that held cancelled work are restarted, whatever they say of it, and then are waited for no more.
+#: Seconds after which workers that held cancelled work are ended, whatever they say of it, and then are waited for no more.
 _PATIENCE_S = 10
+
+#: Seconds that Dask gives a worker to end by itself, which one at work never does, before it kills it.
+_GRACE_S = 0.5
 
 
 class ChunkFailed(Exception):
@@ -34,7 +38,8 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
     """
     from distributed.scheduler import KilledWorker
 
-    future = client.submit(computed_chunk, job.request, start, stop, __version__, pure=False)
+    key = f"computed_chunk-{job.id}-{uuid4().hex}"
+    future = client.submit(computed_chunk, job.request, start, stop, __version__, key=key)
     try:
         return [await future]
     except KilledWorker:
@@ -49,27 +54,40 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
         raise ChunkFailed(f"a worker could not compute the problems {start} to {stop - 1}: {reason_of(error)}") from error
     except asyncio.CancelledError:
         if not closing():
-            await _stop(client, future)
+            await _stop(client, job, future)
         raise
     finally:
         future.release()
 
 
-async def _stop(client: Any, future: Any) -> None:
-    """End work that nobody waits for: a worker that is in the midst of it is restarted, for a thread cannot be stopped."""
+async def _stop(client: Any, job: Job, future: Any) -> None:
+    """End work that nobody waits for: a worker that is in the midst of it is ended, for a thread cannot be stopped."""
     if client.scheduler_info(n_workers=1)["address"].startswith("inproc"):
         return
-    held = [worker for worker, keys in (await client.processing()).items() if str(future.key) in map(str, keys)]
+    processing = {worker: [str(key) for key in keys] for worker, keys in (await client.processing()).items()}
+    held = [worker for worker, keys in processing.items() if future.key in keys]
     await future.cancel(force=True)
+    # All work of a job ends at once. A worker that has no other need not be asked, which takes seconds where it is busy.
+    shared = [worker for worker in held if any(job.id not in key for key in processing[worker])]
+    running = [worker for worker in held if worker not in shared]
     try:
         async with asyncio.timeout(_PATIENCE_S):
-            running = await _at_work(client, future.key, held)
+            running += await _at_work(client, future.key, shared)
     except TimeoutError:  # some worker does not say how far it is
         running = held
-    if running:
-        # Their successors are nobody's to wait for: Dask would do so for four times the time that a connection may take.
-        with suppress(KeyError):  # one of them has ended by itself
-            await client.restart_workers(running, timeout=_PATIENCE_S, raise_for_error=False)
+    await asyncio.gather(*(_end(client, worker) for worker in running))
+
+
+async def _end(client: Any, worker: str) -> None:
+    """End the process of a worker; its nanny starts another, for which nobody waits. What has ended already is left alone."""
+    with suppress(KeyError, TimeoutError):  # it has ended by itself; its nanny does not answer
+        async with asyncio.timeout(_PATIENCE_S):
+            await client.run(_kill, _GRACE_S, workers=[worker], nanny=True, on_error="ignore")
+
+
+async def _kill(grace_s: float, dask_worker: Any) -> None:
+    """End the worker of a nanny, as Dask calls it on the nanny."""
+    await dask_worker.kill(timeout=grace_s)
 
 
 async def _at_work(client: Any, key: Any, workers: list[str]) -> list[str]:

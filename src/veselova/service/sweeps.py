@@ -34,6 +34,12 @@ _AHEAD = 2
 _FIRST_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 30.0
 
+#: Seconds between two looks at whether the cluster has workers.
+_LOOK_S = 2.0
+
+#: What a job waits for while the cluster has none.
+_NO_WORKER = "a worker of the cluster"
+
 #: Seconds between two looks at what other servers have left.
 _WATCH_S = 30.0
 
@@ -206,10 +212,14 @@ class Sweeps:
         try:
             while waiting or at_work:
                 # A worker that died is missing for a moment; the others, or its successor, go on.
-                room = _AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) - len(at_work)
+                workers = len(await client.nthreads())
+                progress = self._progress[job.id]
+                if not workers or progress.waits_for == _NO_WORKER:
+                    progress.waits_for = "" if workers else _NO_WORKER
+                room = _AHEAD * max(1, workers) - len(at_work)
                 for _ in range(min(room, len(waiting))):
                     at_work.add(asyncio.create_task(self._chunk(client, job, result, waiting.pop())))
-                finished, at_work = await asyncio.wait(at_work, return_when=asyncio.FIRST_COMPLETED)
+                finished, at_work = await asyncio.wait(at_work, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED)
                 if failures := [error for task in finished if (error := task.exception())]:
                     raise failures[0]
         finally:
