@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx2
 import pytest
 from fastapi import FastAPI
@@ -28,7 +29,9 @@ from test_http import is_problem, post
 from veselova.service.app import create_app
 from veselova.service.logs import line_formatter
 from veselova.service.metrics import Metrics
+from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
+from veselova.service.workers import Workers
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
 
@@ -260,6 +263,43 @@ def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None
         database.execute("DROP TABLE api_keys")
     detail = is_problem(in_process(broken, "/readyz"), 503, "not-ready")["detail"]
     assert detail == "No worker is warm yet. The keys cannot be read: the database does not answer (OperationalError)."
+
+
+@pytest.mark.parametrize("busy", [True, False])
+def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(busy: bool, tmp_path: Path) -> None:
+    """It is killed when its budget is over, or dies while it has nothing to do."""
+    workers = Workers(Settings(data_dir=tmp_path, workers=1, max_waiting=0), Metrics())
+
+    async def ready() -> int:
+        while not workers.ready():
+            await anyio.sleep(0.02)
+        return await workers.run(os.getpid, budget_s=PATIENCE)
+
+    async def run() -> None:
+        assert not workers.ready()
+        async with workers.running():
+            first = await ready()
+            if busy:
+                with pytest.raises(Refused, match="budget"):
+                    await workers.run(time.sleep, PATIENCE, budget_s=0.2)
+            else:
+                os.kill(first, signal.SIGKILL)
+                while workers.ready():
+                    await anyio.sleep(0.02)
+            assert not workers.ready()
+            await anyio.sleep(0.2)
+            assert await workers.run(os.getpid, budget_s=PATIENCE) != first  # it waits, although no request may
+            second = await ready()
+            assert second != first
+            with anyio.move_on_after(0.2):  # its client has gone
+                await workers.run(time.sleep, PATIENCE, budget_s=PATIENCE)
+            assert not workers.ready()
+            while not workers.ready():
+                await anyio.sleep(0.02)
+            (third,) = workers._processes
+            assert await workers.run(os.getpid, budget_s=PATIENCE) == third
+
+    asyncio.run(run())
 
 
 def test_traces_follow_the_standard_switch() -> None:

@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 from http import HTTPStatus
 
-import anyio
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -62,10 +61,8 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        async with answers.serving(), jobs.running(), anyio.create_task_group() as tasks:
-            tasks.start_soon(_warm, workers)
+        async with answers.serving(), jobs.running(), workers.running():
             yield
-            tasks.cancel_scope.cancel()
         if keys is not None:
             keys.close()
 
@@ -109,15 +106,6 @@ def _surround(app: FastAPI, settings: Settings, policy: Policy, metrics: Metrics
 def _is_request_id(text: str) -> bool:
     """Return whether an id that a client made up may stand in logs and answers."""
     return re.fullmatch(r"[A-Za-z0-9._-]{1,64}", text) is not None
-
-
-async def _warm(workers: Workers) -> None:
-    try:
-        await workers.start()
-    except Refused as error:
-        _LOG.error("the first worker could not be started; /readyz stays at 503: %s", error)
-    except Exception:
-        _LOG.exception("the first worker could not be started; /readyz stays at 503")
 
 
 async def _answer_problem(metrics: Metrics, routes: list[BaseRoute], request: Request, error: Exception) -> Response:

@@ -18,7 +18,7 @@ async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -
 
     A server without the libraries of jobs is complete without their store.
     """
-    missing = [] if workers.warm else ["No worker is warm yet."]
+    missing = [] if workers.ready() else ["No worker is warm yet."]
     try:
         await jobs.require()
     except Refused as error:
