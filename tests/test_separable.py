@@ -83,13 +83,18 @@ def test_a_body_at_rest_in_a_critical_point_stays() -> None:
     assert np.array_equal(found.gamma, np.tile([1.0, 0, 0], (TIMES.size, 1)))
 
 
+ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
+
+
 @pytest.mark.parametrize(
     ("fields", "outcome"),
     [
         ({"Omega": [0.3, 0.1, 0.2]}, "not-separable"),
         ({"potential": {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0]}]}}, "not-separable"),
         ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),
-        ({"gamma": [0.6, 0, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}}, "separatrix"),
+        ({"gamma": [0.6, 1e-30, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}}, "separatrix"),
+        # from q_2 = 0 towards a plane that attracts
+        ({"inertia": [1.2, 0.8, 0.4], "gamma": [0.6, 0, -0.8], "Omega": [0.4, 0.1, 0.3], "potential": ATTRACTING}, "collision"),
     ],
 )
 def test_what_has_no_closed_form_is_a_named_outcome(fields: dict[str, Any], outcome: str) -> None:
@@ -223,6 +228,70 @@ def test_bad_points_are_refused_by_field(change: dict[str, Any], path: str) -> N
     with pytest.raises(InvalidInput) as caught:
         SeparableVeselova(**{"A": [1, 2, 3], "q": [0.6, 0.8, 0], "q_dot": [0, 0, 1], "potential": {"quartic": 1}, **change})
     assert caught.value.field == path
+
+
+def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
+    closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
+    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+
+
+@pytest.mark.parametrize("distance", ["1e-18", "1e-25", "1e-34", "1e-60", "1e-110", "1e-300"])
+@pytest.mark.parametrize(("sign", "velocity"), [("", 1), ("", -1), ("-", 1), ("-", -1)])
+def test_a_start_next_to_a_plane_goes_where_its_velocity_says(sign: str, velocity: int, distance: str) -> None:
+    """λ_s is I_i there to all its digits, so that the sign of q_i says nothing."""
+    q = ["0.6", sign + distance, "0.8"]
+    for A in ([3, 2, 1], [2, 3, 1], [2, 1, 3]):  # the plane at every place
+        served(SeparableVeselova(A, q, ["0.8", velocity, "-0.6"], {"quadratic": "0.3"}, normalize=True), [0.0, 5.0])
+
+
+IN_PLANES: list[Any] = [
+    ([3, 2, 1], [0, 0.6, 0.8], [0, 0.8, -0.6], None),
+    ([3, 2, 1], [0, 0.6, 0.8], [0, 0.8, -0.6], {"quadratic": 0.3}),
+    ([3, 2, 1], [0.6, 0.8, 0], [0.8, -0.6, 0], {"quadratic": 0.3, "quartic": -0.3}),
+    ([3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6], None),  # across which motions are unstable
+    ([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0], {"quadratic": 0.3, "centrifugal": [0.1, 0, 0.2]}),
+    ([7, 3, 2, 1, 5], [0.6, 0, 0.8, 0, 0], [0.8, 0, -0.6, 0, 0], {"quadratic": 0.3, "quartic": 0.2}),
+    ([7, 3, 2, 1], [0.6, 0, 0, 0.8], [0, 0, 0.5, 0], {"quadratic": "1/3"}),
+    ([3, 2, 1], [1e-70, 0.6, 0.8], [-1e-60, 0.8, -0.6], None),  # as good as in the plane
+    ([3, 2, 1], [0.6, 0.8, 1e-72], [0.8, -0.6, 0], {"quadratic": 0.3}),
+]
+
+
+@pytest.mark.parametrize("data", IN_PLANES)
+def test_motions_in_coordinate_planes_are_served(data: Any) -> None:
+    served(SeparableVeselova(*data, normalize=True), [-3.0, 0.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        ([1, 2, 3], [0.6, 0.8, 0], [0, 0, 1], {"clebsch": 0.5}),
+        ([1, 2, 3], [0, 0.6, 0.8], [1, 0, 0], None),
+        ([1, 2, 3], [0.8, 0, -0.6], [0, 0.7, 0], {"family": [0.3, 0.2, 0.1, 0, 0]}),
+        # equal moments: differences of I's and turning points that no double of theirs has
+        ([2, "2/5", "2/5"], [0.48, -0.6, 0.64], [0.6, 1.12, 0.6], {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]}),
+        ([0.5, 0.5, 0.4], [1, 0, 0], [0, 0.02, 0.9], {"family": [0.3, 0, 0.1, 0, 0]}),
+        ([1, 1, 2], [1e-6, 0.6, 0.8], [0, 0.8, -0.6], {"clebsch": 0.5}),
+    ],
+)
+def test_bodies_in_coordinate_planes_and_with_equal_moments_are_served(data: Any) -> None:
+    agreement(VeselovaSO3(*data, normalize=True), [-3.0, 0.0, 5.0])
+
+
+def test_a_start_that_leaves_a_plane_too_slowly_is_a_separatrix() -> None:
+    for problem in (
+        SeparableVeselova([3, 2, 1], [0.6, 1e-72, 0.8], [0.8, 0, -0.6], normalize=True),
+        SeparableVeselova([3, 2, 1], [0.6, 0, 0.8], [0.8, "1e-150", -0.6], {"quadratic": 0.3}, normalize=True),
+    ):
+        with pytest.raises(Unsolved, match="separatrix"):
+            solve(problem, [1.0])
+
+
+def test_motions_below_the_range_of_a_float_are_a_named_outcome() -> None:
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        solve(SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0]), [1.0])
+    with pytest.raises(Unsolved, match="at-rest"):
+        solve(SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3}), [1.0])
 
 
 def test_attracting_planes_end_a_motion_by_name() -> None:

@@ -105,6 +105,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), doubled for what lies between the samples."""
         orbit, motion = self._orbit, self._orbit.motion
         here = motion.turning(orbit.inversion.invert(orbit.sample))
-        moves = [motion.turning(orbit.inversion.invert(orbit.sample + _STEP * e)) - here for e in np.eye(2)]
+        steps = _STEP * np.eye(motion.periods.genus)
+        moves = [motion.turning(orbit.inversion.invert(orbit.sample + step)) - here for step in steps]
         largest = np.array([np.max(np.abs(move)) for move in moves]) / _STEP
         return np.asarray(2 * largest / np.min(np.abs(orbit.in_tau.rates)))

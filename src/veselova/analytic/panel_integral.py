@@ -98,7 +98,7 @@ class _Panels:
         z = z.reshape(-1, z.shape[2])
         values = [self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
         coefficients = np.concatenate(values).reshape(lefts.size, -1) @ self._to_coefficients
-        sizes = np.maximum(np.abs(coefficients[:, 0]), self.floor)
+        sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))  # zero is resolved
         return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
 
     def longer(self, low: float, high: float) -> _Panels:

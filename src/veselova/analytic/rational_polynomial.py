@@ -15,7 +15,7 @@ Polynomial = list[Fraction]
 #: Numbers nearer than this, relative to those around, count as one: roots have more digits.
 NEAR = Fraction(1, 10**40)
 
-#: Digits of the roots.
+#: Digits of the roots, and more where they are asked for.
 _DIGITS = 77
 
 
@@ -71,15 +71,15 @@ def value(polynomial: Polynomial, x: Fraction) -> Fraction:
     return result
 
 
-def roots(polynomial: Polynomial) -> list[tuple[Fraction, Fraction]]:
-    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair, to 77 digits.
+def roots(polynomial: Polynomial, further: int = 0) -> list[tuple[Fraction, Fraction]]:
+    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair, to 77 digits and ``further`` ones.
 
     Each is isolated by Arb: two real roots however near each other are two, and no pair of complex ones.
     Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer than NEAR.
     """
     from veselova.analytic.balls import balls  # loads python-flint
 
-    with balls(_DIGITS, False) as arithmetic:
+    with balls(_DIGITS + further, False) as arithmetic:
         found = arithmetic.polynomial_roots(polynomial)
     if any(count > 1 for _, _, count in found):
         raise Unsolved("clustered-roots", "R has a double root: the motion is on a separatrix, or at rest in one coordinate")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.clock import Rate
 from veselova.analytic.frame import Attitude
-from veselova.analytic.separated_curve import SeparableStart, SeparatedCut, separated_cuts
+from veselova.analytic.separated_curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.analytic.separated_periods import SeparatedPeriods
 
 __all__ = ["SeparableMotion", "SeparatedRate"]
@@ -23,11 +23,14 @@ Array = NDArray[np.float64]
 class SeparableMotion:
     """The motion of one start on its torus; elliptic angles φ_s as in SeparatedCut, of any sign, increasing in time.
 
-    Raises Unsolved as ``separated_cuts`` does, and where an angle series does not end.
+    Axes along which nothing moves are left out of all but ``attitude``: ``start`` is the start among the others. Raises Unsolved
+    as ``moving_axes`` does, and where an angle series does not end.
     """
 
     def __init__(self, start: SeparableStart) -> None:
-        self.cuts = separated_cuts(start)
+        self._dimension = len(start.q)
+        self.start, self.cuts, self._axes = moving_axes(start)
+        start = self.start
         self.periods = SeparatedPeriods(self.cuts)
         self.inversion = AbelJacobi(self.periods)
         self._inverse = np.array([float(x) for x in start.inverse])
@@ -41,11 +44,14 @@ class SeparableMotion:
         self._signs = [self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))]
 
     def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
-        """Return the constant sign of q_i against its root, which passes zero upwards at a lower end, downwards at an upper."""
+        """Return the constant sign of q_i against its root, which passes zero upwards at a lower end, downwards at an upper.
+
+        Where λ_s is at that end to all its digits q_i counts as zero, and what it does next is what its velocity says.
+        """
         if axis not in self._own:
             return 1 if position > 0 else -1
         s, lower = self._own[axis]
-        if position == 0:
+        if (self.cuts[s].below if lower else self.cuts[s].above) == 0:
             return (1 if velocity > 0 else -1) * (1 if lower else -1)
         return (1 if position > 0 else -1) * (1 if self.angles[s] >= 0 or not lower else -1)
 
@@ -55,7 +61,7 @@ class SeparableMotion:
         result = np.ones((phi.shape[0], g, g))
         for s in range(g):
             for j in range(s + 1, g):
-                stretch = self.cuts[j].lower - self.cuts[s].lower - self.cuts[s].width
+                stretch = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
                 distance = self.cuts[s].point(phi[:, s])[1] + stretch + self.cuts[j].point(phi[:, j])[0]
                 result[:, s, j] = result[:, j, s] = distance
         return result
@@ -70,17 +76,15 @@ class SeparableMotion:
         result = np.empty((*phi.shape, self._inverse.size))
         for s, cut in enumerate(self.cuts):
             below, above = cut.point(phi[:, s])
-            for i, x in enumerate(self._inverse):
-                result[:, s, i] = below + (cut.lower - x) if i <= s else -(above + (x - cut.lower - cut.width))
-                if self._own.get(i, (-1, True))[0] == s:
-                    result[:, s, i] = below if i <= s else -above
+            for i, x in enumerate(self.start.inverse):
+                result[:, s, i] = below + float(cut.ends[0] - x) if i <= s else -(above + float(x - cut.ends[1]))
         return result
 
     def attitude(self, phi: Array) -> Attitude:
         """Return q and, as its normals, the unit tangents m_1 … m_g of the coordinate lines, with (q', m_s), at angles (N, g).
 
         (m_s)_i = q_i y_s/(λ_s−I_i), y_s = √(|Φ(λ_s)|/Π_{j≠s}|λ_s−λ_j|); the root of a cut's own end carries a sign, so that all
-        are analytic in φ and change sign with φ_s → φ_s + 2π as they do in time.
+        are analytic in φ and change sign with φ_s → φ_s + 2π as they do in time. The last are axes along which nothing moves.
         """
         offsets, between = self._offsets(phi), self.between(phi)
         own = np.ones_like(offsets)  # the signed root of |λ_s−I_i| where I_i is an end of cut s
@@ -99,7 +103,15 @@ class SeparableMotion:
             other = self.cuts[s].axes[1 if lower else 0]
             mate = own[:, s, other] if other is not None else 1.0
             tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
-        return Attitude(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi))
+        return self._among_all_axes(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi))
+
+    def _among_all_axes(self, q: Array, lines: Array, components: Array, points: Array) -> Attitude:
+        n, g, count = self._dimension, len(self.cuts), q.shape[0]
+        still = [i for i in range(n) if i not in self._axes]
+        position, normals, along = np.zeros((count, n)), np.zeros((count, n, n - 1)), np.zeros((count, n - 1))
+        position[:, self._axes], normals[:, self._axes, :g], along[:, :g] = q, lines, components
+        normals[:, still, range(g, n - 1)] = 1.0
+        return Attitude(position, normals, along, points)
 
     def _components(self, phi: Array, y_rest: Array) -> Array:
         """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of the ends that are I's."""
@@ -113,8 +125,10 @@ class SeparableMotion:
     def turning(self, phi: Array) -> Array:
         """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
-        From A⁻¹m_s = λ_sm_s + σ_sq, σ_s = (A⁻¹m_s, q), it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1).
+        From A⁻¹m_s = λ_sm_s + σ_sq, σ_s = (A⁻¹m_s, q), it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); zero where m_2 is an axis.
         """
+        if len(self.cuts) == 1:
+            return np.zeros(phi.shape[0])
         at = self.attitude(phi)
         sigma = np.sum((self._inverse * at.q)[:, :, None] * at.normals, axis=1)
         mixed = np.sum(sigma * at.components[:, ::-1], axis=1)
@@ -123,13 +137,10 @@ class SeparableMotion:
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
     """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)²."""
-    if cut.width == 0:
-        return 0.0
-    point, slope = start.spheroconic[s], Fraction(0)
-    for x, v, inverse in zip(start.q, start.q_dot, start.inverse, strict=True):
-        if point == inverse:
-            return float(cut.points.angle(cut.below, cut.above, True))
-        slope += x * v / (point - inverse)
+    if cut.below == 0 or cut.above == 0:  # from an end there is one way, and λ_s may be I_i
+        return float(cut.points.angle(cut.below, cut.above, True))
+    point = start.spheroconic[s]
+    slope = sum((x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)), Fraction())
     return float(cut.points.angle(cut.below, cut.above, slope >= 0))
 
 

@@ -38,7 +38,7 @@ class SeparableOrbit:
 
     def __init__(self, start: SeparableStart) -> None:
         self.motion = SeparableMotion(start)
-        self._degree = start.degree
+        self._degree = self.motion.start.degree
         self.rate = SeparatedRate(self.motion.inversion)
         self.inversion = self.motion.inversion
         origin = self.inversion.map(self.motion.angles[None, :])[0]

@@ -2,6 +2,7 @@
 
 In time τ, dτ = √(det A/(q,Aq)) dt, the spheroconic coordinates obey λ_k' = 2w_k/Π_{s≠k}(λ_k−λ_s), w² = R(λ) = 2λΦ(λ)[v(λ) − C(λ)]
 (docs/separable.md). The data are rationals, so R is exact, and its roots have as many digits as their differences ask for.
+A motion in the plane q_i = 0 is one of n−1 axes: ``SeparableStart.without``.
 """
 
 from __future__ import annotations
@@ -33,15 +34,18 @@ from veselova.analytic.rational_polynomial import (
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["SeparableStart", "SeparatedCut", "separated_cuts"]
+__all__ = ["SeparableStart", "SeparatedCut", "moving_axes", "separated_cuts"]
 
 Array = NDArray[np.float64]
 
-#: Digits of λ_s at the start, and of the roots: a start on a coordinate axis is one where a difference of them is zero.
+#: Digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
 
 #: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a separatrix.
 _SEPARATRIX = 1e-12
+
+#: What R's leading coefficient, its reciprocal, and the squares of its roots multiplied may be: a float, and so their products.
+_LARGEST = 10**150
 
 
 @dataclass(frozen=True)
@@ -108,9 +112,27 @@ class SeparableStart:
         return len(self.factor) + self.centrifugal.count(Fraction())
 
     @cached_property
+    def apart(self) -> int:
+        """Return the digits that the nearest I's have in common: distances in their gap need as many more."""
+        gap = min(y - x for x, y in itertools.pairwise(self.inverse))
+        return len(str(int(self.inverse[-1] / gap)))
+
+    def without(self, axis: int) -> SeparableStart:
+        """Return the start among the other axes, for a motion in the plane q_i = 0: T, and so V, in units of I_i.
+
+        There one λ_s is I_i, and the divided difference v[λ_1 … λ_{n−1}] = V is that of (v(λ)−v(I_i))/(λ−I_i) at the others.
+        """
+        own = self.inverse[axis]
+        inverse, q, q_dot, walls = (
+            tuple(_without(values, axis)) for values in (self.inverse, self.q, self.q_dot, self.centrifugal)
+        )
+        polynomial = tuple(c / own for c in quotient(list(self.polynomial), own))
+        return SeparableStart(inverse, q, q_dot, polynomial, tuple(beta / own for beta in walls), self.size)
+
+    @cached_property
     def spheroconic(self) -> list[Fraction]:
-        """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits."""
-        digits = _DIGITS
+        """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits of the gaps that they are in."""
+        digits = _DIGITS + self.apart
         while True:
             try:
                 with Decimals(digits) as arithmetic:
@@ -124,11 +146,13 @@ class SeparableStart:
 class SeparatedCut:
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real roots of R next to them.
 
-    lower a · width b−a · left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the nearest first
+    ends a, b, exact: lower a · width b−a
+    left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the nearest first
     pairs (…, 2) a−Re r, Im r of complex ones · leading |leading coefficient of R| · below, above: λ_s−a and b−λ_s at the start
     axes: the numbers of the I's that are a and b, None where an end is none
     """
 
+    ends: tuple[Fraction, Fraction]
     lower: float
     width: float
     left: Array
@@ -167,14 +191,46 @@ class SeparatedCut:
         return np.asarray(np.sqrt(self._factors(psi)[1]) / (2 * self.points.density))
 
 
+class _Resting(Exception):
+    """A coordinate that rests at I_i, a double root of R with R ≤ 0 on both sides: q_i = 0 for good, to twenty digits."""
+
+    def __init__(self, axis: int) -> None:
+        self.axis = axis
+
+
+def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
+    """Return the start among the axes along which it moves, its cuts, and the numbers of these axes.
+
+    Raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``, ``at-rest``, ``beyond-floats``).
+    """
+    axes = list(range(len(start.q)))
+    still = [i for i, x in enumerate(start.q) if x == start.q_dot[i] == 0]
+    while True:
+        for i in reversed(still):
+            if len(axes) == 2:
+                raise Unsolved("at-rest", "nothing moves by more than 1e-20; integrate numerically")
+            start = start.without(i)
+            del axes[i]
+        try:
+            return start, separated_cuts(start), axes
+        except _Resting as resting:
+            still = [resting.axis]
+
+
 def separated_cuts(start: SeparableStart) -> list[SeparatedCut]:
-    """Return the cuts of a start; raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``)."""
+    """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as ``moving_axes`` has it."""
     factor = start.factor
-    found = roots(factor)
+    found = roots(factor, start.apart)
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
-    real = sorted([Fraction(0), *free, *(x for x, y in found if y == 0)])
+    near = NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
+    # A root that is I_i to all digits is I_i: a double root is then seen to be one.
+    single = [next((own for own in free if abs(x - own) <= near), x) for x, y in found if y == 0]
+    real = sorted([Fraction(0), *free, *single])
     pairs = [(x, y) for x, y in found if y > 0]
     R = [2 * c for c in product([Fraction(0), Fraction(1)], product(monic(free), factor))]
+    leading, far = abs(R[-1]), math.prod((max(Fraction(1), x * x + y * y) for x, y in found), start=Fraction(1))
+    if max(leading, 1 / leading, far) > _LARGEST:
+        raise Unsolved("beyond-floats", "R leaves the range of a float; integrate numerically")
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
 
 
@@ -182,31 +238,33 @@ def _cut(
     start: SeparableStart, s: int, point: Fraction, real: list[Fraction], pairs: list[tuple[Fraction, Fraction]], R: Polynomial
 ) -> SeparatedCut:
     low, high = start.inverse[s], start.inverse[s + 1]
-    scale = start.inverse[-1]
     marks = [x for x in real if low <= x <= high]
-    at = next((x for x in marks if abs(x - point) <= NEAR * scale), None)
-    before = [x for x in marks if x < point and x != at]
-    after = [x for x in marks if x > point and x != at]
-    if at is None:
-        ends = (before[-1] if before else None), (after[0] if after else None)
+    at = min(marks, key=lambda x: abs(x - point), default=point)  # without marks it runs into a plane either way
+    names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
+    if abs(at - point) > NEAR * (high - low):
+        lower, upper = max((x for x in marks if x < point), default=None), min((x for x in marks if x > point), default=None)
     else:  # it starts at a turning point, and moves to where R > 0; where that is nowhere, it stays
-        up = bool(after) and value(R, (at + after[0]) / 2) > 0
-        down = bool(before) and value(R, (at + before[-1]) / 2) > 0
-        ends = (at, after[0]) if up else (before[-1], at) if down else (at, at)
         point = at
-    lower, upper = ends
+        before, after = max((x for x in marks if x < at), default=None), min((x for x in marks if x > at), default=None)
+        if value(R, (at + (high if after is None else after)) / 2) > 0:
+            lower, upper = at, after
+        elif value(R, (at + (low if before is None else before)) / 2) > 0:
+            lower, upper = before, at
+        elif at in names:
+            raise _Resting(names[at])
+        else:
+            raise Unsolved("clustered-roots", "R has a double root: a coordinate rests there; integrate numerically")
     if lower is None or upper is None:
-        axis = s if lower is None else s + 1
-        raise Unsolved("collision", f"the motion runs into the plane q_{axis + 1} = 0 of the sorted axes, where V is −∞")
+        wall = float(low if lower is None else high)
+        raise Unsolved("collision", f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞")
     width = upper - lower
     others = list(real)
     others.remove(lower)
     others.remove(upper)
-    nearest = min((abs(x - end) for x in others for end in (lower, upper)), default=scale)
-    if nearest <= Fraction(_SEPARATRIX) * (width if width else scale):
+    if min(abs(x - end) for x in others for end in (lower, upper)) <= Fraction(_SEPARATRIX) * width:
         raise Unsolved("separatrix", "a turning point is nearly a double root: the motion is asymptotic, or within 1e-12 of one")
-    names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
     return SeparatedCut(
+        ends=(lower, upper),
         lower=float(lower),
         width=float(width),
         left=np.array([float(lower - x) for x in sorted(others) if x < lower]),

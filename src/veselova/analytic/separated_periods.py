@@ -49,8 +49,8 @@ class SeparatedPeriods(AngleSeries):
     @property
     def narrowest_gap(self) -> float:
         """Return the least gap between neighbouring cuts against the wider of both."""
-        ends = [(cut.lower, cut.lower + cut.width, cut.width) for cut in self.cuts]
-        ratios = ((c - b) / (c - b + max(width, other)) for (_, b, width), (c, _, other) in itertools.pairwise(ends))
+        pairs = ((a, b, float(b.ends[0] - a.ends[1])) for a, b in itertools.pairwise(self.cuts))
+        ratios = (gap / (gap + max(a.width, b.width)) for a, b, gap in pairs)
         return min(ratios, default=1.0)
 
     def points(self, phi: Array) -> Array:
@@ -63,10 +63,9 @@ class SeparatedPeriods(AngleSeries):
         below, above = cut.point(phi)
         factors = []
         for l in range(g - 1):
-            end, begin = self.cuts[l].lower + self.cuts[l].width, self.cuts[l + 1].lower
-            half = (begin - end) / 2
+            middle = (self.cuts[l].ends[1] + self.cuts[l + 1].ends[0]) / 2
             # λ−ζ_l from the end of the cut that faces the gap.
-            factors.append(below + (cut.lower - begin) + half if s > l else -(above + (end - cut.lower - cut.width) + half))
+            factors.append(below + float(cut.ends[0] - middle) if s > l else -(above + float(middle - cut.ends[1])))
         one = np.ones_like(phi)
         products = [np.prod([one, *factors[:k], *factors[k + 1 :]], axis=0) for k in range(g - 1)]
         products.append(np.prod([one, *factors], axis=0))
