@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from conftest import slow
 from draws import random_problem
-from veselova import Unsolved, VeselovaSO3, solve
+from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
 from veselova.mechanics import integrals, separation
 from veselova.mechanics.separation import SeparablePotential
 from veselova.mechanics.spheroconic import to_spheroconic
@@ -147,6 +147,13 @@ def test_coordinates_reach_their_turning_points_and_no_farther(name: str, rng: n
     assert np.all(np.max(lam, axis=0) <= ends[:, 1] + 1e-10)
     assert np.allclose(np.min(lam, axis=0), ends[:, 0], atol=1e-3)
     assert np.allclose(np.max(lam, axis=0), ends[:, 1], atol=1e-3)
+
+
+def test_a_body_released_from_rest_has_constants() -> None:
+    for start in ([0.6, 0, 0.8], [0.6, 0.48, 0.64]):
+        found = solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0], {"quadratic": 1}), [0, 1], "numeric")
+        assert max(found.drift.values()) < 1e-11
+    assert not solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0]), [1]).integrals["constants"].any()
 
 
 @pytest.mark.parametrize("n", [3, slow(4), slow(5)])

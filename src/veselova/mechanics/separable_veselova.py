@@ -132,8 +132,8 @@ class SeparableVeselova(Problem):
     @property
     def moves(self) -> bool:
         """Return whether the point moves: q̇ or the force along the sphere."""
-        if np.any(self.q_dot):
-            return True
+        if np.any(self.q_dot) or self.turning == 0:
+            return bool(np.any(self.q_dot))
         rate = self.flow()
         return bool(np.any(np.abs(rate.vector_field(0.0, rate.initial)) > np.finfo(float).eps))
 

@@ -97,7 +97,8 @@ def separation_constants(A: Array, q: Array, q_dot: Array, potential: SeparableP
     rate_squared = np.prod(A) / (q @ (A * q))
     pairs = [(i, j) for j in range(n) for i in range(j)]
     wedges = sum((q[i] * q_dot[j] - q[j] * q_dot[i]) ** 2 * _product(np.delete(I, [i, j])) for i, j in pairs)
-    kinetic = polynomial.polyadd(wedges / (2 * rate_squared), energy(A, q, q_dot) * conics)
+    kinetic = energy(A, q, q_dot) * conics
+    kinetic[:-1] += wedges / (2 * rate_squared)
     remainder = polynomial.polydiv(potential.polynomial, conics)[1]
     for i in np.flatnonzero(potential.centrifugal):
         # 1/(λ−I_i) mod U is (U(I_i) − U(λ))/((λ−I_i)U(I_i)), and U(I_i) = q_i² Φ'(I_i).
