@@ -89,7 +89,11 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
     motions = [solve(problem, TIMES, "numeric", formulation=formulation) for formulation in problem.formulations]
     if "analytic" in problem.engines:
         motions.append(solve(problem, TIMES, "analytic"))
-        assert compare(problem, TIMES).agrees
+        both = compare(problem, TIMES)
+        assert both.agrees
+        for output in problem.bounded:
+            assert f"{output} by " in repr(both)
+            assert output in both._repr_html_()
     for other in motions[1:]:
         for output in problem.bounded:
             difference = np.abs(other.series(output) - motions[0].series(output)).reshape(len(TIMES), -1).max(axis=1)

@@ -28,7 +28,8 @@ class Comparison:
 
     def __repr__(self) -> str:
         agreement = "agree" if self.agrees else "disagree"
-        return f"<Comparison: {self.analytic!r} and {self.numeric!r} {agreement}, frames differ by {self.deviation['frame']:.2g}>"
+        gaps = ", ".join(f"{name} by {self.deviation[name]:.2g}" for name in self.analytic.problem.bounded)
+        return f"<Comparison: {self.analytic!r} and {self.numeric!r} {agreement}, they differ in {gaps}>"
 
     def difference(self, name: str) -> Array:
         """Return the largest difference of one output over its components, at each time, shape (N,)."""
