@@ -5,7 +5,7 @@
 Prints, per dimension and number of digits, the seconds of a whole call (set-up included), those until the frame is there in
 decimals, and those until all series are (decimals are made when they are asked for), the working digits, the clock and its
 evaluations, the largest error reported, and the largest difference of the frame from a run with ten digits more (decimals are
-rounded to three digits beyond those asked for). The last bodies are next to a separatrix, with relative gaps of 1e-7 and 1e-17.
+rounded to three digits beyond those asked for). The last bodies are next to a separatrix, with relative gaps of 1e-6 and 1e-17.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        return grown(rate.inversion.periods.genus, determinants, MOST_MODES)
+        return grown(rate.inversion.periods.genus, determinants, 2 * MOST_MODES)  # those at the edge are looked at too
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""

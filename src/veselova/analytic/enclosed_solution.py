@@ -63,8 +63,9 @@ _MOST_GROWTH = 1000
 _NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
 _MODE_AT_TIME, _TIME, _NODES = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1, 36
 
-#: The digits of those, and milliseconds beyond which modes are not begun: minutes.
-_DIGITS, _LONGEST = 60, 120_000
+#: The digits of those, by what power of them modes grow, whose sums are in balls for genus 1, and milliseconds beyond which modes
+#: are not begun: minutes.
+_DIGITS, _GROWTH, _LONGEST = 60, {1: 2.5, 2: 1.5, 3: 1.5, 4: 1.5}, 120_000
 
 
 class EnclosedSolution:
@@ -191,7 +192,8 @@ class EnclosedSolution:
         clocks = [partial(EnclosedClock, self.orbit, approximate, xp.certified)]
         # Of a direction that doubles do not see they say nothing.
         known = self._coarse.moving.size == self.moving.size and self.moving.rate_variation < WIDEST_RATE
-        if known and modes <= MOST_MODES and forming * (xp.digits / _DIGITS) ** 1.5 <= _LONGEST and not xp.certified:
+        growth = (xp.digits / _DIGITS) ** _GROWTH[kind]
+        if known and modes <= MOST_MODES and forming * growth <= _LONGEST and not xp.certified:
             clocks.insert(int(by_panels < by_modes), partial(EnclosedFourier, self.orbit))
         for clock in clocks[:-1]:
             with suppress(Unsolved):

@@ -231,7 +231,7 @@ def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, floa
 class ColumnsForModes(Generic[T]):
     """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more.
 
-    ``made``: what is made of weights, G_s and the largest entry that modes may have
+    ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may turn by one of ψ
     """
 
     def __init__(self, rate: Rate[Any], made: Callable[[Values, Values, int], T]) -> None:
