@@ -271,6 +271,7 @@ def test_motions_in_coordinate_planes_are_served(data: Any) -> None:
         # equal moments: differences of I's and turning points that no double of theirs has
         ([2, "2/5", "2/5"], [0.48, -0.6, 0.64], [0.6, 1.12, 0.6], {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]}),
         ([0.5, 0.5, 0.4], [1, 0, 0], [0, 0.02, 0.9], {"family": [0.3, 0, 0.1, 0, 0]}),
+        ([4, 4, 4], [1, 0, 1e-20], [0, -1e-18, 0.8], {"clebsch": -0.5, "family": [-0.3, 0, 0.1, 0, 0]}),
         ([1, 1, 2], [1e-6, 0.6, 0.8], [0, 0.8, -0.6], {"clebsch": 0.5}),
     ],
 )

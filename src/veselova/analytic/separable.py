@@ -86,17 +86,9 @@ class SeparableMotion:
         (m_s)_i = q_i y_s/(λ_s−I_i), y_s = √(|Φ(λ_s)|/Π_{j≠s}|λ_s−λ_j|); the root of a cut's own end carries a sign, so that all
         are analytic in φ and change sign with φ_s → φ_s + 2π as they do in time. The last are axes along which nothing moves.
         """
-        offsets, between = self._offsets(phi), self.between(phi)
-        own = np.ones_like(offsets)  # the signed root of |λ_s−I_i| where I_i is an end of cut s
-        for i, (s, lower) in self._own.items():
-            own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
-        ends = np.array(
-            [[self._own.get(i, (-1, True))[0] == s for i in range(self._inverse.size)] for s in range(len(self.cuts))]
-        )
-        far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
+        offsets, ends, own, far, y_rest = self._roots(phi)
         scale = np.array([np.sqrt(np.prod([d for d in row if d])) for row in self._distances])
         q_rest = np.array(self._signs) * np.prod(far, axis=1) / scale
-        y_rest = np.prod(far, axis=2) / np.sqrt(np.prod(between, axis=2))
         q, y = q_rest * np.prod(own, axis=1), y_rest * np.prod(own, axis=2)
         tangents = q[:, None, :] * y[:, :, None] / np.where(ends, 1.0, offsets)
         for i, (s, lower) in self._own.items():  # the root stands in q_i and in y_s, and cancels the quotient
@@ -104,6 +96,19 @@ class SeparableMotion:
             mate = own[:, s, other] if other is not None else 1.0
             tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
         return self._among_all_axes(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi))
+
+    def _roots(self, phi: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return λ_s−I_i; whether I_i is an end of cut s, (g, n); √|λ_s−I_i| there, signed, and elsewhere, 1 where not; y_s.
+
+        All are (N, g, n) but the second and y_s (N, g), which leaves out the signed roots.
+        """
+        offsets, axes = self._offsets(phi), range(self._inverse.size)
+        ends = np.array([[self._own.get(i, (-1, True))[0] == s for i in axes] for s in range(len(self.cuts))])
+        own = np.ones_like(offsets)
+        for i, (s, lower) in self._own.items():
+            own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
+        far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
+        return offsets, ends, own, far, np.prod(far, axis=2) / np.sqrt(np.prod(self.between(phi), axis=2))
 
     def _among_all_axes(self, q: Array, lines: Array, components: Array, points: Array) -> Attitude:
         n, g, count = self._dimension, len(self.cuts), q.shape[0]
@@ -125,14 +130,14 @@ class SeparableMotion:
     def turning(self, phi: Array) -> Array:
         """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
-        From A⁻¹m_s = λ_sm_s + σ_sq, σ_s = (A⁻¹m_s, q), it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); zero where m_2 is an axis.
+        From A⁻¹m_s = λ_sm_s + σ_sq it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); σ_s = Σ I_iq_i²y_s/(λ_s−I_i) = −y_s, a product:
+        the sum has no digit left where I's are nearly equal. It is zero where m_2 is an axis.
         """
         if len(self.cuts) == 1:
             return np.zeros(phi.shape[0])
-        at = self.attitude(phi)
-        sigma = np.sum((self._inverse * at.q)[:, :, None] * at.normals, axis=1)
-        mixed = np.sum(sigma * at.components[:, ::-1], axis=1)
-        return np.asarray(mixed / self.between(phi)[:, 0, 1])
+        _, _, own, _, y_rest = self._roots(phi)
+        y, along = y_rest * np.prod(own, axis=2), self._components(phi, y_rest)
+        return np.asarray(-np.sum(y * along[:, ::-1], axis=1) / self.between(phi)[:, 0, 1])
 
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
