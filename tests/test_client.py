@@ -21,6 +21,8 @@ from veselova import (
     Client,
     InvalidInput,
     InvalidRequest,
+    LRSystem,
+    MatrixGroup,
     ProblemResponse,
     ServiceError,
     ServiceUnreachable,
@@ -249,6 +251,18 @@ def test_an_answer_of_another_service_is_a_service_error() -> None:
 def test_bad_times_are_refused_before_anything_is_sent() -> None:
     with pytest.raises(InvalidInput, match="times"):
         Client("http://nowhere.invalid").trajectory(PROBLEM, [0, float("nan")])
+
+
+def test_a_system_on_another_group_is_refused_before_anything_is_sent() -> None:
+    group = MatrixGroup.su(2)
+    system = LRSystem.on(group, np.diag([1.0, 2.0, 3.0]), [group.basis[0]], omega=group.basis[1])
+    client = Client("http://nowhere.invalid")
+    for call in (client.trajectory, client.compare):
+        with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
+            call(system, [1.0])
+    with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
+        client.sweep(system, {"/rank": [1, 2]}, times=[1.0])
+    assert json.loads(json.dumps(system.as_dict()))["basis"] == group.basis.tolist()
 
 
 def test_a_job_without_an_id_is_refused_and_an_id_is_one_part_of_the_address() -> None:

@@ -70,13 +70,6 @@ def test_matrices_off_a_group_are_put_back_on_it(name: str, rng: np.random.Gener
     assert np.max(np.abs(group.project(back) - back)) < 1e-14
 
 
-def test_a_system_on_another_group_says_that_it_cannot_be_sent() -> None:
-    group = MatrixGroup.su(2)
-    system = LRSystem.on(group, np.diag([1.0, 2.0, 3.0]), [group.basis[0]], omega=group.basis[1])
-    with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
-        system.as_dict()
-
-
 J = [[0, 1], [-1, 0]]
 
 

@@ -121,11 +121,11 @@ class LRSystem(Problem):
         system._set(n=group.size, rank=None, given=given)
         return system
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the problem as given, JSON-ready; raises InvalidInput for one that stands on a group of matrices."""
+    def as_request(self) -> dict[str, Any]:
+        """Return the problem as a request states it; raises InvalidInput for one made by ``on``: requests know SO(n) alone."""
         if self.rank is None:
             raise InvalidInput(("problem",), "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent", repr(self))
-        return super().as_dict()
+        return super().as_request()
 
     def _become(self, distribution: Distribution, inertia: Inertia, g: Any, omega: Any, potential: Any, homogeneous: Any) -> None:
         require_truth_value(homogeneous, "homogeneous")

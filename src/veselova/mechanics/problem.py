@@ -107,6 +107,10 @@ class Problem(ABC):
         """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
         return {"system": self.system, **self.given}
 
+    def as_request(self) -> dict[str, Any]:
+        """Return ``as_dict`` where it is the JSON that a request states; raises InvalidInput for a problem that none can."""
+        return self.as_dict()
+
     def conditioning_floor(self, times: Array) -> Array:
         """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
         return np.asarray(np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64)

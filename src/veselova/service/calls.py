@@ -110,12 +110,12 @@ def compare_call(
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
     """Return the invariant torus of a motion (see ``veselova.torus``)."""
-    return Call("/v1/tori", {"problem": _problem(problem).as_dict(), "budget_s": budget_s}, budget_s, torus_of)
+    return Call("/v1/tori", {"problem": _problem(problem).as_request(), "budget_s": budget_s}, budget_s, torus_of)
 
 
 def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
     return {
-        "problem": problem.as_dict(),
+        "problem": problem.as_request(),
         "times": _times(times),
         "method": method,
         "outputs": list(problem.stored),

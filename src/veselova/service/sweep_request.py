@@ -250,4 +250,4 @@ def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any]
     stated = plain(vary)
     if times is not None and not isinstance(times, Mapping):
         times = plain(times)
-    return {"problem": problem.as_dict() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
+    return {"problem": problem.as_request() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
