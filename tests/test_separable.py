@@ -10,6 +10,7 @@ import pytest
 
 from conftest import slow
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
+from veselova.analytic.abel_jacobi import AbelJacobi
 from veselova.analytic.separable import SeparableMotion, SeparatedRate
 from veselova.analytic.separated_curve import SeparableStart
 
@@ -293,6 +294,30 @@ def test_motions_below_the_range_of_a_float_are_a_named_outcome() -> None:
         solve(SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0]), [1.0])
     with pytest.raises(Unsolved, match="at-rest"):
         solve(SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3}), [1.0])
+
+
+@pytest.mark.parametrize("speed", ["1e-150", "1e-160", "1e-200", "1e-300"])
+def test_motions_whose_squares_are_no_floats_are_integrated(speed: str) -> None:
+    """Without a potential the motion depends on speed times time alone."""
+    slow_one, one = (SeparableVeselova([3, 2, 1], ["0.6", "0.8", 0], [0, 0, v]) for v in (speed, 1))
+    found, expected = (solve(p, [t], "numeric") for p, t in ((slow_one, 1e-5 / float(speed)), (one, 1e-5)))
+    assert np.max(np.abs(found.q - expected.q)) <= found.error[0] + expected.error[0]
+    assert np.allclose(found.q_dot, expected.q_dot * float(speed), rtol=1e-9, atol=1e-9 * float(speed))
+
+
+def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two A's share ten digits and the cuts all but touch: angles lie in a bent valley 1e-6 wide."""
+    tried: list[int] = []
+    settled = AbelJacobi._settled
+
+    def counted(self: Any, psi: Any, z: Any) -> Any:
+        tried.append(1)
+        return settled(self, psi, z)
+
+    monkeypatch.setattr(AbelJacobi, "_settled", counted)
+    A, q = ["1.0638356722869833", "1.7260509725242217", "1.7260509724665165"], ["1.5432042772351", "0.34605385", "0.0802813117"]
+    served(SeparableVeselova(A, q, ["1.1121", 0, 0], normalize=True), [-50.0, -0.01, 0.0, 0.03, 50.0])
+    assert 0 < len(tried) < 2000  # 40 a point; along tangents more than ten thousand a point
 
 
 def test_attracting_planes_end_a_motion_by_name() -> None:

@@ -120,17 +120,21 @@ class AbelJacobi(Generic[P]):
     def _continued(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the angles of one point, led there along the line of phases from those of 2πz: the map is one-to-one.
 
-        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way.
+        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way. It serves in a
+        bent valley as narrow as the gap, which a tangent leaves at once: a cubic through the last two stations follows it.
         """
         psi = 2 * np.pi * z
         begin, done, step = self.map(psi[None])[0], 0.0, _FIRST_STRETCH
+        stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         while done < 1 and step > _LEAST_STRETCH:
             reached = min(1.0, done + step)
-            found = self._settled(psi, begin + reached * (z - begin))
+            found = self._settled(_extrapolated(stations, reached) if len(stations) == 2 else psi, begin + reached * (z - begin))
             if found is None:
                 step /= 4
-            else:
-                psi, done, step = found, reached, 2 * step
+                continue
+            psi, done, step = found, reached, 2 * step
+            slope = np.linalg.lstsq(self.jacobian(psi[None])[0], z - begin, rcond=None)[0]
+            stations = [*stations[-1:], (done, psi, slope)]
         if done == 1:
             return psi
         gap = self.periods.narrowest_gap
@@ -181,6 +185,18 @@ class AbelJacobi(Generic[P]):
         if not xp.inside(step, reach).all():
             raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
         return np.asarray(psi + step)
+
+
+def _extrapolated(stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float) -> NDArray[np.float64]:
+    """Return the value at ``reached`` of the cubic with the values and slopes of two stations (place, value, slope)."""
+    (first, early, rise), (second, late, climb) = stations
+    length = second - first
+    x = (reached - second) / length
+    chord = (late - early) / length
+    # The divided differences of Hermite's interpolation, at the second station twice, then at the first.
+    bend = climb - chord
+    twist = climb - 2 * chord + rise
+    return np.asarray(late + (reached - second) * (climb + x * (bend + (x + 1) * twist)))
 
 
 def _inverses(matrices: Values, arithmetic: Any) -> Values:

@@ -35,10 +35,11 @@ class SeparableFlow(PointFlow, SingularFlow):
         n, inverse = A.size, 1 / scaled
         p = scaled * sliding_velocity(scaled, q, q_dot / turning) * (q @ (scaled * q))
         # T is A²/det A; V in its units, with I in units of 2^−k.
-        unit = float(np.prod(scaled)) * 2.0 ** (k * (n - 2)) / turning**2
+        unit = float(np.prod(scaled)) * 2.0 ** (k * (n - 2))
         quartic, quadratic, betas = potential
-        forces = [betas * unit, [quartic * unit * 4.0**-k, quadratic * unit * 2.0**-k]]
-        return cls(np.concatenate([scaled, inverse, *forces]), 1 / turning, np.concatenate([q, p]))
+        forces = np.array([*(betas * unit), quartic * unit * 4.0**-k, quadratic * unit * 2.0**-k])
+        forces = forces / turning / turning  # the square of a slow turning is no float
+        return cls(np.concatenate([scaled, inverse, forces]), 1 / turning, np.concatenate([q, p]))
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q̇, ṗ): (extended), and −∂V/∂q along the sphere."""

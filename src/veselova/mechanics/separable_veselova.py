@@ -119,7 +119,7 @@ class SeparableVeselova(Problem):
         """Return |q̇| plus a rate to which the potential can bring the body."""
         scale, k = integrals.unit_scale(self.A)
         lightest = float(np.min(scale)) ** 2 / float(np.prod(scale)) * 2.0 ** (k * (2 - self.n))
-        return float(np.linalg.norm(self.q_dot) + np.sqrt(2 * self._size / lightest))
+        return float(integrals.norm(self.q_dot) + np.sqrt(2 * self._size / lightest))
 
     @property
     def _size(self) -> float:
@@ -145,7 +145,8 @@ class SeparableVeselova(Problem):
     def flow(self, formulation: str = "reduced") -> SeparableFlow:
         """Return the reduced flow with this potential, in units of this problem."""
         quartic, quadratic, betas = self.potential
-        return SeparableFlow.of(self.A, self.q, self.q_dot, (float(quartic), float(quadratic), to_float(betas)), self.turning)
+        turning = max(self.turning, float(np.finfo(float).tiny))  # its reciprocal is a float
+        return SeparableFlow.of(self.A, self.q, self.q_dot, (float(quartic), float(quadratic), to_float(betas)), turning)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return the spheroconic coordinates."""
