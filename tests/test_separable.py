@@ -84,6 +84,14 @@ def test_a_body_at_rest_in_a_critical_point_stays() -> None:
     assert np.array_equal(found.gamma, np.tile([1.0, 0, 0], (TIMES.size, 1)))
 
 
+def test_a_thin_wall_turns_the_frame_within_a_millionth_of_a_cycle() -> None:
+    """The rate of that turning is not known to more digits than the phases, and its integral is."""
+    gamma = [0.7340915110161714, -0.17903651732263912, 0.6550233422703153]
+    Omega = [-0.21550164995208362, 2.9910045927283826, 1.059041613713418]
+    body = VeselovaSO3([4, 5, 3], gamma, Omega, {"family": [0.664, 0, "3.45e-10", "0.0407", 0]}, normalize=True)
+    agreement(body, [-0.01, 0.0, 0.03])
+
+
 ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
 
 

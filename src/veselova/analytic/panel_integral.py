@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panels import Panels, are_settled
+from veselova.analytic.panels import TAIL, Panels, are_settled
 from veselova.analytic.precision import DOUBLE
 from veselova.mechanics.errors import InternalContradiction
 
@@ -53,7 +53,8 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = panels.series(lefts, length)
-        settled = are_settled(tails, before, _NOISE_TAIL)
+        # A spike may be shorter than its phases are exact, and its series never end; a short one needs no more than a long panel.
+        settled = are_settled(tails, before, _NOISE_TAIL) | (tails * sizes * length <= TAIL * floor * panels.length)
         lengths = np.full(lefts.size, length)
         done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
         if np.all(settled):

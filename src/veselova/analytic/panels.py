@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Panels", "are_settled"]
+__all__ = ["TAIL", "Panels", "are_settled"]
 
 Array = NDArray[np.float64]
 
 #: A series whose last coefficients fall below this part of its size is resolved; what it leaves out counts as no less.
-_TAIL = 4e-15
+TAIL = 4e-15
 
 #: Last coefficients that have not fallen to this part of what they were on a longer panel are rounding, if they are small.
 _STALLED = 0.25
@@ -20,7 +20,7 @@ _STALLED = 0.25
 
 def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np.bool_]:
     """Return which series are resolved, or fall no more: by their tails, those on longer panels, and what may be rounding."""
-    return (tails <= _TAIL) | ((tails <= noise) & (tails > _STALLED * before))
+    return (tails <= TAIL) | ((tails <= noise) & (tails > _STALLED * before))
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Panels:
         zero = int(np.searchsorted(borders, 0.0))
         integrals = _integrated(coefficients[order]) * (lengths / 2)[:, None]
         over_panels = np.sum(integrals, axis=1)  # at x = 1 every Chebyshev polynomial is one
-        left_out = np.maximum(tails[order], _TAIL) * sizes * lengths
+        left_out = np.maximum(tails[order], TAIL) * sizes * lengths
         values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
         return cls(borders, lengths, integrals, values, tails_from_zero, float(np.mean(sizes)))
 
