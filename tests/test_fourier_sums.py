@@ -180,3 +180,16 @@ def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) 
     assert by_modes.decimals is not None
     assert max(by_modes.decimals.error) < Decimal("1e-350")
     assert np.max(np.abs(by_modes.decimals.midpoints["frame"] - by_panels.decimals.midpoints["frame"])) < Decimal("1e-350")
+
+
+@pytest.mark.parametrize("apart", [["1", "2.5"], ["1", "2", "3.5"]])
+def test_modes_of_nearly_coinciding_phases_are_found(apart: list[str]) -> None:
+    """A proven radius holds them: that of panels, which know nothing of modes."""
+    A = [1, *(1 + Fraction(x) / 10**16 for x in apart)]
+    body = vs.Veselova(A, ["0.797", "0.1", "0.604", "0.3"][: len(A)], ["-0.5", "0.82", "0.69", "0.4"][: len(A)], normalize=True)
+    by_modes, proven = vs.solve(body, [29, 1e5], digits=18), vs.solve(body, [29], digits=18, certified=True)
+    assert [found.provenance.details["clock"] for found in (by_modes, proven)] == ["fourier", "panels"]
+    assert by_modes.decimals is not None
+    assert proven.decimals is not None
+    difference = np.max(np.abs(by_modes.decimals.midpoints["frame"][0] - proven.decimals.midpoints["frame"][0]))
+    assert difference <= by_modes.decimals.error[0] + proven.decimals.error[0]

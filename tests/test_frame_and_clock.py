@@ -11,8 +11,9 @@ import pytest
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova, solve
-from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock, grown
+from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock
 from veselova.analytic.increasing import increasing_root
+from veselova.analytic.modes import grown
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.solution import Solution
@@ -266,6 +267,17 @@ def test_modes_that_are_met_again_are_not_taken_again(A: list[object], q: list[o
     fourier, panels = (solve_analytic(problem, times, clock=clock) for clock in ("fourier", "panels"))
     difference = np.max(np.abs(fourier.frame - panels.frame), axis=(1, 2))
     assert np.all(difference <= fourier.error + panels.error)
+
+
+@pytest.mark.parametrize("gap", [1e-4, 3e-6, 1e-7, 2e-9])
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_modes_of_nearly_coinciding_phases_are_found(n: int, gap: float, rng: np.random.Generator) -> None:
+    """With all A's nearly equal the modes with Σm = 1 count, as far as slow differences reach, and neither Σm = 0 nor 2 does."""
+    A = 1.7 * (1 + gap * np.cumsum(rng.uniform(0.5, 2, n)))
+    solution = Solution(Veselova(A, rng.normal(size=n), rng.normal(size=n), normalize=True))
+    clocks = [solution.clock(np.array([0.0, 30.0]), name) for name in ("fourier", "panels")]
+    fourier, panels = (clock.tau1(np.linspace(0, 30, 50))[0] for clock in clocks)
+    assert np.max(np.abs(fourier - panels)) < 1e-13
 
 
 def test_no_mode_is_looked_at_twice() -> None:

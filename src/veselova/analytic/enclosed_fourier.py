@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
-from veselova.analytic.fourier_clock import ColumnsForModes, grown
+from veselova.analytic.fourier_clock import ColumnsForModes
 from veselova.analytic.increasing import Rows, doublings, increasing_root, interval_step
+from veselova.analytic.modes import grown
 from veselova.analytic.precision import DOUBLE, Values
 from veselova.analytic.strip import Orbit
 from veselova.analytic.waves import waves_at
