@@ -296,7 +296,7 @@ def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(busy: bool, tm
             assert not workers.ready()
             while not workers.ready():
                 await anyio.sleep(0.02)
-            (third,) = workers._processes
+            (third,) = workers.warm
             assert await workers.run(os.getpid, budget_s=PATIENCE) == third
 
     asyncio.run(run())

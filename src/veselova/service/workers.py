@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import logging
 import math
-import os
-import sys
+from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
 import anyio
-from anyio import BrokenWorkerProcess, CapacityLimiter, CapacityLimiterStatistics, to_process
+from anyio import CapacityLimiter, CapacityLimiterStatistics
 from anyio.abc import TaskGroup
 
 from veselova.service.metrics import Metrics
 from veselova.service.problem_details import Refused
 from veselova.service.settings import MEGABYTE, Settings
 from veselova.service.tasks import warm_up
+from veselova.service.worker import Worker, WorkerLost
+from veselova.service.worker_process import message
 
 __all__ = ["Workers"]
 
@@ -30,6 +31,9 @@ _SETTLED_S = 0.1
 _FIRST_PAUSE_S = 1.0
 _LONGEST_PAUSE_S = 30.0
 
+#: Seconds after which a worker that nobody needed is ended when another one is called.
+_LONGEST_REST_S = 300.0
+
 T = TypeVar("T")
 
 
@@ -41,7 +45,8 @@ class Workers:
         self._limiter = CapacityLimiter(settings.workers)
         self._max_waiting = settings.max_waiting
         self._memory_mb = settings.worker_memory_mb
-        self._processes: set[int] = set()
+        self._warm: set[Worker] = set()
+        self._resting: deque[tuple[Worker, float]] = deque()
         self._tasks: TaskGroup | None = None
         self._starting = False
         metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self.load.total_tokens)
@@ -57,24 +62,38 @@ class Workers:
         """Return how many workers are at work for requests: one that is being started is not."""
         return max(0, self.load.borrowed_tokens - self._starting)
 
+    @property
+    def warm(self) -> list[int]:
+        """Return the ids of the processes that have answered before and live."""
+        self._warm = {worker for worker in self._warm if worker.lives}
+        return [worker.process_id for worker in self._warm]
+
     def ready(self) -> bool:
         """Return whether there is a warm worker, one that has answered before; where there is none, one is started."""
-        warm = self._warm() > 0
-        if not warm:
+        ready = bool(self.warm)
+        if not ready:
             self._replace()
-        return warm
+        return ready
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Start a worker with both engines loaded, and another whenever none is left for the next request, within the context."""
-        async with anyio.create_task_group() as tasks:
-            self._tasks = tasks
-            self._replace(0)
-            try:
-                yield
-            finally:
-                self._tasks = None
-                tasks.cancel_scope.cancel()
+        """Start a worker with both engines loaded, and another whenever none is left for the next request, within the context.
+
+        At its end no worker is left.
+        """
+        try:
+            async with anyio.create_task_group() as tasks:
+                self._tasks = tasks
+                self._replace(0)
+                try:
+                    yield
+                finally:
+                    self._tasks = None
+                    tasks.cancel_scope.cancel()
+        finally:
+            for worker, _ in self._resting:
+                await worker.end()
+            self._resting.clear()
 
     async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
         """Return what a task gives within the budget, waiting for a worker included.
@@ -94,28 +113,54 @@ class Workers:
             raise
 
     async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
-        work: tuple[Any, ...] = (_with_process, self._memory_mb, task, *arguments)
-        answer: T
+        call = message((task, arguments))
         try:
             with anyio.fail_after(budget_s):
-                process, answer = await to_process.run_sync(*work, cancellable=True, limiter=self._limiter)
+                await self._acquire()
+                try:
+                    answer: T = await self._asked(call)
+                    return answer
+                finally:
+                    self._limiter.release()
         except TimeoutError:
             raise Refused("over-budget", f"The work was stopped after its budget of {budget_s:g} s.") from None
-        except (BrokenWorkerProcess, KeyboardInterrupt):  # interrupted: only where another command serves
+        except WorkerLost:
             raise Refused("worker-lost", "The worker process ended before it answered; try again.", retry_after=1) from None
-        self._processes.add(process)
-        return answer
+        except MemoryError:
+            detail = f"The work needs more than the {self._memory_mb} MB of memory that a worker of this server has"
+            raise Refused("worker-memory", f"{detail}; ask for fewer times.") from None
 
-    def _warm(self) -> int:
-        """Return how many workers have answered before and live."""
-        self._processes = set(filter(_lives, self._processes))
-        return len(self._processes)
+    async def _acquire(self) -> None:
+        """Wait for a place; where one is free, without giving way to other tasks first."""
+        try:
+            self._limiter.acquire_nowait()
+        except anyio.WouldBlock:
+            await self._limiter.acquire()
+
+    async def _asked(self, call: bytes) -> Any:
+        """Return what a worker answers: the one that rests since the shortest time, or a new one."""
+        while self._resting:
+            worker, _ = self._resting.pop()
+            if worker.lives:
+                break
+        else:
+            worker = await Worker.started(self._memory_mb * MEGABYTE)
+        now = anyio.current_time()
+        while self._resting and now - self._resting[0][1] > _LONGEST_REST_S:
+            await self._resting.popleft()[0].end()
+        try:
+            answer = await worker.ask(call)
+            self._warm.add(worker)
+        finally:
+            if worker.lives:
+                self._resting.append((worker, anyio.current_time()))
+        return answer
 
     def _replace(self, pause_s: float = _SETTLED_S) -> None:
         """Start a worker in the background, unless one is idle, or all are at work, or requests wait, which start their own."""
         load = self.load
         room = load.borrowed_tokens < load.total_tokens and not load.tasks_waiting
-        if self._tasks is not None and room and not self._starting and self._warm() <= load.borrowed_tokens:
+        if self._tasks is not None and room and not self._starting and len(self.warm) <= load.borrowed_tokens:
             self._starting = True
             self._tasks.start_soon(self._start, pause_s)
 
@@ -133,39 +178,3 @@ class Workers:
                 pause_s = min(max(2 * pause_s, _FIRST_PAUSE_S), _LONGEST_PAUSE_S)
         finally:
             self._starting = False
-
-
-def _lives(process: int) -> bool:
-    """Return whether a process that this one has started lives still."""
-    if os.name != "posix":  # asking would end it
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def _with_process(megabytes: int, task: Callable[..., T], *arguments: Any) -> tuple[int, T]:
-    """Return this process and what a task gives in it."""
-    return os.getpid(), _within_memory(megabytes, task, *arguments)
-
-
-def _within_memory(megabytes: int, task: Callable[..., T], *arguments: Any) -> T:
-    """Return what a task gives in this process, whose memory is limited; raises Refused where it does not suffice."""
-    try:
-        import resource
-    except ImportError:  # not a POSIX system: the limit of its container is what there is
-        return task(*arguments)
-    # Arrow's own allocator reserves a gigabyte, used or not, which would count.
-    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
-    # On Linux RLIMIT_DATA counts what a process writes to, and not the libraries that it maps, as RLIMIT_AS would.
-    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
-    hard = resource.getrlimit(kind)[1]
-    limit = megabytes * MEGABYTE
-    resource.setrlimit(kind, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
-    try:
-        return task(*arguments)
-    except MemoryError:
-        detail = f"The work needs more than the {megabytes} MB of memory that a worker of this server has; ask for fewer times."
-        raise Refused("worker-memory", detail) from None
