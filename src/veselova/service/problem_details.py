@@ -36,6 +36,7 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
 
 #: What the service itself refuses: code → (status, title).
 _REFUSALS = {
+    "malformed-http": (400, "The request is not HTTP/1.1"),
     "malformed-json": (400, "The body is not JSON"),
     "no-such-job": (404, "No such job"),
     "no-such-resource": (404, "No such resource"),
