@@ -5,14 +5,14 @@
 Starts a server with one worker and an empty cache, then POSTs REQUESTS (200) different bodies of three and of four dimensions one
 after the other, q at 100 times, and of four dimensions the frame at 1000. The time of a request is that of its client: from the
 first byte sent on a connection that is kept open on loopback to the last byte received. The client looks for the end of the
-answer and no more (Python's own takes a tenth of it all to read the headers). After each request this process makes the same
-problem, solves it and writes the same answer itself: what the request took more is the overhead of the service, which has in it
-HTTP, validation, the way to the worker and back and the entry of the cache. Beyond the engine's own seconds, which stand in every
-answer, come the problem, the integrals of motion and the text, with a server or without. /healthz is HTTP and nothing else.
+answer and no more (Python's own takes a tenth of it all to read the headers). Beyond the engine's own seconds, stated in every
+answer, come the problem, the integrals of motion and the text, with a server or without: this process makes the same problems,
+solves them and writes the same answers itself. What requests take more than that is the overhead of the service, which has in it
+HTTP, validation, the way to the worker and back and the entry of the cache. /healthz is HTTP and nothing else.
 
 The peer is the least that a FastAPI service can be: one route that reads a model and hands it to a ProcessPoolExecutor of one
-process, which makes the same answer; it has no limits, budgets, cache, log or counters. Its requests alternate with ours, the
-answer without a server between them.
+process, which makes the same answer; it has no limits, budgets, cache, log or counters. Ten requests of ours, ten of its own and
+ten answers without a server take turns.
 """
 
 from __future__ import annotations
@@ -44,6 +44,9 @@ from pydantic import BaseModel
 from veselova.service.delivery import Wanted, solved
 from veselova.service.examples import BODY4_PROBLEM
 from veselova.service.tasks import warm_up
+
+#: Requests of one kind before the turn of the next.
+_BLOCK = 10
 
 BODY3_PROBLEM = {"system": "veselova", "A": [3, 2, 1], "q": [1, 1, 1], "q_dot": [0.3, -0.7, 0.4], "normalize": True}
 
@@ -97,24 +100,26 @@ def quantiles(taken: list[float]) -> str:
 
 def measure(ours: int, bare: int, base: dict[str, Any], count: int, outputs: list[str], requests: int) -> None:
     """Print what a request costs beyond the solve; the servers listen at these ports."""
-    whole, beyond, here, overhead, peer, size = [], [], [], [], [], 0
+    asked = list(bodies(base, count, outputs, requests))
+    whole, beyond, here, peer, size = [], [], [], [], 0
     with Connection(ours) as connection, Connection(bare) as other:
-        for k, body in enumerate(bodies(base, count, outputs, requests)):
-            # Ours writes an entry of its cache after an answer, which is not to fall into the next request.
-            first, second = (connection, other) if k % 2 else (other, connection)
-            asked = {first: first.ask("POST", "/v1/trajectories", body)}
-            seconds, content = without_http(json.loads(body))
-            asked[second] = second.ask("POST", "/v1/trajectories", body)
-            assert without_provenance(asked[other][1]) == without_provenance(asked[connection][1]) == without_provenance(content)
-            here.append(seconds - solve_seconds(content))
-            whole.append(asked[connection][0])
-            overhead.append(whole[-1] - seconds)
-            beyond.append(whole[-1] - solve_seconds(asked[connection][1]))
-            peer.append(asked[other][0] - solve_seconds(asked[other][1]))
-            size = len(content)
+        for first in range(0, requests, _BLOCK):
+            block = asked[first : first + _BLOCK]
+            answers = [connection.ask("POST", "/v1/trajectories", body) for body in block]
+            others = [other.ask("POST", "/v1/trajectories", body) for body in block]
+            made = [without_http(json.loads(body)) for body in block]
+            for (seconds, answer), (bare_seconds, of_bare), (alone, content) in zip(answers, others, made, strict=True):
+                assert without_provenance(of_bare) == without_provenance(answer) == without_provenance(content)
+                whole.append(seconds)
+                beyond.append(seconds - solve_seconds(answer))
+                peer.append(bare_seconds - solve_seconds(of_bare))
+                here.append(alone - solve_seconds(content))
+                size = len(content)
+    overhead = statistics.median(beyond) - statistics.median(here)
     print(f"{outputs[0]} at {count} times, n = {len(base['A'])}, {size / 1e3:.0f} kB: whole request {quantiles(whole)},")
-    print(f"  more than the same answer takes without a server {quantiles(overhead)};")
-    print(f"  beyond the engine's own seconds {quantiles(beyond)}, without a server {quantiles(here)},")
+    print(
+        f"  beyond the engine's own seconds {quantiles(beyond)}, without a server {quantiles(here)}: {1e3 * overhead:.2f} more;"
+    )
     print(f"  of bare FastAPI {quantiles(peer)}: ours over its {statistics.median(beyond) / statistics.median(peer):.2f}")
 
 
