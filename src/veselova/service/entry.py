@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
+import orjson
 from numpy.typing import NDArray
 
 from veselova.mechanics.archive import archived_series, read_archive
@@ -26,6 +26,9 @@ from veselova.service.schemas import TrajectoryRequest
 __all__ = ["DamagedEntry", "Entry", "packed", "read_entry", "unpacked"]
 
 Arrays: TypeAlias = Mapping[str, NDArray[Any]]
+
+#: Bytes of an array that is written at once.
+_SMALL = 100_000
 
 #: The checksum at the end of a file.
 _CHECKSUM = struct.Struct("<I")
@@ -81,9 +84,9 @@ def packed(request: Mapping[str, Any], trajectory: Trajectory, most: int) -> byt
     arrays = _arrays(trajectory)
     if _bytes(arrays) > most:
         return None
-    stream = io.BytesIO()
-    _write(stream, request, trajectory, arrays)
-    return stream.getvalue() if stream.tell() <= most else None
+    content = b"".join(_parts(request, trajectory, arrays))
+    content += _CHECKSUM.pack(zlib.crc32(content))
+    return content if len(content) <= most else None
 
 
 def _bytes(arrays: Arrays) -> int:
@@ -100,7 +103,16 @@ def _arrays(trajectory: Trajectory) -> Arrays:
 
 
 def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> None:
-    """Write a line of JSON (request, provenance, names and shapes of the arrays), the arrays, and a checksum of both.
+    """Write the parts of an entry, and a checksum of all."""
+    checksum = 0
+    for part in _parts(request, trajectory, arrays):
+        checksum = zlib.crc32(part, checksum)
+        stream.write(part)
+    stream.write(_CHECKSUM.pack(checksum))
+
+
+def _parts(request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> Iterator[bytes]:
+    """Yield a line of JSON (request, provenance, names and shapes of the arrays), then the arrays, large ones block by block.
 
     NumPy's own archive has a header and a checksum for each array, which take four times as long to write for small ones.
     """
@@ -110,15 +122,15 @@ def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory,
         "decimals": trajectory.decimals is not None,
         "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
     }
-    line = json.dumps(header).encode() + b"\n"
-    stream.write(line)
-    checksum = zlib.crc32(line)
+    try:
+        yield orjson.dumps(header, option=orjson.OPT_APPEND_NEWLINE)
+    except TypeError:  # an integer of more than 64 bits
+        yield json.dumps(header).encode() + b"\n"
     for array in arrays.values():
-        for rows in row_blocks(array.shape[0], array[:1].size):
-            block = array[rows].tobytes()
-            checksum = zlib.crc32(block, checksum)
-            stream.write(block)
-    stream.write(_CHECKSUM.pack(checksum))
+        if array.nbytes <= _SMALL:
+            yield array.tobytes()
+        else:
+            yield from (array[rows].tobytes() for rows in row_blocks(array.shape[0], array[:1].size))
 
 
 def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
