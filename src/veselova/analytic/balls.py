@@ -54,7 +54,8 @@ class Balls(Arithmetic):
 
     has_radii: ClassVar[bool] = True
     exp = staticmethod(_entrywise("exp"))
-    expm1 = staticmethod(_entrywise("expm1"))
+    sinh = staticmethod(_entrywise("sinh"))
+    cosh = staticmethod(_entrywise("cosh"))
     log = staticmethod(_entrywise("log"))
     sin = staticmethod(_entrywise("sin"))
     cos = staticmethod(_entrywise("cos"))

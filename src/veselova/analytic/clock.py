@@ -105,8 +105,8 @@ class ClockRate(Rate[Periods]):
     def at(self, psi: Values) -> Values:
         """Return dt/dτ₁ at angles of shape (N, g)."""
         rate = 0 * psi[:, 0] + self.scale
-        for s, cut in enumerate(self.inversion.periods.cuts):
-            rate = rate * self._factor(s, cut.distances(psi[:, s])[0])
+        for s, root in enumerate(self.inversion.periods.roots_on_cuts(psi)[0]):
+            rate = rate * self._factor(s, root * root)
         return np.asarray(rate)
 
     def _factor(self, s: int, below: Values) -> Values:

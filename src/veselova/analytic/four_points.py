@@ -18,14 +18,17 @@ import numpy as np
 from veselova.analytic.elliptic import Jacobi
 from veselova.analytic.precision import Arithmetic, Values
 
-__all__ = ["FourPoints"]
+__all__ = ["FAR", "FourPoints"]
+
+#: The distance of a neighbour at infinity among others: to all digits its ratios are one and zero.
+FAR = 1e300
 
 
 @dataclass(frozen=True)
 class FourPoints:
     """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for both.
 
-    In doubles they may be arrays (N, 1), for N intervals at once.
+    In doubles they may be arrays (N, 1), for N intervals at once; a neighbour at infinity is then FAR away.
     """
 
     arithmetic: Arithmetic
@@ -34,21 +37,28 @@ class FourPoints:
     after: Any
 
     @cached_property
+    def _shares(self) -> tuple[Any, Any, Any, Any]:
+        """Return (b_1−b_0)/(b_2−b_0), (b_3−b_2)/(b_3−b_1), and what these leave of one; 1 and 0 for a neighbour at infinity."""
+        # Ratios before products: the square of a width of 1e-200 is no float.
+        one = self.arithmetic.number(1)
+        (lower, below), (upper, above) = (
+            (one, 0 * one) if x is None else (x / (x + self.width), self.width / (x + self.width))
+            for x in (self.before, self.after)
+        )
+        return lower, upper, below, above
+
+    @cached_property
     def jacobi(self) -> Jacobi:
         """Return the elliptic functions; k'² is a product of gap widths, never 1−k²."""
-        before, width, after = self.before, self.width, self.after
-        if before is None:
-            return Jacobi(self.arithmetic, width / (width + after), after / (width + after))
-        if after is None:
-            return Jacobi(self.arithmetic, width / (width + before), before / (width + before))
-        # Ratios before products: the square of a width of 1e-200 is no float.
-        lower, upper = width + before, width + after
-        return Jacobi(self.arithmetic, (width / lower) * ((before + upper) / upper), (before / lower) * (after / upper))
+        lower, upper, rest_below, rest_above = self._shares
+        return Jacobi(self.arithmetic, rest_below + rest_above * lower, lower * upper)
 
     @cached_property
     def density(self) -> Any:
-        """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|)."""
+        """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|); without what is infinite."""
         factors = [self.width + neighbour for neighbour in (self.before, self.after) if neighbour is not None]
+        if isinstance(self.width, np.ndarray):
+            factors = [np.where(factor < FAR, factor, 1.0) for factor in factors]
         root = math.prod(self.arithmetic.sqrt(factor) for factor in factors)
         return self.jacobi.quarter / self.arithmetic.pi / root
 
@@ -65,8 +75,7 @@ class FourPoints:
     def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
         """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
         # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop out.
-        if self.before is not None:
-            above = above * (self.before / (self.before + self.width))
+        above = above * self._shares[0]
         return below / (below + above), above / (below + above)
 
     def angle(self, below: Any, above: Any, increasing: bool) -> Any:

@@ -140,8 +140,10 @@ class _Point:
     @cached_property
     def own_roots(self) -> Values:
         """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one for b_0, (N, 2g+1)."""
-        of_cuts = [cut.roots(self.psi[:, s]) for s, cut in enumerate(self.frame.periods.cuts)]
-        return np.stack([np.ones_like(of_cuts[0][0]), *(root for roots in of_cuts for root in roots)], axis=1)
+        below, above = self.frame.periods.roots_on_cuts(self.psi)
+        result = np.full((self.psi.shape[0], 2 * len(below) + 1), self.curve.arithmetic.number(1))
+        result[:, 1::2], result[:, 2::2] = below.T, above.T
+        return result
 
     @cached_property
     def on_cuts(self) -> tuple[Values, Values]:
@@ -152,10 +154,10 @@ class _Point:
     @cached_property
     def roots(self) -> Values:
         """Return √|λ_s−b_i|, (N, g, 2g+1), one where b_i ends cut s."""
-        (below, above), cuts = self.on_cuts, self.frame.periods.cuts
-        distances = np.stack([cut.to_branch_points(below[:, s], above[:, s]) for s, cut in enumerate(cuts)], axis=1)
-        for s in range(len(cuts)):
-            distances[:, s, 2 * s + 1 : 2 * s + 3] = self.curve.arithmetic.number(1)
+        (below, above), cuts = self.on_cuts, np.arange(self.curve.genus)
+        distances = np.swapaxes(self.frame.periods.all_cuts.to_branch_points(below.T, above.T), 0, 1)
+        for end in (1, 2):
+            distances[:, cuts, 2 * cuts + end] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(distances))
 
     @cached_property

@@ -8,32 +8,47 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.curve import Curve
 from veselova.analytic.elliptic import Jacobi
-from veselova.analytic.four_points import FourPoints
+from veselova.analytic.four_points import FAR, FourPoints
 from veselova.analytic.precision import Values
 
 __all__ = ["Interval"]
 
+#: Genera with their intervals of which layouts are kept.
+_MOST_KEPT = 1024
+
 
 @dataclass(frozen=True)
 class Interval:
-    """The interval [b_j, b_{j+1}], a cut for odd j and a gap for even j; λ runs over it as ψ runs from 0 to π."""
+    """The interval [b_j, b_{j+1}], a cut for odd j and a gap for even j; λ runs over it as ψ runs from 0 to π.
+
+    Of one curve in doubles it may be S intervals j, side by side: what is said of one then has a first axis for them.
+    """
 
     curve: Curve
-    left: int
+    left: int | tuple[int, ...]
 
     @cached_property
     def points(self) -> FourPoints:
         """Return the interval with its neighbours b_0 and b_3."""
-        width, j, last = self.curve.width, self.left, 2 * self.curve.genus
+        j, last = self.left, 2 * self.curve.genus
+        if isinstance(j, tuple):
+            around = np.array([FAR, *np.diagonal(self.curve.differences, 1).tolist(), FAR])
+            return FourPoints(self.curve.arithmetic, *(around[np.array(j) + k, None] for k in range(3)))
+        width = self.curve.width
         before, after = width(j - 1) if j > 0 else None, width(j + 1) if j + 2 <= last else None
         return FourPoints(self.curve.arithmetic, before, width(j), after)
+
+    @cached_property
+    def _layout(self) -> _Layout:
+        return _layout(self.curve.genus, self.left)
 
     @property
     def jacobi(self) -> Jacobi:
@@ -50,18 +65,16 @@ class Interval:
         return below * below, above * above
 
     def to_branch_points(self, below: Values, above: Values) -> Values:
-        """Return |λ−b_i| for all i, shape (..., 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
-        d, j = self.curve.differences, self.left
-        return np.concatenate(
-            [d[..., None, : j + 1, j] + below[..., None], above[..., None] + d[..., None, j + 1, j + 1 :]], axis=-1
-        )
+        """Return |λ−b_i| for all i, (..., N, 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
+        layout = self._layout
+        stretches = self.curve.differences[..., layout.rows, layout.columns]
+        return np.asarray(stretches[..., None, :] + np.where(layout.on_left, below[..., None], above[..., None]))
 
     def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
         """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (..., N), and r_l, l = 1…g−1, (..., N, g−1), gap l's root."""
-        xp, g, j = self.curve.arithmetic, self.curve.genus, self.left
-        roots = xp.sqrt(self.to_branch_points(below, above))
-        nearest = [i for i in range(j - 1, j + 3) if 0 <= i <= 2 * g]
-        roots[..., nearest] = xp.number(1)  # the four nearest went into the substitution
+        xp, g = self.curve.arithmetic, self.curve.genus
+        # The four nearest went into the substitution.
+        roots = xp.sqrt(np.where(self._layout.nearest, xp.number(1), self.to_branch_points(below, above)))
         return self.points.density / np.prod(roots[..., [0, 1, 2 * g]], axis=-1), roots[..., 2:-1:2] * roots[..., 3::2]
 
     @cached_property
@@ -84,9 +97,9 @@ class Interval:
         return left, width * (width + before) * (square - 1) / (before - width * (square - 1))
 
     def bound_in_strip(self) -> Values:
-        """Return upper bounds of |du_k/dψ| in the strip, (g,): on that circle |λ−x| lies between its values on the real axis."""
+        """Return upper bounds of |du_k/dψ| in the strip of one interval, (g,): on that circle |λ−x| lies between its values on the real axis."""
         left, right = self.ends_of_strip
-        d, j, zeros, last = self.curve.differences, self.left, self.curve.midpoints, 2 * self.curve.genus
+        d, j, zeros, last = self.curve.differences, cast("int", self.left), self.curve.midpoints, 2 * self.curve.genus
         outside = [d[i, j] - left for i in range(j - 1)] + [d[j + 1, i] - right for i in range(j + 3, last + 1)]
         factors = [max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l])) for l in range(zeros.shape[1])]
         common = self.points.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
@@ -94,10 +107,9 @@ class Interval:
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
         """Return λ−ζ_l, l = 1…g−1, shape (..., N, g−1), with ζ_l the midpoint of gap l."""
-        zeros, j = self.curve.midpoints, self.left
-        split = j // 2
-        left, right = zeros[..., None, j, :split], zeros[..., None, j + 1, split:]
-        return np.concatenate([below[..., None] - left, -(above[..., None] + right)], axis=-1)
+        layout, inner = self._layout, np.arange(self.curve.genus - 1)
+        of_end = self.curve.midpoints[..., layout.nearer_end, inner]
+        return np.where(layout.is_below, below[..., None], -above[..., None]) - of_end[..., None, :]
 
     def forms(self, below: Values, above: Values) -> Values:
         """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (..., g, N): holomorphic forms p_k dλ/(2√|R|).
@@ -113,4 +125,33 @@ class Interval:
         upper = np.cumprod(np.concatenate([one, factors[..., ::-1]], axis=-1), axis=-1)[..., ::-1]
         omitted = lower[..., :-1] * upper[..., 1:] / of_gaps
         forms = common[..., None] * np.concatenate([omitted, lower[..., -1:]], axis=-1)
-        return np.asarray(np.swapaxes(forms, -1, -2))
+        return np.ascontiguousarray(np.swapaxes(forms, -1, -2))  # sums along rows are in pairs, which rounds less
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where branch points and midpoints of gaps lie as seen from intervals [b_j, b_{j+1}]; axes as those of their points.
+
+    rows, columns (..., 2g+1): b_i is as far from the nearer end as these two are from each other
+    on_left, nearest (..., 1, 2g+1): whether b_i is b_j or below, and whether it is an end or next to one
+    nearer_end (..., g−1), is_below (..., 1, g−1): the end nearer to the midpoint of gap l, and whether that is b_j
+    """
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    on_left: NDArray[np.bool_]
+    nearest: NDArray[np.bool_]
+    nearer_end: NDArray[np.intp]
+    is_below: NDArray[np.bool_]
+
+
+@lru_cache(_MOST_KEPT)
+def _layout(genus: int, left: int | tuple[int, ...]) -> _Layout:
+    j, i, inner = np.array(left)[..., None], np.arange(2 * genus + 1), np.arange(genus - 1)
+    on_left, is_below = i <= j, inner < j // 2
+    arrays = np.where(on_left, i, j + 1), np.where(on_left, j, i), on_left, (i >= j - 1) & (i <= j + 2)
+    ends = np.where(is_below, j, j + 1)
+    for array in (*arrays, ends, is_below):
+        array.setflags(write=False)  # they serve every curve of this genus
+    rows, columns, left_ones, nearest = arrays
+    return _Layout(rows, columns, left_ones[..., None, :], nearest[..., None, :], ends, is_below[..., None, :])

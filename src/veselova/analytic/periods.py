@@ -18,13 +18,16 @@ import numpy as np
 from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.interval import Interval
-from veselova.analytic.precision import Arithmetic, Values
+from veselova.analytic.precision import DOUBLE, Arithmetic, Values
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["Periods"]
 
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
+
+#: Entries at one node of the forms of intervals that are evaluated side by side: with all nodes they stay in the cache.
+_BLOCK = 10_000
 
 #: Nodes of an interval in balls: a minute.
 _MOST_NODES = 100_000
@@ -57,9 +60,33 @@ class Periods(AngleSeries):
         """Return the gaps s = 0…g−1."""
         return tuple(Interval(self.curve, 2 * s) for s in range(self.genus))
 
+    @cached_property
+    def all_cuts(self) -> Interval:
+        """Return the cuts of one curve side by side."""
+        return Interval(self.curve, tuple(range(1, 2 * self.genus, 2)))
+
+    def roots_on_cuts(self, psi: Values) -> tuple[Values, Values]:
+        """Return the ``roots`` of every cut of one curve at angles (N, g), each (g, N)."""
+        if self._together:
+            return self.all_cuts.roots(psi.T)
+        below, above = zip(*(cut.roots(psi[:, s]) for s, cut in enumerate(self.cuts)), strict=True)
+        return np.stack(below), np.stack(above)
+
+    @property
+    def _together(self) -> bool:
+        """Return whether intervals are evaluated side by side: of one curve in doubles, where calls cost more than numbers."""
+        return self.arithmetic is DOUBLE and self.curve.branch_points.ndim == 1
+
+    @cached_property
+    def _blocks(self) -> tuple[Interval, ...]:
+        """Return all intervals of one curve in doubles, as many of them side by side as fill a block."""
+        count = 2 * self.genus
+        size = max(1, _BLOCK // (self.genus * (count + 1)))
+        return tuple(Interval(self.curve, tuple(range(count)[first : first + size])) for first in range(0, count, size))
+
     def require_moduli(self) -> None:
         """Raise Unsolved where k'² of an interval, which has the widths of both its neighbours as factors, is no double."""
-        if any(interval.jacobi.complement < sys.float_info.min for interval in (*self.cuts, *self.gaps)):
+        if any(np.min(block.jacobi.complement) < sys.float_info.min for block in self._blocks):
             reason = "two of the narrow intervals beside one another have widths whose product leaves the range of a float"
             raise Unsolved("beyond-floats", reason)
 
@@ -71,7 +98,7 @@ class Periods(AngleSeries):
     @cached_property
     def quadrature_nodes(self) -> int:
         """Return the number of nodes on all cuts."""
-        return sum(self.node_count(cut) for cut in self.cuts)
+        return sum(int(series.shape[-1]) for series in self.cut_series)
 
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to the working precision.
@@ -79,10 +106,10 @@ class Periods(AngleSeries):
         Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
-        return self.nodes if self.nodes is not None else int(self.needed_nodes(interval))
+        return self.nodes if self.nodes is not None else int(np.max(self.needed_nodes(interval)))
 
     def needed_nodes(self, interval: Interval) -> Any:
-        """Return that number; of many curves a column of them."""
+        """Return that number; of many curves, or intervals, a column of them."""
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
@@ -98,16 +125,32 @@ class Periods(AngleSeries):
         return below, interval.forms(below, above)
 
     @cached_property
+    def _in_blocks(self) -> list[tuple[int, Values, Values]]:
+        """Return how many coefficients hold the forms, λ−b_1, and the forms, on all intervals of one curve in doubles."""
+        found = list[tuple[int, Values, Values]]()
+        for block in self._blocks:
+            counts = self.needed_nodes(block)[:, 0].astype(int).tolist()
+            found += zip(counts, *self._forms_at_nodes(block), strict=True)
+        return found
+
+    @cached_property
     def forms_at_nodes(self) -> tuple[tuple[Values, Values], ...]:
         """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its series."""
+        if self._together:
+            return tuple((below, forms) for _, below, forms in self._in_blocks[1::2])
         return tuple(self._forms_at_nodes(cut) for cut in self.cuts)
 
     def _series(self, interval: Interval, forms: Values) -> Values:
         """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
         coefficients = self.arithmetic.cosine_series(forms)
         if self.arithmetic.certified:
-            coefficients[:, 0] = self.arithmetic.widened(coefficients[:, 0], self._bound(interval, 2))
+            coefficients[:, 0] = self._mean(interval, forms)
         return coefficients
+
+    def _mean(self, interval: Interval, forms: Values) -> Values:
+        """Return h_0, shape (..., g)."""
+        mean = np.sum(forms, axis=-1) / forms.shape[-1]
+        return np.asarray(self.arithmetic.widened(mean, self._bound(interval, 2)) if self.arithmetic.certified else mean)
 
     def _bound(self, interval: Interval, times: int) -> Values:
         """Return the bound of what the forms' series leave out after times·N coefficients, shape (g,).
@@ -131,10 +174,10 @@ class Periods(AngleSeries):
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
-        return tuple(
-            (-1) ** (self.genus - s) * self._series(cut, forms)
-            for s, (cut, (_, forms)) in enumerate(zip(self.cuts, self.forms_at_nodes, strict=True), start=1)
-        )
+        found = [self._series(cut, forms) for cut, (_, forms) in zip(self.cuts, self.forms_at_nodes, strict=True)]
+        if self._together:
+            found = [series[:, :count] for series, (count, _, _) in zip(found, self._in_blocks[1::2], strict=True)]
+        return tuple((-1) ** (self.genus - s) * series for s, series in enumerate(found, start=1))
 
     @cached_property
     def cancellation(self) -> Values:
@@ -144,9 +187,14 @@ class Periods(AngleSeries):
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
+        on_gaps = (
+            (forms for _, _, forms in self._in_blocks[::2])
+            if self._together
+            else (self._forms_at_nodes(gap)[1] for gap in self.gaps)
+        )
         over_gaps = [
-            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._series(gap, self._forms_at_nodes(gap)[1])[..., 0]
-            for s, gap in enumerate(self.gaps)
+            (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._mean(gap, forms)
+            for s, (gap, forms) in enumerate(zip(self.gaps, on_gaps, strict=True))
         ]
         return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
 

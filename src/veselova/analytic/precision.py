@@ -51,7 +51,8 @@ class Arithmetic(ABC):
     pi: Any
     sqrt: Callable[[Any], Any]
     exp: Callable[[Any], Any]
-    expm1: Callable[[Any], Any]
+    sinh: Callable[[Any], Any]
+    cosh: Callable[[Any], Any]
     log: Callable[[Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
@@ -113,7 +114,7 @@ class Arithmetic(ABC):
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
         count = values.shape[-1]
         coefficients = self.product(values, self._waves(count)) * 2 / count
-        coefficients[..., 0] = coefficients[..., 0] / 2
+        coefficients[..., 0] = np.sum(values, axis=-1) / count
         return np.asarray(coefficients)
 
     def _waves(self, count: int) -> Values:
@@ -157,7 +158,8 @@ class Double(Arithmetic):
     pi = float(np.pi)
     sqrt = staticmethod(np.sqrt)
     exp = staticmethod(np.exp)
-    expm1 = staticmethod(np.expm1)
+    sinh = staticmethod(np.sinh)
+    cosh = staticmethod(np.cosh)
     log = staticmethod(np.log)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
@@ -246,7 +248,7 @@ class Extended(Arithmetic):
         self.digits = digits
         self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
-        for name in ("sqrt", "exp", "expm1", "log", "sin", "cos", "floor"):
+        for name in ("sqrt", "exp", "sinh", "cosh", "log", "sin", "cos", "floor"):
             setattr(self, name, self._entrywise(getattr(self._context, name), 1))
         self._rf = self._entrywise(self._context.elliprf, 3)
 
@@ -259,9 +261,7 @@ class Extended(Arithmetic):
         """Return one number, rounded to this precision."""
         if isinstance(value, (Fraction, decimal.Decimal)):
             return self._context.make_mpf(from_rational(*value.as_integer_ratio(), self._context.prec, "n"))
-        if isinstance(value, np.generic):
-            value = value.item()
-        return self._context.mpf(value)
+        return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""
