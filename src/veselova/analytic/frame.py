@@ -29,7 +29,7 @@ from veselova.analytic.precision import Values
 __all__ = ["Attitude", "Differences", "Frame", "slopes"]
 
 #: Step of the difference quotients: truncation and rounding both near 1e-8.
-_STEP = 1e-6
+_STEP = 1e-8
 
 #: Distances |λ_s−b_i| held at once: 16 MB.
 _BLOCK = 2_000_000
@@ -108,19 +108,19 @@ class Differences:
 
     @property
     def ends(self) -> Values:
-        """Return the points between which differences are taken, shape (2dN, g)."""
-        steps = np.moveaxis(self.directions * (self._lengths[:, None, :] / 2), 2, 0)
-        return np.concatenate([self.points + steps, self.points - steps]).reshape(-1, self.points.shape[1])
+        """Return the points between which differences are taken, shape ((1+d)N, g): these points, and one in each direction."""
+        steps = np.moveaxis(self.directions * self._lengths[:, None, :], 2, 0)
+        return np.concatenate([self.points[None], self.points + steps]).reshape(-1, self.points.shape[1])
 
     def slopes(self, at: Attitude) -> Values:
-        """Return the derivatives of all frame entries, to about 1e-8, shape (N, n², d), from the attitudes at the ends."""
+        """Return the derivatives of all frame entries, to about 1e-7, shape (N, n², d), from the attitudes at the ends."""
         count, _, number = self.directions.shape
-        entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(2, number, count, -1)
-        return np.asarray(np.moveaxis(entries[0] - entries[1], 0, 2) / self._lengths[:, None, :])
+        entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(1 + number, count, -1)
+        return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
 
 
 def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
-    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-8, (N, n², d)."""
+    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-7, (N, n², d)."""
     differences = Differences(points, directions)
     return differences.slopes(attitude(differences.ends))
 

@@ -97,7 +97,10 @@ class Interval:
         return left, width * (width + before) * (square - 1) / (before - width * (square - 1))
 
     def bound_in_strip(self) -> Values:
-        """Return upper bounds of |du_k/dψ| in the strip of one interval, (g,): on that circle |λ−x| lies between its values on the real axis."""
+        """Return upper bounds of |du_k/dψ| in the strip of one interval, (g,).
+
+        On that circle |λ−x| lies between its values on the real axis.
+        """
         left, right = self.ends_of_strip
         d, j, zeros, last = self.curve.differences, cast("int", self.left), self.curve.midpoints, 2 * self.curve.genus
         outside = [d[i, j] - left for i in range(j - 1)] + [d[j + 1, i] - right for i in range(j + 3, last + 1)]

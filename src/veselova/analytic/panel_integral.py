@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 #: Points per panel, of a short stretch and of a long one.
 _FEW_NODES, _NODES = 24, 48
 
-#: Panels beyond an end: ends come from means.
-_MARGIN = 2
+#: Panels beyond an end, as ends come from means; none beyond one so near that going on, where it is short, costs little.
+_MARGIN, _NEAR = 2, 4
 
 #: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and how many are looked at.
 _MANY_PANELS, _LONGER, _PROBED = 200, (7, 6, 5, 4, 3.5, 3, 2.5), 8
@@ -75,30 +75,23 @@ class _Panels:
     nodes: int
     length: float
 
-    @cached_property
-    def _points(self) -> Array:
-        """Return the Chebyshev points of [0, 1], from 1 downwards."""
-        return np.asarray((np.cos(DOUBLE.nodes(self.nodes)) + 1) / 2)
-
-    @cached_property
-    def _to_coefficients(self) -> Array:
-        return np.asarray(DOUBLE.cosine_series(np.eye(self.nodes)))
-
     def lefts(self, low: float, high: float) -> Array:
         """Return where the panels over a stretch start."""
-        first = math.floor(low / self.length) - _MARGIN if low < 0 else 0
-        last = math.ceil(high / self.length) + _MARGIN if high > 0 or first == 0 else 0
-        return np.arange(first, last, dtype=float) * self.length
+        before, after = math.ceil(-low / self.length), math.ceil(high / self.length)
+        first = before + _MARGIN * (before > _NEAR)
+        last = max(after + _MARGIN * (after > _NEAR), first == 0)
+        return np.arange(-first, last, dtype=float) * self.length
 
     def series(self, lefts: Array, length: float) -> tuple[Array, Array, Array]:
         """Return the Chebyshev coefficients (P, nodes), their sizes and relative tails, (P,).
 
         Phases of nodes are those of the border plus a short way.
         """
-        z = self.in_tau1.phases(lefts)[:, None, :] + (self._points * length)[:, None] * self.in_tau1.rates
+        points, to_coefficients = _chebyshev(self.nodes)
+        z = self.in_tau1.phases(lefts)[:, None, :] + (points * length)[:, None] * self.in_tau1.rates
         z = z.reshape(-1, z.shape[2])
         values = [self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
-        coefficients = np.concatenate(values).reshape(lefts.size, -1) @ self._to_coefficients
+        coefficients = np.concatenate(values).reshape(lefts.size, -1) @ to_coefficients
         sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))  # zero is resolved
         return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
 
@@ -111,3 +104,11 @@ class _Panels:
             if np.all(are_settled(panels.series(probed, panels.length)[2], np.inf, _NOISE_TAIL)):
                 return panels
         return self
+
+
+@lru_cache
+def _chebyshev(count: int) -> tuple[Array, Array]:
+    """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to coefficients; read-only."""
+    points, to_coefficients = np.asarray((np.cos(DOUBLE.nodes(count)) + 1) / 2), np.asarray(DOUBLE.cosine_series(np.eye(count)))
+    points.flags.writeable = to_coefficients.flags.writeable = False
+    return points, to_coefficients

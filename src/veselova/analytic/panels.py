@@ -27,7 +27,8 @@ def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np
 class Panels:
     """τ₁ ↦ ∫_0^{τ₁} f(z) along an orbit, on P panels.
 
-    borders (P+1,) in τ₁, zero among them · lengths (P,) · integrals (P, N+1), coefficients of the integral from the left border
+    borders (P+1,) in τ₁, zero among them · lengths (P,)
+    integrals (P, 2, N+1), coefficients of the integral from the left border, and of its derivative in x, −1 … 1 on a panel
     values (P+1,) of the integral at the borders · tails (P+1,), what series leave out of them · mean_size of f
     """
 
@@ -45,8 +46,10 @@ class Panels:
         left, lengths, sizes = lefts[order], lengths[order], sizes[order]
         borders = np.append(left, left[-1] + lengths[-1])
         zero = int(np.searchsorted(borders, 0.0))
-        integrals = _integrated(coefficients[order]) * (lengths / 2)[:, None]
-        over_panels = np.sum(integrals, axis=1)  # at x = 1 every Chebyshev polynomial is one
+        slopes = coefficients[order] * (lengths / 2)[:, None]
+        integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
+        integrals[:, 0], integrals[:, 1, :-1] = _integrated(slopes), slopes
+        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
         left_out = np.maximum(tails[order], TAIL) * sizes * lengths
         values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
         return cls(borders, lengths, integrals, values, tails_from_zero, float(np.mean(sizes)))
@@ -54,7 +57,7 @@ class Panels:
     @property
     def size(self) -> int:
         """Return the number of nodes."""
-        return int(self.integrals.shape[0] * (self.integrals.shape[1] - 1))
+        return int(self.integrals.shape[0] * (self.integrals.shape[2] - 1))
 
     def at(self, tau1: Array) -> Array:
         """Return the integrals from zero to Neumann times within the panels."""
@@ -81,16 +84,10 @@ class Panels:
 
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
         """Return the integral from the panel's left border to x, and its derivative in x."""
-        orders = np.arange(self.integrals.shape[1])
-        angle = np.arccos(np.clip(x, -1.0, 1.0))
-        table = self.integrals[panel]
-        value = np.sum(table * np.cos(orders * angle[:, None]), axis=1)
-        sine = np.sin(angle)
-        inside = sine > 1e-8
-        slopes = np.where(inside[:, None], np.sin(orders * angle[:, None]) / np.where(inside, sine, 1.0)[:, None], orders)
-        # At x = −1 the limit of sin(kα)/sin α is (−1)^{k+1} k.
-        slopes = np.where((~inside & (x < 0))[:, None], -((-1.0) ** orders) * orders, slopes)
-        return value, np.sum(table * orders * slopes, axis=1)
+        angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
+        waves = np.cos(np.arange(self.integrals.shape[2]) * angle[:, None])
+        value, slope = (self.integrals[panel] @ waves[:, :, None])[:, :, 0].T
+        return value, slope
 
 
 def _summed(over_panels: Array, zero: int) -> Array:

@@ -118,7 +118,7 @@ class ThetaQuotients:
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
 
     def slopes(self, z: Array) -> Array:
-        """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-8."""
+        """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-7."""
         genus = self.theta.genus
         return np.asarray(slopes(self.at, z, np.broadcast_to(np.eye(genus), (z.shape[0], genus, genus))))
 
