@@ -29,6 +29,7 @@ __all__ = [
     "Member",
     "centred_points",
     "half_of",
+    "largest_corner",
     "lattice_points",
     "points_within",
     "schur",
@@ -75,6 +76,8 @@ class Coordinates:
         primal, dual = _reduced(T), np.rint(np.linalg.inv(_reduced(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)[::-1]
         choices = []
         for U, counts in ((primal, range(genus + 1)), (dual, range(1, genus))):
+            if U is dual and (primal == U).all():
+                break
             factors = _Factors.of(U @ T @ U.T)
             choices += [(cls(U, tuple(range(m, genus))), factors.cost(m)) for m in counts]
         return min(choices, key=lambda choice: choice[1])
@@ -123,15 +126,15 @@ class Coordinates:
 def _reduced(form: Array) -> Integers:
     """Return a basis, as rows, in which no vector is shortened by a multiple of another; short vectors first."""
     U = np.eye(len(form), dtype=np.int64)
-    gram, size = form.copy(), len(form)
+    gram, size = form.tolist(), len(form)
     improved = True
     while improved:
         improved = False
         for i, j in ((i, j) for i in range(size) for j in range(size) if i != j):
-            if abs(gram[i, j]) > _HALF * gram[j, j]:
-                U[i] -= round(gram[i, j] / gram[j, j]) * U[j]
-                gram, improved = U @ form @ U.T, True
-    return U[np.argsort(np.diag(gram), kind="stable")]
+            if abs(gram[i][j]) > _HALF * gram[j][j]:
+                U[i] -= round(gram[i][j] / gram[j][j]) * U[j]
+                gram, improved = (U @ form @ U.T).tolist(), True
+    return U[sorted(range(size), key=lambda i: gram[i][i])]
 
 
 @dataclass(frozen=True)
@@ -152,13 +155,13 @@ class _Factors:
 
     @cached_property
     def _lengths(self) -> list[float]:
-        return [float(x) for x in np.diag(self.lower)]
+        return [self.lower.item(i, i) for i in range(len(self.lower))]
 
     @cached_property
     def _spreads(self) -> list[float]:
         """Return how far centred points reach along each Gram–Schmidt vector, along which r of the cell reaches ``half``."""
-        half = np.sum(np.abs(self.inverse), axis=1) / 2
-        return [float(x) for x in half + np.sqrt(half**2 + RADIUS**2)]
+        half = np.abs(self.inverse).sum(axis=1) / 2
+        return [x + math.sqrt(x * x + RADIUS**2) for x in half.tolist()]
 
     def cost(self, m: int) -> float:
         """Return the terms of a value with Gaussians in the first m coordinates; infinite where the waves cancel."""
@@ -196,13 +199,17 @@ def schur(T: Array, F: list[int], G: list[int]) -> tuple[Array, Array, Array]:
     return (S + S.T) / 2, C, (inverse + inverse.T) / 2
 
 
-def _largest_corner(form: Array) -> float:
+def largest_corner(form: Array) -> float:
     """Return max rᵀ form r over the cell |r_i| ≤ ½, a convex function: the maximum over its corners."""
-    size = form.shape[0]
-    if size == 0:
-        return 0.0
-    corners = (np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5
-    return float(np.max(np.sum((corners @ form) * corners, axis=1)))
+    corners = _corners(len(form))
+    return float(((corners @ form) * corners).sum(axis=1).max())
+
+
+@lru_cache
+def _corners(size: int) -> Array:
+    corners = np.asarray((np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5, dtype=np.float64)
+    corners.flags.writeable = False
+    return corners
 
 
 def centred_points(form: Array, radius: float) -> Array:
@@ -210,10 +217,10 @@ def centred_points(form: Array, radius: float) -> Array:
 
     Zero is no nearer than the nearest, so |k|² − 2k·r ≤ radius², whose least value over the cell is |k|² − Σ|(form k)_i|.
     """
-    corner = _largest_corner(form)
+    corner = largest_corner(form)
     k = lattice_points(form, math.sqrt(radius * radius + corner) + math.sqrt(corner), np.zeros(form.shape[0]))
     projected = k @ form
-    return np.asarray(k[np.sum(projected * k - np.abs(projected), axis=1) <= radius * radius])
+    return np.asarray(k[(projected * k - np.abs(projected)).sum(axis=1) <= radius * radius])
 
 
 def small_norm(form: Array, shift: Array) -> float:
@@ -234,16 +241,16 @@ def lattice_points(form: Array, radius: float, shift: Array) -> Array:
         return np.zeros((1, 0))
     upper = np.linalg.cholesky(form).T
     points, left = np.zeros((1, 0)), np.array([radius * radius])
-    for i in range(dimension - 1, -1, -1):
-        centre = -(points @ upper[i, i + 1 :]) / upper[i, i]
-        reach = np.sqrt(left) / upper[i, i]
-        first = np.ceil(centre - reach - shift[i])
-        counts = np.maximum(np.floor(centre + reach - shift[i]) - first + 1, 0).astype(np.int64)
-        parent = np.repeat(np.arange(points.shape[0]), counts)
-        offset = np.arange(parent.size) - np.repeat(np.cumsum(counts) - counts, counts)
-        x = first[parent] + offset + shift[i]
-        left = np.maximum(left[parent] - (upper[i, i] * (x - centre[parent])) ** 2, 0.0)
-        points = np.column_stack([x, points[parent]])
+    for i, offset in zip(range(dimension - 1, -1, -1), shift[::-1].tolist(), strict=True):
+        length = float(upper[i, i])
+        centre = points @ (upper[i, i + 1 :] / -length) - offset  # of the whole numbers x_i − shift_i
+        reach = np.sqrt(left) / length
+        first = np.ceil(centre - reach)
+        counts = (np.floor(centre + reach) - first).astype(np.int64) + 1
+        parent, ends = np.repeat(np.arange(len(points)), counts), np.cumsum(counts)
+        whole = (first - (ends - counts))[parent] + np.arange(len(parent))
+        left = np.maximum(left[parent] - (length * (whole - centre[parent])) ** 2, 0.0)
+        points = np.concatenate([whole[:, None] + offset, points[parent]], axis=1)
     return points
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import RADIUS, Coordinates, Member, centred_points, half_of, lattice_points, schur, small_norm
+from veselova.analytic.lattice import RADIUS, Coordinates, Member, centred_points, half_of, largest_corner, lattice_points, schur
 from veselova.analytic.theta_sums import SIGNS, Blocks, Family, Group, in_blocks
 
 __all__ = ["Theta"]
@@ -94,13 +94,8 @@ class Theta:
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        return int(self._gaussian_lattice.shape[0] * self._crossing((0,) * len(self._split[0]))[0].shape[0])
-
-    def _wave_lattice(self, epsilon_F: tuple[int, ...]) -> Array:
-        """Return one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all of them small."""
-        S = self._parts[0]
-        shift = np.array(epsilon_F) / 2
-        return np.asarray(half_of(lattice_points(S, np.sqrt(RADIUS**2 + small_norm(S, shift)), shift)))
+        _, starts, _ = self._crossings
+        return len(self._gaussian_lattice) * int(starts[1] - starts[0])
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
@@ -159,11 +154,11 @@ class Theta:
     def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         local, signs = zip(*self._coordinates.characteristics(characteristics), strict=True)
         deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
-        shifts, (of, x, turned) = list(dict.fromkeys(deltas)), self._turned(local)
+        shifts, (of, doubled, turned) = list(dict.fromkeys(deltas)), self._turned(local)
         blocks = np.array([shifts.index(delta) for delta in deltas])
         return Blocks(
             np.array(shifts, dtype=float) / 2,
-            in_blocks(2 * x, blocks[of], len(shifts)),
+            in_blocks(doubled, blocks[of], len(shifts)),
             in_blocks(np.concatenate([turned.real, -turned.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
             np.flatnonzero(np.diff(of, prepend=-1)),
             in_blocks(self._parities(local).T, blocks, len(shifts)),
@@ -193,36 +188,46 @@ class Theta:
         return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
 
     def _family(self, members: list[Characteristic]) -> Family:
-        of, x, turned = self._turned(members)
+        of, doubled, turned = self._turned(members)
         each = turned.reshape(len(turned), len(members), -1)
         parts = [each.real, -each.imag] if self._split[0] else [each.real]
         tables = np.stack(parts, axis=2).reshape(len(turned), -1)
-        return Family(np.rint(2 * x[of == 0]).astype(np.int64), np.ascontiguousarray(tables.T))
+        return Family(doubled[of == 0], np.ascontiguousarray(tables.T))
 
-    def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], Array, NDArray[np.complex128]]:
-        """Return what is summed, characteristic after characteristic: which it is, (X,), the x of its waves, (X, |F|), and
+    def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
+        """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
         (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
-        F = self._split[0]
-        crossings = [self._crossing(tuple(c.epsilon[i] for i in F)) for c in members]
-        of, x = np.repeat(np.arange(len(members)), [len(x) for x, _ in crossings]), np.concatenate([x for x, _ in crossings])
-        delta = np.array([[c.delta[i] for i in F] for c in members], dtype=float)
+        F, (doubled, starts, crossings) = self._split[0], self._crossings
+        codes = [sum(c.epsilon[i] << place for place, i in enumerate(F)) for c in members]
+        ranges = [np.arange(starts[code], starts[code + 1]) for code in codes]
+        of, waves = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
+        delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
         signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
-        turned = np.concatenate([table for _, table in crossings], axis=1)
+        doubled = doubled[waves]
+        turned = crossings[:, waves]
         turned *= signs[:, of]
-        turned *= _QUARTER_TURNS[np.rint(2 * (x * delta[of]).sum(axis=1)).astype(int) % 4]
-        return of, x, turned
-
-    def _crossing(self, epsilon_F: tuple[int, ...]) -> tuple[Array, NDArray[np.complex128]]:
-        """Return the x of the waves and w_x e^{2πi x·Ck}, shape (K, X); w_x counts x and −x."""
-        if epsilon_F not in self._crossings:
-            x, (S, C, _, _) = self._wave_lattice(epsilon_F), self._parts
-            weights = np.where(np.any(x != 0, axis=1), 2.0, 1.0) * np.exp(-np.pi * np.sum((x @ S) * x, axis=1))
-            self._crossings[epsilon_F] = x, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
-        return self._crossings[epsilon_F]
+        turned *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
+        return of, doubled, turned
 
     @cached_property
-    def _crossings(self) -> dict[tuple[int, ...], tuple[Array, NDArray[np.complex128]]]:
-        return {}
+    def _crossings(self) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.complex128]]:
+        """Return 2x of the waves of all ε_F, (X, |F|), where each ε_F begins, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
+
+        Of ε_F these are one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all small.
+        """
+        S, C, _, _ = self._parts
+        # No point of the plane is farther from a lattice than a corner of its cell is from the middle.
+        doubled = half_of(lattice_points(S / 4, np.sqrt(RADIUS**2 + largest_corner(S)), np.zeros(len(S))).astype(np.int64))
+        codes, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
+        norms = ((x @ S) * x).sum(axis=1)
+        least = np.full(2 ** len(S), np.inf)
+        np.minimum.at(least, codes, norms)
+        kept = norms <= RADIUS**2 + least[codes]
+        order = np.flatnonzero(kept)[np.argsort(codes[kept], kind="stable")]
+        doubled, x = doubled[order], x[order]
+        weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
+        starts = np.searchsorted(codes[order], np.arange(len(least) + 1))
+        return doubled, starts, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
 
 
 def _kept(

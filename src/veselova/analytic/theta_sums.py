@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +133,7 @@ class Blocks:
         return result.T
 
 
-def in_blocks(rows: Array, blocks: NDArray[np.intp], count: int) -> Array:
+def in_blocks(rows: NDArray[Any], blocks: NDArray[np.intp], count: int) -> Array:
     """Return rows (R, d), each in its place among ``count`` blocks, shape (R, count·d)."""
     result = np.zeros((len(rows), count, rows.shape[1]))
     result[np.arange(len(rows)), blocks] = rows
