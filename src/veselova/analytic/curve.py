@@ -62,7 +62,7 @@ class Curve:
     def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
-        rows, columns = np.triu_indices(points.size, 1)
+        rows, columns = _pairs(points.size)
         with spectrum.working():
             upwards = arithmetic.array(points[columns] - points[rows])
         differences = np.full((points.size, points.size), arithmetic.number(0))
@@ -133,6 +133,12 @@ class Curve:
             for j in range(first, 2 * self.genus, 2)
         ]
         return min(ratios, default=1.0)
+
+
+@lru_cache
+def _pairs(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return i and j of all pairs i < j."""
+    return np.triu_indices(size, 1)
 
 
 def places_of(origins: tuple[BranchPoint, ...]) -> dict[tuple[str, int], int]:

@@ -51,12 +51,13 @@ def increasing_root(
         for _ in range(_MOST_STEPS):
             value, slope = function(x, rows)
             step = value / slope
-            small, found = np.abs(step) <= settled, np.minimum(np.maximum(x - step, low), high)
+            moved, size = x - step, np.abs(step)
+            small, found = size <= settled, np.minimum(np.maximum(moved, low), high)
             if small.all():
                 return _with(result, rows, found)
             low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-            trial = np.where(2 * np.abs(step) <= before, x - step, np.nan)  # steps that do not shrink may go in circles
-            trial = np.where((trial >= low) & (trial <= high), trial, (low + high) / 2)
+            taken = (2 * size <= before) & (moved >= low) & (moved <= high)  # steps that do not shrink may go in circles
+            trial = np.where(taken, moved, (low + high) / 2)
             before, x = np.maximum(np.abs(trial - x), 2 * settled), np.where(small, found, trial)
             open_ = np.asarray(~(small | (high - low <= narrow)).reshape(len(x), -1).all(axis=1))
             if not open_.any():

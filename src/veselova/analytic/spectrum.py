@@ -187,7 +187,7 @@ def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
             # All eigenvalues add up to the trace; none but the lowest is missing, and none at all where q' = 0.
             rest = np.sum(spheroconic) - np.sum(along * along) - sum(constants)
             constants = sorted([rest, *constants]) if len(constants) < len(points) else constants
-        elif abs(1 - np.sum(along * along / spheroconic)) > Decimal(10) ** -digits:
+        elif abs(1 - (along * along / spheroconic).sum()) > Decimal((0, (1,), -digits)):
             return None
         else:
             constants = [Decimal(0), *constants]

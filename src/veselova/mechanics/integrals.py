@@ -176,49 +176,50 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
 class StateIntegrals:
     """The integrals of states, by the functions above; what several of them are made of is computed once.
 
-    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and F_i has no units.
+    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and F_i has no units. ``q_prime``
+    is the q' of that A.
     """
 
     def __init__(self, A: Array, q: Array, q_dot: Array) -> None:
-        self._A, self._k = unit_scale(A)
+        self.A, self._k = unit_scale(A)
         self._q, self._q_dot = q, q_dot
         self._unit = self._k * (2 - A.size)  # of h and p
 
     @cached_property
     def _sliding(self) -> Array:
-        return sliding_velocity(self._A, self._q, self._q_dot)
+        return sliding_velocity(self.A, self._q, self._q_dot)
 
     @cached_property
     def _rate(self) -> Array:
-        return norm(np.sqrt(self._A) * self._sliding)
+        return norm(np.sqrt(self.A) * self._sliding)
 
     @cached_property
-    def _q_prime(self) -> Array:
+    def q_prime(self) -> Array:
         return _over_rate(self._q_dot, self._rate)
 
     @cached_property
     def _qAq(self) -> Array:
-        return np.asarray((self._A * self._q * self._q).sum(axis=-1), dtype=np.float64)
+        return np.asarray((self.A * self._q * self._q).sum(axis=-1), dtype=np.float64)
 
     @property
     def energy(self) -> Array:
         """Return h, shape (...)."""
         with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
-            h = self._rate * self._rate * (self._qAq / (2 * self._A.prod()))
+            h = self._rate * self._rate * (self._qAq / (2 * self.A.prod()))
             return np.asarray(np.ldexp(h, self._unit), dtype=np.float64)
 
     @property
     def momentum(self) -> Array:
         """Return p, shape (..., n)."""
-        p = self._A * self._sliding * self._qAq[..., None] / self._A.prod()
+        p = self.A * self._sliding * self._qAq[..., None] / self.A.prod()
         return np.asarray(np.ldexp(p, self._unit), dtype=np.float64)
 
     @property
     def neumann(self) -> Array:
         """Return F_1 … F_n, shape (..., n)."""
-        return uhlenbeck_integrals(self._A, self._q, self._q_prime)
+        return uhlenbeck_integrals(self.A, self._q, self.q_prime)
 
     @property
     def constants(self) -> Array:
         """Return c_2 ≤ … ≤ c_{n−1}, shape (..., n−2)."""
-        return np.asarray(np.ldexp(moser_eigenvalues(self._A, self._q, self._q_prime)[..., 1:], -self._k), dtype=np.float64)
+        return np.asarray(np.ldexp(moser_eigenvalues(self.A, self._q, self.q_prime)[..., 1:], -self._k), dtype=np.float64)

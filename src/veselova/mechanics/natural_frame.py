@@ -46,11 +46,13 @@ def natural_frame(A: Array, q: Array, q_dot: Array) -> Array:
 
 def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
     """Return the same for a Neumann motion with velocity q' of any size, γ being the eigenvector of the least constant c_1."""
-    basis, v = tangent_basis(q), q_prime
-    restricted = basis.T @ (np.diag(1 / A) - np.outer(v, v)) @ basis
+    basis = tangent_basis(q)
+    along = q_prime @ basis
+    restricted = (basis.T / A) @ basis - along[:, None] * along
     vectors = basis @ np.linalg.eigh(restricted)[1]  # columns γ, n_2, …, n_{n−1}: c_1 = 0 is the smallest
-    vectors = vectors * np.where(v @ vectors < 0, -1.0, 1.0)
-    frame = np.concatenate([q[:, None], vectors[:, 1:], vectors[:, :1]], axis=1)
+    frame = np.empty_like(vectors, shape=(q.size, q.size))
+    frame[:, 0], frame[:, 1:-1], frame[:, -1] = q, vectors[:, 1:], vectors[:, 0]
+    frame[:, 1:] *= np.where(q_prime @ frame[:, 1:] < 0, -1.0, 1.0)
     if np.linalg.det(frame) < 0:
         frame[:, 1] = -frame[:, 1]
     return orthonormalized(frame)

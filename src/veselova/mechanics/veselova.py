@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from veselova.mechanics import integrals
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_matrix, read_only, require_truth_value, stated, to_float
-from veselova.mechanics.natural_frame import natural_frame, orthonormalized, refined
+from veselova.mechanics.natural_frame import moser_frame, orthonormalized, refined
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.principal_inertia import principal_inertia
 from veselova.mechanics.problem import Series
@@ -81,9 +82,10 @@ class Veselova(TorusProblem):
         exact = replace(exact, frame=exact_frame)
         position, velocity = unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
-        _require_representable_energy(A_float, position, velocity)
+        found = integrals.StateIntegrals(A_float, position, velocity)
+        _require_representable_energy(float(found.energy), velocity)
         if given_frame is None:
-            near_frame = natural_frame(A_float, position, velocity)
+            near_frame = moser_frame(found.A, position, found.q_prime)
         else:
             near_frame = admissible_frame(given_frame, position)
         given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
@@ -227,9 +229,8 @@ def _require_finite(velocity: Array, given: tuple[Fraction, ...]) -> None:
         raise InvalidInput(("q_dot",), "components along the principal axes within the range of a float", largest)
 
 
-def _require_representable_energy(A: Array, q: Array, q_dot: Array) -> None:
-    energy = float(integrals.energy(A, q, q_dot))
-    if not np.isfinite(energy) or (energy == 0 and np.any(q_dot)):
+def _require_representable_energy(energy: float, q_dot: Array) -> None:
+    if not math.isfinite(energy) or (energy == 0 and q_dot.any()):
         raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")
 
 
