@@ -175,4 +175,4 @@ def test_distances_are_sums_of_positive_parts(rng: np.random.Generator) -> None:
         assert np.allclose(squares[0], sn**2, atol=1e-13)
         assert np.allclose(squares[1], cn**2, atol=1e-13)
         point = curve.branch_points[cut.left] + below
-        assert np.allclose(cut.to_branch_points(below, above), np.abs(point[:, None] - curve.branch_points), atol=1e-14)
+        assert np.allclose(cut.to_branch_points(below, above), np.abs(point - curve.branch_points[:, None]), atol=1e-14)

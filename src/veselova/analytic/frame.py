@@ -127,7 +127,7 @@ def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: V
 
 @dataclass(frozen=True)
 class _Point:
-    """The distances and signed roots at given angles, shared by the products. Axes: N points, s = 1…g, branch points b_i."""
+    """The distances and signed roots at given angles, shared by the products. Axes: s = 1…g, branch points b_i, N points."""
 
     frame: Frame
     psi: Values
@@ -139,37 +139,34 @@ class _Point:
 
     @cached_property
     def own_roots(self) -> Values:
-        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one for b_0, (N, 2g+1)."""
+        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one for b_0, (2g+1, N)."""
         below, above = self.frame.periods.roots_on_cuts(self.psi)
-        result = np.full((self.psi.shape[0], 2 * len(below) + 1), self.curve.arithmetic.number(1))
-        result[:, 1::2], result[:, 2::2] = below.T, above.T
+        result = np.full((2 * len(below) + 1, self.psi.shape[0]), self.curve.arithmetic.number(1))
+        result[1::2], result[2::2] = below, above
         return result
 
     @cached_property
     def on_cuts(self) -> tuple[Values, Values]:
-        """Return λ_s−b_{2s−1} and b_{2s}−λ_s, each (N, g)."""
+        """Return λ_s−b_{2s−1} and b_{2s}−λ_s, each (g, N)."""
         squares = self.own_roots * self.own_roots
-        return squares[:, 1::2], squares[:, 2::2]
+        return squares[1::2], squares[2::2]
 
     @cached_property
     def roots(self) -> Values:
-        """Return √|λ_s−b_i|, (N, g, 2g+1), one where b_i ends cut s."""
-        (below, above), cuts = self.on_cuts, np.arange(self.curve.genus)
-        distances = np.swapaxes(self.frame.periods.all_cuts.to_branch_points(below.T, above.T), 0, 1)
+        """Return √|λ_s−b_i|, (g, 2g+1, N), one where b_i ends cut s."""
+        distances, cuts = self.frame.periods.all_cuts.to_branch_points(*self.on_cuts), np.arange(self.curve.genus)
         for end in (1, 2):
-            distances[:, cuts, 2 * cuts + end] = self.curve.arithmetic.number(1)
+            distances[cuts, 2 * cuts + end] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(distances))
 
     @cached_property
     def roots_between(self) -> Values:
-        """Return √|λ_s−λ_j|, (N, g, g), one for s = j: of what is above λ_s on its cut, the stretch between, and below λ_j."""
-        below, above = self.on_cuts
-        g = self.curve.genus
-        stretch = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
-        forward = above[:, :, None] + stretch + below[:, None, :]
-        lower = np.arange(g)[:, None] < np.arange(g)
-        result = np.where(lower, forward, np.swapaxes(forward, 1, 2))
-        result[:, np.arange(g), np.arange(g)] = self.curve.arithmetic.number(1)
+        """Return √|λ_s−λ_j|, (g, g, N), one for s = j: of what is above λ_s on its cut, the stretch between, and below λ_j."""
+        (below, above), g = self.on_cuts, self.curve.genus
+        cuts, stretch = np.arange(g), self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
+        forward = above[:, None] + stretch[:, :, None] + below
+        result = np.where((cuts[:, None] < cuts)[:, :, None], forward, np.swapaxes(forward, 0, 1))
+        result[cuts, cuts] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(result))
 
 
@@ -179,29 +176,29 @@ def _attitude(frame: Frame, psi: Values) -> Attitude:
     q, position = _orthogonal(point, "I", frame.signs)
     v, velocity = _orthogonal(point, "c", None)
     order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
-    normals = np.swapaxes(position, 1, 2) @ velocity[:, :, order]
+    normals = position.transpose(2, 1, 0) @ velocity[:, order].transpose(2, 0, 1)
     lower_ends = frame.periods.curve.branch_points[1 : 2 * g : 2]
-    return Attitude(q, normals, v[:, order], lower_ends + point.on_cuts[0])
+    return Attitude(q.T, normals, v[order].T, lower_ends + point.on_cuts[0].T)
 
 
 def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) -> tuple[Values, Values]:
-    """Return the signed column values (q_i or v_k), (N, m), and the matrix column·row/(λ_s−b), (N, g, m), for one kind of b."""
+    """Return the signed column values (q_i or v_k), (m, N), and the matrix column·row/(λ_s−b), (g, m, N), for one kind of b."""
     curve, layout = point.curve, point.curve.layout(kind)
-    near, own = point.roots[:, :, layout.places], point.own_roots[:, layout.places]
+    near, own = point.roots[:, layout.places], point.own_roots[layout.places]
     # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond each λ_s.
-    columns = np.prod(near / curve.root_stretches(kind), axis=1)
+    columns = np.prod(near / curve.root_stretches(kind)[:, :, None], axis=0)
     if signs is not None:
-        columns = columns * signs
+        columns = columns * signs[:, None]
     # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or I_1 and I_n) have no partner.
     ratios, cuts = near.copy(), np.arange(curve.genus)[:, None]
-    ratios[:, :, 1 : curve.genus] /= point.roots_between[:, cuts, layout.partners]
-    rows = np.prod(ratios, axis=2)
-    whole_rows = rows.copy()
+    ratios[:, 1 : curve.genus] /= point.roots_between[cuts, layout.partners]
+    rows = np.prod(ratios, axis=1)
+    whole_rows, values = rows.copy(), columns * own
     for k, s, _ in layout.ends:
-        whole_rows[:, s] *= own[:, k]
-    matrix = layout.sides * ((columns * own)[:, None, :] / near) * (whole_rows[:, :, None] / near)
+        whole_rows[s] *= own[k]
+    matrix = layout.sides[:, :, None] * (values / near) * (whole_rows[:, None] / near)
     # The root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays.
     for k, s, mate in layout.ends:
-        entry = layout.sides[s, k] * columns[:, k] * rows[:, s]
-        matrix[:, s, k] = entry if mate < 0 else entry * own[:, mate]
-    return columns * own, matrix
+        entry = layout.sides[s, k] * columns[k] * rows[s]
+        matrix[s, k] = entry if mate < 0 else entry * own[mate]
+    return values, matrix

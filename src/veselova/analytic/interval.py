@@ -29,6 +29,7 @@ _MOST_KEPT = 1024
 class Interval:
     """The interval [b_j, b_{j+1}], a cut for odd j and a gap for even j; λ runs over it as ψ runs from 0 to π.
 
+    Points are along the last axis: sums over them are in pairs, which rounds less.
     Of one curve in doubles it may be S intervals j, side by side: what is said of one then has a first axis for them.
     """
 
@@ -65,17 +66,18 @@ class Interval:
         return below * below, above * above
 
     def to_branch_points(self, below: Values, above: Values) -> Values:
-        """Return |λ−b_i| for all i, (..., N, 2g+1), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
+        """Return |λ−b_i| for all i, (..., 2g+1, N), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums of positive terms."""
         layout = self._layout
         stretches = self.curve.differences[..., layout.rows, layout.columns]
-        return np.asarray(stretches[..., None, :] + np.where(layout.on_left, below[..., None], above[..., None]))
+        return np.asarray(stretches[..., None] + np.where(layout.on_left, below[..., None, :], above[..., None, :]))
 
     def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
-        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (..., N), and r_l, l = 1…g−1, (..., N, g−1), gap l's root."""
+        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (..., N), and r_l, l = 1…g−1, (..., g−1, N), gap l's root."""
         xp, g = self.curve.arithmetic, self.curve.genus
         # The four nearest went into the substitution.
         roots = xp.sqrt(np.where(self._layout.nearest, xp.number(1), self.to_branch_points(below, above)))
-        return self.points.density / np.prod(roots[..., [0, 1, 2 * g]], axis=-1), roots[..., 2:-1:2] * roots[..., 3::2]
+        outer = roots[..., 0, :] * roots[..., 1, :] * roots[..., 2 * g, :]
+        return self.points.density / outer, roots[..., 2:-1:2, :] * roots[..., 3::2, :]
 
     @cached_property
     def strip(self) -> Any:
@@ -109,10 +111,10 @@ class Interval:
         return np.array([common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)], dtype=object)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
-        """Return λ−ζ_l, l = 1…g−1, shape (..., N, g−1), with ζ_l the midpoint of gap l."""
+        """Return λ−ζ_l, l = 1…g−1, shape (..., g−1, N), with ζ_l the midpoint of gap l."""
         layout, inner = self._layout, np.arange(self.curve.genus - 1)
         of_end = self.curve.midpoints[..., layout.nearer_end, inner]
-        return np.where(layout.is_below, below[..., None], -above[..., None]) - of_end[..., None, :]
+        return np.where(layout.is_below, below[..., None, :], -above[..., None, :]) - of_end[..., None]
 
     def forms(self, below: Values, above: Values) -> Values:
         """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (..., g, N): holomorphic forms p_k dλ/(2√|R|).
@@ -123,12 +125,11 @@ class Interval:
         common, of_gaps = self.measure(below, above)
         numerators = self.to_midpoints(below, above)
         factors = numerators / of_gaps
-        one = np.ones_like(below)[..., None]
-        lower = np.cumprod(np.concatenate([one, factors], axis=-1), axis=-1)
-        upper = np.cumprod(np.concatenate([one, factors[..., ::-1]], axis=-1), axis=-1)[..., ::-1]
-        omitted = lower[..., :-1] * upper[..., 1:] / of_gaps
-        forms = common[..., None] * np.concatenate([omitted, lower[..., -1:]], axis=-1)
-        return np.ascontiguousarray(np.swapaxes(forms, -1, -2))  # sums along rows are in pairs, which rounds less
+        one = np.ones_like(below)[..., None, :]
+        lower = np.cumprod(np.concatenate([one, factors], axis=-2), axis=-2)
+        upper = np.cumprod(np.concatenate([one, factors[..., ::-1, :]], axis=-2), axis=-2)[..., ::-1, :]
+        omitted = lower[..., :-1, :] * upper[..., 1:, :] / of_gaps
+        return np.asarray(common[..., None, :] * np.concatenate([omitted, lower[..., -1:, :]], axis=-2))
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,8 @@ class _Layout:
     """Where branch points and midpoints of gaps lie as seen from intervals [b_j, b_{j+1}]; axes as those of their points.
 
     rows, columns (..., 2g+1): b_i is as far from the nearer end as these two are from each other
-    on_left, nearest (..., 1, 2g+1): whether b_i is b_j or below, and whether it is an end or next to one
-    nearer_end (..., g−1), is_below (..., 1, g−1): the end nearer to the midpoint of gap l, and whether that is b_j
+    on_left, nearest (..., 2g+1, 1): whether b_i is b_j or below, and whether it is an end or next to one
+    nearer_end (..., g−1), is_below (..., g−1, 1): the end nearer to the midpoint of gap l, and whether that is b_j
     """
 
     rows: NDArray[np.intp]
@@ -157,4 +158,4 @@ def _layout(genus: int, left: int | tuple[int, ...]) -> _Layout:
     for array in (*arrays, ends, is_below):
         array.setflags(write=False)  # they serve every curve of this genus
     rows, columns, left_ones, nearest = arrays
-    return _Layout(rows, columns, left_ones[..., None, :], nearest[..., None, :], ends, is_below[..., None, :])
+    return _Layout(rows, columns, left_ones[..., None], nearest[..., None], ends, is_below[..., None])

@@ -80,9 +80,16 @@ class Periods(AngleSeries):
     @cached_property
     def _blocks(self) -> tuple[Interval, ...]:
         """Return all intervals of one curve in doubles, as many of them side by side as fill a block."""
-        count = 2 * self.genus
-        size = max(1, _BLOCK // (self.genus * (count + 1)))
-        return tuple(Interval(self.curve, tuple(range(count)[first : first + size])) for first in range(0, count, size))
+        return self._side_by_side(range(2 * self.genus))
+
+    @cached_property
+    def blocks_of_cuts(self) -> tuple[Interval, ...]:
+        """Return the cuts, those of one curve in doubles in such blocks."""
+        return self._side_by_side(range(1, 2 * self.genus, 2)) if self._together else self.cuts
+
+    def _side_by_side(self, lefts: range) -> tuple[Interval, ...]:
+        size = max(1, _BLOCK // (self.genus * (2 * self.genus + 1)))
+        return tuple(Interval(self.curve, tuple(lefts[first : first + size])) for first in range(0, len(lefts), size))
 
     def require_moduli(self) -> None:
         """Raise Unsolved where k'² of an interval, which has the widths of both its neighbours as factors, is no double."""

@@ -70,14 +70,14 @@ def actions(periods: Periods) -> Array:
     """
     curve, found = periods.curve, []
     places = curve.layout("c").places
-    for cut in periods.cuts:
-        psi = periods.arithmetic.nodes(periods.node_count(cut))
-        below, above = cut.distances(psi)
-        to_constants = cut.to_branch_points(below, above)[..., places]
-        common, of_gaps = cut.measure(below, above)
-        densities = common * to_constants[..., 0] * np.prod(to_constants[..., 1:] / of_gaps, axis=-1)
-        found.append(np.mean(densities, axis=-1))
-    return np.stack(found, axis=-1)
+    for cuts in periods.blocks_of_cuts:
+        psi = periods.arithmetic.nodes(periods.node_count(cuts))
+        below, above = cuts.distances(psi)
+        to_constants = cuts.to_branch_points(below, above)[..., places, :]
+        common, of_gaps = cuts.measure(below, above)
+        densities = common * to_constants[..., 0, :] * np.prod(to_constants[..., 1:, :] / of_gaps, axis=-2)
+        found.append(np.mean(densities, axis=-1).reshape(*curve.branch_points.shape[:-1], -1))
+    return np.concatenate(found, axis=-1)
 
 
 def _monomial_cycles(periods: Periods) -> Array:
@@ -88,6 +88,6 @@ def _monomial_cycles(periods: Periods) -> Array:
         below, above = cut.distances(psi)
         point = periods.curve.branch_points[2 * s + 1] + below
         common, of_gaps = cut.measure(below, above)
-        density = common / np.prod(of_gaps, axis=1)
+        density = common / np.prod(of_gaps, axis=0)
         columns.append((-1) ** (g - s - 1) * 2 * np.pi * np.mean(point ** np.arange(g)[:, None] * density, axis=1))
     return np.stack(columns, axis=1)
