@@ -63,7 +63,8 @@ class Periods(AngleSeries):
     @cached_property
     def all_cuts(self) -> Interval:
         """Return the cuts of one curve side by side."""
-        return Interval(self.curve, tuple(range(1, 2 * self.genus, 2)))
+        lefts = tuple(range(1, 2 * self.genus, 2))
+        return next((block for block in self.blocks_of_cuts if block.left == lefts), Interval(self.curve, lefts))
 
     def roots_on_cuts(self, psi: Values) -> tuple[Values, Values]:
         """Return the ``roots`` of every cut of one curve at angles (N, g), each (g, N)."""

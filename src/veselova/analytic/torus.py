@@ -82,12 +82,11 @@ def actions(periods: Periods) -> Array:
 
 def _monomial_cycles(periods: Periods) -> Array:
     """Return a in the basis λ^{k−1}dλ/(2√|R|)."""
-    g, columns = periods.genus, []
-    for s, cut in enumerate(periods.cuts):
-        psi = periods.arithmetic.nodes(periods.node_count(cut))
-        below, above = cut.distances(psi)
-        point = periods.curve.branch_points[2 * s + 1] + below
-        common, of_gaps = cut.measure(below, above)
-        density = common / np.prod(of_gaps, axis=0)
-        columns.append((-1) ** (g - s - 1) * 2 * np.pi * np.mean(point ** np.arange(g)[:, None] * density, axis=1))
-    return np.stack(columns, axis=1)
+    g, rows, lower_ends = periods.genus, list[Array](), periods.curve.branch_points[1::2, None]
+    for cuts in periods.blocks_of_cuts:
+        below, above = cuts.distances(periods.arithmetic.nodes(periods.node_count(cuts)))
+        point = lower_ends[len(rows) : len(rows) + len(below)] + below
+        common, of_gaps = cuts.measure(below, above)
+        density = common / np.prod(of_gaps, axis=-2)
+        rows += list(2 * np.pi * np.mean(point[:, None] ** np.arange(g)[:, None] * density[:, None], axis=-1))
+    return np.stack([(-1) ** (g - s - 1) * row for s, row in enumerate(rows)], axis=1)
