@@ -113,14 +113,17 @@ class Differences:
         return np.concatenate([self.points[None], self.points + steps]).reshape(-1, self.points.shape[1])
 
     def slopes(self, at: Attitude) -> Values:
-        """Return the derivatives of all frame entries, to about 1e-7, shape (N, n², d), from the attitudes at the ends."""
+        """Return the derivatives of all frame entries, shape (N, n², d), from the attitudes at the ends."""
         count, _, number = self.directions.shape
         entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(1 + number, count, -1)
         return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
 
 
 def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
-    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), to about 1e-7, (N, n², d)."""
+    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), shape (N, n², d).
+
+    To about 1e-7 of the largest; next to a separatrix, where frames turn within little, to less (1e-5 beside a gap of 1e-6).
+    """
     differences = Differences(points, directions)
     return differences.slopes(attitude(differences.ends))
 
