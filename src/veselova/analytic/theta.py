@@ -94,8 +94,9 @@ class Theta:
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        _, starts, _ = self._crossings
-        return len(self._gaussian_lattice) * int(starts[1] - starts[0])
+        known = (codes for codes in list(self._crossed) if 0 in codes)
+        of_zero = self._crossings(next(known, (0,)))[1][0]
+        return len(self._gaussian_lattice) * (of_zero.stop - of_zero.start)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
@@ -197,9 +198,10 @@ class Theta:
     def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
         """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
         (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
-        F, (doubled, starts, crossings) = self._split[0], self._crossings
+        F = self._split[0]
         codes = [sum(c.epsilon[i] << place for place, i in enumerate(F)) for c in members]
-        ranges = [np.arange(starts[code], starts[code + 1]) for code in codes]
+        doubled, places, crossings = self._crossings(tuple(sorted(set(codes))))
+        ranges = [places[code] for code in codes]
         of, waves = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
         delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
         signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
@@ -209,25 +211,41 @@ class Theta:
         turned *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
         return of, doubled, turned
 
-    @cached_property
-    def _crossings(self) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.complex128]]:
-        """Return 2x of the waves of all ε_F, (X, |F|), where each ε_F begins, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
+    def _crossings(self, codes: tuple[int, ...]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+        """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
 
-        Of ε_F these are one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all small.
+        ``codes``: the bits of each 2ε_F, in increasing order. Of ε_F these are one of each pair ±x with a term above e^−39 of the
+        largest: where T is large ε = ½ makes all small.
         """
-        S, C, _, _ = self._parts
-        # No point of the plane is farther from a lattice than a corner of its cell is from the middle.
-        doubled = half_of(lattice_points(S / 4, np.sqrt(RADIUS**2 + largest_corner(S)), np.zeros(len(S))).astype(np.int64))
-        codes, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
-        norms = ((x @ S) * x).sum(axis=1)
-        least = np.full(2 ** len(S), np.inf)
-        np.minimum.at(least, codes, norms)
-        kept = norms <= RADIUS**2 + least[codes]
-        order = np.flatnonzero(kept)[np.argsort(codes[kept], kind="stable")]
-        doubled, x = doubled[order], x[order]
-        weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
-        starts = np.searchsorted(codes[order], np.arange(len(least) + 1))
-        return doubled, starts, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
+        if codes not in self._crossed:
+            S, C, _, _ = self._parts
+            doubled = half_of(self._doubled_points(codes))
+            of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
+            norms = ((x @ S) * x).sum(axis=1)
+            least = np.full(2 ** len(S), -np.inf)
+            least[list(codes)] = np.inf
+            np.minimum.at(least, of, norms)
+            kept = norms <= RADIUS**2 + least[of]
+            order = np.flatnonzero(kept)[np.argsort(of[kept], kind="stable")]
+            doubled, x = doubled[order], x[order]
+            weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
+            firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
+            places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
+            self._crossed[codes] = doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
+        return self._crossed[codes]
+
+    def _doubled_points(self, codes: tuple[int, ...]) -> NDArray[np.int64]:
+        """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent finds all of them at once."""
+        S, bits = self._parts[0], np.arange(len(self._parts[0]))
+        # No point of space is farther from a lattice than a corner of its cell is from the middle.
+        reach = float(np.sqrt(RADIUS**2 + largest_corner(S)))
+        if 2 ** len(S) <= 2 * len(codes):
+            return lattice_points(S / 4, reach, np.zeros(len(S))).astype(np.int64)
+        return np.concatenate([2 * lattice_points(S, reach, (code >> bits & 1) / 2) for code in codes]).astype(np.int64)
+
+    @cached_property
+    def _crossed(self) -> dict[tuple[int, ...], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
+        return {}
 
 
 def _kept(
