@@ -7,6 +7,7 @@ import io
 import json
 import logging
 import os
+import pickle
 import re
 import signal
 import sqlite3
@@ -31,6 +32,7 @@ from veselova.service.logs import line_formatter
 from veselova.service.metrics import Metrics
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
+from veselova.service.worker_process import SIZE, answered
 from veselova.service.workers import Workers
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
@@ -342,3 +344,22 @@ def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) ->
     shown = own.get("/metrics").text
     assert len(metrics) > 8
     assert not [name for name in metrics if f"# TYPE {name.removesuffix('_total')}" not in shown]
+
+
+class Unmakeable(Exception):
+    """It is pickled, but cannot be made again."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(first)
+        self.second = second
+
+
+def fail_with_what_cannot_be_made() -> None:
+    raise Unmakeable("what happened", "where")
+
+
+def test_a_worker_says_what_happened_whatever_the_exception_is() -> None:
+    succeeded, error = pickle.loads(answered(pickle.dumps((fail_with_what_cannot_be_made, ())))[SIZE.size :])
+    assert not succeeded
+    assert isinstance(error, RuntimeError)
+    assert str(error) == "Unmakeable: what happened"

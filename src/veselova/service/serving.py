@@ -46,7 +46,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
 
     from veselova.service.access import Policy
     from veselova.service.app import create_app
-    from veselova.service.http_protocol import BoundedHttp
+    from veselova.service.http_protocol import Http
     from veselova.service.logs import configure_logging
 
     configure_logging(limits)
@@ -62,8 +62,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
         access_log=False,
         server_header=False,
         loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
-        http=BoundedHttp,
-        ws="none",
+        http=Http,
         proxy_headers=forwarded_allow_ips is not None,
         forwarded_allow_ips=forwarded_allow_ips,
         timeout_graceful_shutdown=limits.shutdown_grace_s,

@@ -15,7 +15,7 @@ import struct
 import sys
 from typing import Any, BinaryIO
 
-__all__ = ["SIZE", "message", "serve"]
+__all__ = ["SIZE", "answered", "message", "serve"]
 
 #: What stands before a pickle: its size in bytes.
 SIZE = struct.Struct("<Q")
@@ -34,7 +34,7 @@ def serve(most_bytes: int) -> None:
     sys.path[:] = pickle.loads(_received(calls) or pickle.dumps(sys.path))
     _limit_memory(most_bytes)
     while call := _received(calls):
-        answers.write(_answer(call))
+        answers.write(answered(call))
         answers.flush()
 
 
@@ -53,14 +53,16 @@ def _received(calls: BinaryIO) -> bytes:
     return calls.read(SIZE.unpack(size)[0]) if len(size) == SIZE.size else b""
 
 
-def _answer(call: bytes) -> bytes:
+def answered(call: bytes) -> bytes:
+    """Return the message that answers a call, the pickle of a task and its arguments."""
     try:
         task, arguments = pickle.loads(call)
         return message((True, task(*arguments)))
     except Exception as error:
         try:
+            pickle.loads(pickle.dumps(error))
             return message((False, error))
-        except Exception:  # it holds what cannot be sent
+        except Exception:  # it holds what cannot be sent, or made again
             return message((False, RuntimeError(f"{type(error).__name__}: {error}")))
 
 

@@ -145,10 +145,9 @@ class Workers:
                 break
         else:
             worker = await Worker.started(self._memory_mb * MEGABYTE)
-        now = anyio.current_time()
-        while self._resting and now - self._resting[0][1] > _LONGEST_REST_S:
-            await self._resting.popleft()[0].end()
         try:
+            while self._resting and anyio.current_time() - self._resting[0][1] > _LONGEST_REST_S:
+                await self._resting.popleft()[0].end()
             answer = await worker.ask(call)
             self._warm.add(worker)
         finally:
