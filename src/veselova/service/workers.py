@@ -91,9 +91,8 @@ class Workers:
                     self._tasks = None
                     tasks.cancel_scope.cancel()
         finally:
-            for worker, _ in self._resting:
-                await worker.end()
-            self._resting.clear()
+            while self._resting:
+                await self._resting.popleft()[0].end()
 
     async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
         """Return what a task gives within the budget, waiting for a worker included.
