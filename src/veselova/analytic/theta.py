@@ -94,8 +94,7 @@ class Theta:
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        known = (codes for codes in list(self._crossed) if 0 in codes)
-        of_zero = self._crossings(next(known, (0,)))[1][0]
+        of_zero = self._crossings(frozenset({0}))[1][0]
         return len(self._gaussian_lattice) * (of_zero.stop - of_zero.start)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
@@ -176,6 +175,9 @@ class Theta:
 
     def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         families = self._coordinates.families(characteristics).items()
+        self._crossings(
+            frozenset(self._codes([c for _, of in families for given in of.values() for _, c, _ in given]))
+        )  # at once
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
     def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
@@ -199,8 +201,8 @@ class Theta:
         """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
         (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
         F = self._split[0]
-        codes = [sum(c.epsilon[i] << place for place, i in enumerate(F)) for c in members]
-        doubled, places, crossings = self._crossings(tuple(sorted(set(codes))))
+        codes = self._codes(members)
+        doubled, places, crossings = self._crossings(frozenset(codes))
         ranges = [places[code] for code in codes]
         of, waves = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
         delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
@@ -211,30 +213,40 @@ class Theta:
         turned *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
         return of, doubled, turned
 
-    def _crossings(self, codes: tuple[int, ...]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+    def _codes(self, members: Sequence[Characteristic]) -> list[int]:
+        """Return the bits of 2ε_F of each."""
+        return [sum(c.epsilon[i] << place for place, i in enumerate(self._split[0])) for c in members]
+
+    def _crossings(self, wanted: frozenset[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
         """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
 
-        ``codes``: the bits of each 2ε_F, in increasing order. Of ε_F these are one of each pair ±x with a term above e^−39 of the
-        largest: where T is large ε = ½ makes all small.
+        ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
+        above e^−39 of the largest: where T is large ε = ½ makes all small.
         """
-        if codes not in self._crossed:
-            S, C, _, _ = self._parts
-            doubled = half_of(self._doubled_points(codes))
-            of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
-            norms = ((x @ S) * x).sum(axis=1)
-            least = np.full(2 ** len(S), -np.inf)
-            least[list(codes)] = np.inf
-            np.minimum.at(least, of, norms)
-            kept = norms <= RADIUS**2 + least[of]
-            order = np.flatnonzero(kept)[np.argsort(of[kept], kind="stable")]
-            doubled, x = doubled[order], x[order]
-            weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
-            firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
-            places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
-            self._crossed[codes] = doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
-        return self._crossed[codes]
+        known = list(self._crossed)  # a copy: another thread may add to them
+        if (found := next((kept for kept in known if wanted <= kept), None)) is not None:
+            return self._crossed[found]
+        self._crossed[wanted] = self._formed(sorted(wanted))
+        return self._crossed[wanted]
 
-    def _doubled_points(self, codes: tuple[int, ...]) -> NDArray[np.int64]:
+    def _formed(self, codes: list[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+        """Return the ``_crossings`` of these codes and no others."""
+        S, C, _, _ = self._parts
+        doubled = half_of(self._doubled_points(codes))
+        of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
+        norms = ((x @ S) * x).sum(axis=1)
+        least = np.full(2 ** len(S), -np.inf)
+        least[codes] = np.inf
+        np.minimum.at(least, of, norms)
+        kept = norms <= RADIUS**2 + least[of]
+        order = np.flatnonzero(kept)[np.argsort(of[kept], kind="stable")]
+        doubled, x = doubled[order], x[order]
+        weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
+        firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
+        places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
+        return doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
+
+    def _doubled_points(self, codes: list[int]) -> NDArray[np.int64]:
         """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent finds all of them at once."""
         S, bits = self._parts[0], np.arange(len(self._parts[0]))
         # No point of space is farther from a lattice than a corner of its cell is from the middle.
@@ -244,7 +256,7 @@ class Theta:
         return np.concatenate([2 * lattice_points(S, reach, (code >> bits & 1) / 2) for code in codes]).astype(np.int64)
 
     @cached_property
-    def _crossed(self) -> dict[tuple[int, ...], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
+    def _crossed(self) -> dict[frozenset[int], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
         return {}
 
 
