@@ -41,6 +41,9 @@ _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 #: Entries of one block of (points × lattice): temporaries that stay in the cache.
 _BLOCK = 100_000
 
+#: Classes ε_F that are few enough for all of them to be found when the first is asked for.
+_FEW_CLASSES = 8
+
 #: Products of few points with the tables of all functions at once, which save the calls of one group after the other.
 _FEW = 150_000
 
@@ -223,6 +226,8 @@ class Theta:
         ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
         above e^−39 of the largest: where T is large ε = ½ makes all small.
         """
+        if 2 ** len(self._split[0]) <= _FEW_CLASSES:
+            wanted = frozenset(range(2 ** len(self._split[0])))
         known = list(self._crossed)  # a copy: another thread may add to them
         if (found := next((kept for kept in known if wanted <= kept), None)) is not None:
             return self._crossed[found]

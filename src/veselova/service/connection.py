@@ -16,17 +16,24 @@ __all__ = ["while_connected"]
 
 T = TypeVar("T")
 
+#: Seconds before anyone looks whether the client is there: most work is done by then, and looking takes a task of its own.
+_UNWATCHED_S = 0.05
+
 
 async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) -> T:
     """Return what the work gives; end it when the client has gone, or the server shuts down: raises Refused then."""
     try:
         with anyio.CancelScope() as scope:
             # No task group: nothing is to wait for the end of the watcher, which holds nothing.
-            watcher = asyncio.create_task(_cancel_when_gone(request, scope))
+            watchers: list[asyncio.Task[None]] = []
+            loop = asyncio.get_running_loop()
+            due = loop.call_later(_UNWATCHED_S, lambda: watchers.append(loop.create_task(_cancel_when_gone(request, scope))))
             try:
                 return await work()
             finally:
-                watcher.cancel()
+                due.cancel()
+                for watcher in watchers:
+                    watcher.cancel()
     except anyio.get_cancelled_exc_class():
         # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.
         raise Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5) from None

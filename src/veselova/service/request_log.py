@@ -97,7 +97,9 @@ class Failures:
 def _subject(scope: Scope) -> dict[str, Any]:
     """Return what was asked: the route, or the path where no route has it, in characters that are safe to print."""
     client = (scope.get("client") or (None,))[0]
-    route = get_route_name(Request(scope), should_include_root_path=False) if "app" in scope else None
+    route = getattr(scope.get("route"), "path", None)
+    if route is None and "app" in scope:  # what was refused before it reached its route
+        route = get_route_name(Request(scope), should_include_root_path=False)
     if route is None:
         return {"method": scope["method"][:20], "path": quote(scope["path"])[:_LONGEST_PATH], "client": client}
     return {"method": scope["method"][:20], "route": route, "client": client}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import orjson
 from fastapi import APIRouter, Request
 from fastapi.routing import APIRoute
 from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
 
 from veselova.service.answers import Answers
 from veselova.service.problem_details import Refused
@@ -80,12 +81,19 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
 
 
 class _Direct(APIRoute):
-    """A route whose endpoint reads the request itself: the framework looks for no parameters, which takes as long as the rest."""
+    """A route whose endpoint reads the request itself: the framework looks for no parameters, which takes as long as the rest.
 
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return the endpoint."""
-        endpoint: Callable[[Request], Coroutine[Any, Any, Response]] = self.endpoint
-        return endpoint
+    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of the application.
+    """
+
+    def __init__(self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any) -> None:
+        super().__init__(path, endpoint, **described)
+
+        async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+            response = await endpoint(Request(scope, receive, send))
+            await response(scope, receive, send)
+
+        self.app = answer
 
 
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:

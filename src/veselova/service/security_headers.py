@@ -8,7 +8,6 @@ import re
 
 from fastapi import FastAPI
 from fastapi.openapi.docs import get_swagger_ui_html
-from starlette.datastructures import MutableHeaders
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -16,12 +15,15 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 __all__ = ["SecurityHeaders", "add_documentation"]
 
 #: An answer of the service is data: nothing in it is to be run, framed or guessed at.
-_HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-}
+_HEADERS = (
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+)
+
+#: And a failure is not to be kept.
+_OF_FAILURES = (*_HEADERS, (b"cache-control", b"no-store"))
 
 
 class SecurityHeaders:
@@ -35,11 +37,10 @@ class SecurityHeaders:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in _HEADERS.items():
-                    headers.setdefault(name, value)
-                if message["status"] >= 400:
-                    headers.setdefault("Cache-Control", "no-store")
+                fields = list(message.get("headers", ()))
+                stated = {name.lower() for name, _ in fields}
+                further = _HEADERS if message["status"] < 400 else _OF_FAILURES
+                message = {**message, "headers": fields + [field for field in further if field[0] not in stated]}
             await send(message)
 
         await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
