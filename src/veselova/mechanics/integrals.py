@@ -112,11 +112,17 @@ def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
     Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
     """
     inverse = 1 / A
-    product = q[..., :, None] * q_prime[..., None, :]
-    P = product - product.swapaxes(-1, -2)
     gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])  # I_i − I_j without cancellation
     same = np.abs(gap) <= _COINCIDENT * np.maximum(inverse[:, None], inverse[None, :])
-    F = q * q + (np.where(same, 0.0, P * P) / np.where(same, 1.0, gap)).sum(axis=-1)
+    q, q_prime = _along(q), _along(q_prime)
+    product = q[:, None] * q_prime
+    P = product - product.swapaxes(0, 1)
+    P *= P
+    P[same] = 0.0
+    P /= np.where(same, 1.0, gap).reshape(gap.shape + (1,) * (P.ndim - 2))
+    F = (q * q + P.sum(axis=1)).T
+    if np.count_nonzero(same) == A.size:
+        return np.asarray(F, dtype=np.float64)
     share = same / same.sum(axis=1, keepdims=True)
     return np.asarray(F @ share.T, dtype=np.float64)
 
@@ -168,9 +174,28 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
     They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
     a symmetric eigenproblem with absolute error of a few ε·max(I_i, |q'|²), whatever coincides.
     """
-    basis = tangent_basis(q)
-    form = np.diag(1 / A) - q_prime[..., :, None] * q_prime[..., None, :]
-    return np.asarray(np.linalg.eigvalsh(basis.swapaxes(-1, -2) @ form @ basis), dtype=np.float64)
+    # In the basis of ``tangent_basis``, q⊥ seen through H = 1 − wuᵀ with w = 2u/(u,u): HDH = D + wyᵀ + ywᵀ, y = ½(u,Du)w − Du.
+    q, q_prime, diagonal = _along(q), _along(q_prime), (1 / A).reshape(-1, *(1,) * (q.ndim - 1))
+    u = q.copy()
+    u[-1] += np.where(u[-1] >= 0, 1.0, -1.0)
+    w, Du = u * (2 / (u * u).sum(axis=0)), diagonal * u
+    y = (u * Du).sum(axis=0) / 2 * w - Du
+    along = q_prime - (u * q_prime).sum(axis=0) * w
+    w, y, along = w[:-1], y[:-1], along[:-1]
+    product = w[:, None] * y
+    form = product + product.swapaxes(0, 1)
+    form -= along[:, None] * along
+    for k, entry in enumerate(diagonal[:-1]):
+        form[k, k] += entry
+    if len(form) == 2:  # as accurate, and ten times as fast for many states
+        middle, radius = (form[0, 0] + form[1, 1]) / 2, np.hypot((form[0, 0] - form[1, 1]) / 2, form[0, 1])
+        return np.stack([(middle - radius).T, (middle + radius).T], axis=-1)
+    return np.asarray(np.linalg.eigvalsh(form.T), dtype=np.float64)
+
+
+def _along(vectors: Array) -> Array:
+    """Return vectors (..., n) as (n, ...), leading axes in reverse, in memory: sums over n are then sums of long rows."""
+    return np.ascontiguousarray(vectors.T)
 
 
 class StateIntegrals:
