@@ -178,9 +178,8 @@ class Theta:
 
     def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         families = self._coordinates.families(characteristics).items()
-        self._crossings(
-            frozenset(self._codes([c for _, of in families for given in of.values() for _, c, _ in given]))
-        )  # at once
+        members = [c for _, of in families for given in of.values() for _, c, _ in given]
+        self._crossings(frozenset(self._codes(members)))  # at once
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
     def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
@@ -226,8 +225,8 @@ class Theta:
         ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
         above e^−39 of the largest: where T is large ε = ½ makes all small.
         """
-        if 2 ** len(self._split[0]) <= _FEW_CLASSES:
-            wanted = frozenset(range(2 ** len(self._split[0])))
+        if (classes := 2 ** len(self._split[0])) <= _FEW_CLASSES:
+            wanted = frozenset(range(classes))
         known = list(self._crossed)  # a copy: another thread may add to them
         if (found := next((kept for kept in known if wanted <= kept), None)) is not None:
             return self._crossed[found]

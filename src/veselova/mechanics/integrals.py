@@ -153,11 +153,21 @@ def neumann_polynomial(point: Any, inverse: Any, q_squared: Any, wedge_squared: 
 
 def tangent_basis(q: Array) -> Array:
     """Return an orthonormal basis of q⊥ as columns, shape (..., n, n−1): n−1 columns of the reflection that swaps q and ∓E_n."""
-    n = q.shape[-1]
-    u = np.array(q, dtype=np.float64)
-    u[..., -1] += np.where(u[..., -1] >= 0, 1.0, -1.0)  # the sign that adds: no cancellation
+    u = _mirror(q).T
     norm = (u * u).sum(axis=-1)[..., None, None]
-    return np.asarray(np.eye(n)[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm, dtype=np.float64)
+    return np.asarray(np.eye(q.shape[-1])[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm, dtype=np.float64)
+
+
+def _mirror(q: Array) -> Array:
+    """Return u of the reflection 1 − 2uuᵀ/(u,u) that swaps q and ∓E_n, as ``_along`` has vectors."""
+    u = np.array(_along(q), dtype=np.float64)
+    u[-1] += np.where(u[-1] >= 0, 1.0, -1.0)  # the sign that adds: no cancellation
+    return u
+
+
+def _along(vectors: Array) -> Array:
+    """Return vectors (..., n) as (n, ...), leading axes in reverse, in memory: sums over n are then sums of long rows."""
+    return np.ascontiguousarray(vectors.T)
 
 
 def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
@@ -175,27 +185,20 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
     a symmetric eigenproblem with absolute error of a few ε·max(I_i, |q'|²), whatever coincides.
     """
     # In the basis of ``tangent_basis``, q⊥ seen through H = 1 − wuᵀ with w = 2u/(u,u): HDH = D + wyᵀ + ywᵀ, y = ½(u,Du)w − Du.
-    q, q_prime, diagonal = _along(q), _along(q_prime), (1 / A).reshape(-1, *(1,) * (q.ndim - 1))
-    u = q.copy()
-    u[-1] += np.where(u[-1] >= 0, 1.0, -1.0)
+    u, velocity, diagonal = _mirror(q), _along(q_prime), (1 / A).reshape(-1, *(1,) * (q.ndim - 1))
     w, Du = u * (2 / (u * u).sum(axis=0)), diagonal * u
     y = (u * Du).sum(axis=0) / 2 * w - Du
-    along = q_prime - (u * q_prime).sum(axis=0) * w
-    w, y, along = w[:-1], y[:-1], along[:-1]
+    mirrored = velocity - (u * velocity).sum(axis=0) * w
+    w, y, mirrored = w[:-1], y[:-1], mirrored[:-1]
     product = w[:, None] * y
     form = product + product.swapaxes(0, 1)
-    form -= along[:, None] * along
+    form -= mirrored[:, None] * mirrored
     for k, entry in enumerate(diagonal[:-1]):
         form[k, k] += entry
     if len(form) == 2:  # as accurate, and ten times as fast for many states
         middle, radius = (form[0, 0] + form[1, 1]) / 2, np.hypot((form[0, 0] - form[1, 1]) / 2, form[0, 1])
         return np.stack([(middle - radius).T, (middle + radius).T], axis=-1)
     return np.asarray(np.linalg.eigvalsh(form.T), dtype=np.float64)
-
-
-def _along(vectors: Array) -> Array:
-    """Return vectors (..., n) as (n, ...), leading axes in reverse, in memory: sums over n are then sums of long rows."""
-    return np.ascontiguousarray(vectors.T)
 
 
 class StateIntegrals:

@@ -24,15 +24,19 @@ async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) ->
     """Return what the work gives; end it when the client has gone, or the server shuts down: raises Refused then."""
     try:
         with anyio.CancelScope() as scope:
-            # No task group: nothing is to wait for the end of the watcher, which holds nothing.
-            watchers: list[asyncio.Task[None]] = []
-            loop = asyncio.get_running_loop()
-            due = loop.call_later(_UNWATCHED_S, lambda: watchers.append(loop.create_task(_cancel_when_gone(request, scope))))
+            watcher: asyncio.Task[None] | None = None
+
+            def watch() -> None:
+                nonlocal watcher
+                # No task group: nothing is to wait for the end of the watcher, which holds nothing.
+                watcher = asyncio.create_task(_cancel_when_gone(request, scope))
+
+            due = asyncio.get_running_loop().call_later(_UNWATCHED_S, watch)
             try:
                 return await work()
             finally:
                 due.cancel()
-                for watcher in watchers:
+                if watcher is not None:
                     watcher.cancel()
     except anyio.get_cancelled_exc_class():
         # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.

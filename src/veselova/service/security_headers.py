@@ -38,7 +38,7 @@ class SecurityHeaders:
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 fields = list(message.get("headers", ()))
-                stated = {name.lower() for name, _ in fields}
+                stated = {name for name, _ in fields}
                 further = _HEADERS if message["status"] < 400 else _OF_FAILURES
                 message = {**message, "headers": fields + [field for field in further if field[0] not in stated]}
             await send(message)
