@@ -50,7 +50,7 @@ def main() -> None:
         integrating = (time.perf_counter() - began) * FAR / 1000
 
         solution = Solution(problem)
-        unguarded = solution.attitude(solution._fourier(False).tau1(times)[1], "angles")
+        unguarded = solution.attitude(solution.fourier_clock(False).tau1(times)[1], "angles")
         difference = np.max(np.abs(solution.states(unguarded)[2] - trajectory.frame))
         floor = problem.conditioning_floor(times)[0]
         size = trajectory.provenance.details["clock_size"]

@@ -23,6 +23,7 @@ import numpy as np
 
 import veselova as vs
 from veselova.analytic.filling import Filling
+from veselova.analytic.horizon import Horizon
 from veselova.analytic.solution import Solution
 
 
@@ -34,7 +35,7 @@ def problem(n: int) -> vs.Veselova:
 def clock(body: vs.Veselova, times: np.ndarray) -> None:
     """Take t to τ₁ as the method does, and nothing else."""
     solution = Solution(body)
-    chosen = solution.clock(times, None, "nufft")
+    chosen = Horizon(solution, times, "nufft").clock()
     Filling(times, times.size + 1, chosen, solution.in_tau1.rates, lambda tau1, z: (tau1, (tau1,))).completed()
 
 

@@ -24,6 +24,7 @@ from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.characteristic import Characteristic
 from veselova.analytic.clock import UniformClock
+from veselova.analytic.horizon import Horizon
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta
@@ -79,7 +80,7 @@ def along_orbit(genus: int, count: int) -> str:
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     clock = UniformClock(LinearFlow.of(start, rates), 1.0)
-    fewest = solution.costs(times).fewest_in_window(32, "panels")
+    fewest = Horizon(solution, times).costs.fewest_in_window(32, "panels")
 
     def evaluation(_: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)

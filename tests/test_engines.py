@@ -240,7 +240,7 @@ def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
     found = solve(problem, times)
     assert found.provenance.details["guard_digits"]
     solution = Solution(problem)
-    unguarded = solution._fourier(False)
+    unguarded = solution.fourier_clock(False)
     attitude = solution.attitude(unguarded.tau1(times)[1], "angles")
     _, _, frame = solution.states(attitude)
     floor = problem.conditioning_floor(times)

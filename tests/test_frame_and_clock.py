@@ -11,7 +11,9 @@ import pytest
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova, solve
+from veselova.analytic import fourier_clock
 from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock
+from veselova.analytic.horizon import Horizon
 from veselova.analytic.increasing import increasing_root
 from veselova.analytic.modes import grown
 from veselova.analytic.orbit import LinearFlow
@@ -91,7 +93,7 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
     for _ in range(3):
         solution = Solution(random_problem(rng, n))
         times = np.sort(rng.uniform(-80, 80, 30))
-        fourier, panels = solution.clock(times, "fourier"), solution.clock(times, "panels")
+        fourier, panels = (Horizon(solution, times).clock(name) for name in ("fourier", "panels"))
         (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
         scale = np.max(np.abs(tau_panels))
         assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
@@ -104,7 +106,7 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
 def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Generator) -> None:
     solution = Solution(random_problem(rng, n))
     means = np.sort(rng.uniform(-40, 40, 30))
-    clocks = [solution.clock(np.array([-80.0, 80.0]), name) for name in ("fourier", "panels")]
+    clocks = [Horizon(solution, np.array([-80.0, 80.0])).clock(name) for name in ("fourier", "panels")]
     (fourier, z_fourier), (panels, z_panels) = (clock.ahead(means) for clock in clocks)
     assert np.allclose(fourier, panels, rtol=0, atol=1e-12)
     assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
@@ -117,10 +119,10 @@ def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Gen
 def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Generator) -> None:
     """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at once."""
     solution = Solution(random_problem(rng, n))
-    clock = solution.clock(np.array([1.0]), "fourier")
+    clock = Horizon(solution, np.array([1.0])).clock("fourier")
     assert isinstance(clock, FourierClock)
     z = rng.uniform(-1, 1, (40, n - 1))
-    series = clock._periodic(z - solution.in_tau1.start, clock.size)[1]
+    series = clock._sum.at(z - solution.in_tau1.start)[1]
     q = solution.attitude(z, "angles").q
     A = np.array([float(a) for a in solution.moving.A])
     start = np.array([float(x) for x in solution.spectrum.q]) ** 2 @ A
@@ -130,8 +132,8 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     # What makes a step of the inverse clock one of fourth order: the derivatives of the rate along the flow.
     step = 1e-4 / np.max(np.abs(solution.in_tau1.rates))
     advance = z - solution.in_tau1.start
-    coefficients = clock._periodic(advance, clock.size)
-    before, after = (clock._periodic(advance + x * solution.in_tau1.rates, clock.size) for x in (-step, step))
+    coefficients = clock._sum.at(advance)
+    before, after = (clock._sum.at(advance + x * solution.in_tau1.rates) for x in (-step, step))
     for k in (1, 2, 3):
         slope = (after - before)[k - 1] / (2 * step) + (solution.mean_rate if k == 1 else 0)
         size = np.max(np.abs(coefficients[k]))
@@ -149,7 +151,7 @@ def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
 def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
     solution = Solution(near_separatrix(gap).problem())
     times = np.linspace(-30, 30, 41)
-    tau_fourier, tau_panels = solution.clock(times, "fourier").tau1(times)[0], solution.clock(times, "panels").tau1(times)[0]
+    tau_fourier, tau_panels = (Horizon(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels"))
     assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
 
 
@@ -214,21 +216,21 @@ def test_a_bracket_settles_what_no_step_does() -> None:
 def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """t(τ₁(t)) = t to rounding wherever the last step was allowed to end, and A's within a factor of 5 take two sums."""
     rng, sums, few = np.random.default_rng(8), [], 0
-    plain = FourierClock._periodic
+    plain = fourier_clock._Sum.at
 
-    def counted(clock: FourierClock, advance: Any, size: int) -> Any:
-        sums.append(size)
-        return plain(clock, advance, size)
+    def counted(modes: Any, advance: Any) -> Any:
+        sums.append(len(modes.orders))
+        return plain(modes, advance)
 
     for _ in range(12):
-        clock = Solution(random_problem(rng, n, spread)).clock(np.array([1.0]), "fourier")
+        clock = Horizon(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock("fourier")
         assert isinstance(clock, FourierClock)
         times = np.sort(rng.uniform(-20, 20, 40))
         together, _ = clock.tau1(times)
         off = clock.time(together) - times
         assert np.max(np.abs(off)) < 40 * np.finfo(float).eps * (1 + np.max(np.abs(times)))
         with monkeypatch.context() as patched:
-            patched.setattr(FourierClock, "_periodic", counted)
+            patched.setattr(fourier_clock._Sum, "at", counted)
             for time, tau1 in zip(times[:20], together, strict=False):
                 sums.clear()
                 alone, _ = clock.tau1(np.array([time]))
@@ -275,7 +277,7 @@ def test_modes_of_nearly_coinciding_phases_are_found(n: int, gap: float, rng: np
     """With all A's nearly equal the modes with Σm = 1 count, as far as slow differences reach, and neither Σm = 0 nor 2 does."""
     A = 1.7 * (1 + gap * np.cumsum(rng.uniform(0.5, 2, n)))
     solution = Solution(Veselova(A, rng.normal(size=n), rng.normal(size=n), normalize=True))
-    clocks = [solution.clock(np.array([0.0, 30.0]), name) for name in ("fourier", "panels")]
+    clocks = [Horizon(solution, np.array([0.0, 30.0])).clock(name) for name in ("fourier", "panels")]
     fourier, panels = (clock.tau1(np.linspace(0, 30, 50))[0] for clock in clocks)
     assert np.max(np.abs(fourier - panels)) < 1e-13
 

@@ -147,10 +147,10 @@ def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callabl
     """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving directions."""
     with spectrum.working():
         start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
-    size, at_start = (start * start) @ A, arithmetic.number(spectrum.clock_rate)
+    relative, at_start = A / ((start * start) @ A), arithmetic.number(spectrum.clock_rate)
 
     def rate(q: Values) -> Values:
-        ratio = ((q * q) @ A) / size
+        ratio = (q * q) @ relative
         power = 1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
         return np.asarray(at_start * power)
 
@@ -219,7 +219,7 @@ class UniformClock(Clock):
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
         """Return zero: nothing is integrated."""
-        return np.zeros(1)
+        return np.zeros_like(tau1)
 
     @property
     def size(self) -> int:

@@ -18,6 +18,7 @@ from veselova.analytic.balls import Balls, balls
 from veselova.analytic.clock import Clock
 from veselova.analytic.enclosed_rest import resting_series
 from veselova.analytic.enclosed_solution import EnclosedSolution
+from veselova.analytic.horizon import Horizon
 from veselova.analytic.precision import Values
 from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
@@ -70,10 +71,11 @@ class EnclosedMotion:
         if not any(self.problem.exact.tangent):
             return self._resting(grid, began)
         solution = Solution(self.problem)
-        clock = solution.clock(grid)
+        horizon = Horizon(solution, grid)
+        clock = horizon.clock()
         reach = float(np.max(np.abs(clock.tau1(grid[[0, -1]])[0])))
         method = self.method or self._cheaper(solution)
-        working = self.digits + _SPARE + math.ceil(math.log10(1 + solution.cycles(grid)))
+        working = self.digits + _SPARE + math.ceil(math.log10(1 + horizon.cycles))
         if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
             working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):

@@ -151,7 +151,7 @@ class EnclosedSolution:
 
         windows, size = None, self.moving.size
         if not (self.arithmetic.certified or self._coarse.near_separatrix):
-            cycles = self._coarse.cycles(np.array([0.0, float(times[-1] - times[0])]))
+            cycles = self._coarse.fastest * abs(float(times[-1] - times[0]))
             windows = EnclosedWindows.worth_while(times, cycles, sampled, self.arithmetic)
         while windows is not None:
             tau1, attitude, details = self._evaluated(windows.times, coarse)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
+from veselova.analytic.horizon import Horizon
 from veselova.analytic.solution import Solution
+from veselova.analytic.steepness import Steepness
 
-__all__ = ["estimated_error"]
+__all__ = ["ErrorBound"]
 
 Array = NDArray[np.float64]
 
@@ -37,32 +42,61 @@ _WIDE, _MANY = 10.0, 10_000
 _AXES_ROUNDING = 8.0
 
 
-def estimated_error(solution: Solution, times: Array, tau1: Array, clock: Clock, method: str) -> Array:
-    """Return a bound on every component of q and frame at each time, shape (N,)."""
-    steepness = solution.steepness
-    if solution.near_separatrix or not solution.is_even:  # the frame turns within a hundredth of the torus, which samples miss
-        rows = np.linspace(0, times.size - 1, min(times.size, _ON_ORBIT)).astype(int)
-        steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
-    frequencies = np.abs(solution.in_tau1.rates)
-    rounding = _GUARDED_RATE if solution.is_guarded(times) else _RATE * _EPSILON
-    # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
-    # Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are, and
-    # so does the clock.
-    at_once = _PHASE * _EPSILON * float(steepness.by_phase.sum())
-    if method != "angles":
-        at_once += float(solution.start_rounding @ steepness.by_phase) + solution.quotients.rounding
-    with_time = rounding * (float(frequencies @ steepness.by_phase) + steepness.along_flow)
-    of_clock = clock.error(tau1, _PHASE * _EPSILON + solution.start_rounding, rounding * frequencies)
-    evaluation = _EVALUATION[method] * (1.0 if method == "angles" else max(1.0, solution.largest_period))
-    error = np.abs(tau1)  # in place from here on: fresh memory costs more than sums
-    error *= with_time
-    error += of_clock * steepness.along_flow
-    if (slowness := _slowness(solution, tau1)) is not None:
-        error *= slowness
-    error += evaluation * _EPSILON + at_once
-    if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
-        error = error + _AXES_ROUNDING * solution.problem.conditioning_floor(times)
-    return np.asarray(error)
+@dataclass(frozen=True)
+class ErrorBound:
+    """A bound on every component of q and frame of one solution by one method; what does not depend on times is kept."""
+
+    solution: Solution
+    method: str
+
+    def at(self, horizon: Horizon, tau1: Array, clock: Clock) -> Array:
+        """Return the bound at each time of a horizon, (N,), from the Neumann times there."""
+        solution, steepness, at_once = self.solution, self.solution.steepness, self._at_once
+        if self._is_looked_at:
+            rows = np.linspace(0, tau1.size - 1, min(tau1.size, _ON_ORBIT)).astype(int)
+            steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
+            at_once = self._of_one_evaluation(steepness)
+        rounding = _GUARDED_RATE if horizon.is_guarded else _RATE * _EPSILON
+        error = clock.error(tau1, self._of_start, rounding * self._frequencies)  # in place: fresh memory costs more than sums
+        error *= steepness.along_flow
+        # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
+        error += np.abs(tau1) * (rounding * (float(self._frequencies @ steepness.by_phase) + steepness.along_flow))
+        if (slowness := _slowness(solution, tau1)) is not None:
+            error *= slowness
+        error += at_once
+        if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
+            error += _AXES_ROUNDING * solution.problem.conditioning_floor(horizon.times)
+        return error
+
+    @cached_property
+    def _is_looked_at(self) -> bool:
+        # There the frame turns within a hundredth of the torus, which samples miss.
+        return self.solution.near_separatrix or not self.solution.is_even
+
+    @cached_property
+    def _frequencies(self) -> Array:
+        return np.abs(self.solution.in_tau1.rates)
+
+    @cached_property
+    def _of_start(self) -> Array:
+        return _PHASE * _EPSILON + self.solution.start_rounding
+
+    @cached_property
+    def _at_once(self) -> float:
+        return self._of_one_evaluation(self.solution.steepness)
+
+    def _of_one_evaluation(self, steepness: Steepness) -> float:
+        """Return the error of one evaluation at phases that are known to a few roundings.
+
+        Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are, and
+        so does the clock.
+        """
+        solution, evaluation = self.solution, _EVALUATION[self.method]
+        result = _PHASE * _EPSILON * float(steepness.by_phase.sum())
+        if self.method == "angles":
+            return result + evaluation * _EPSILON
+        result += float(solution.start_rounding @ steepness.by_phase) + solution.quotients.rounding
+        return result + evaluation * max(1.0, solution.largest_period) * _EPSILON
 
 
 def _slowness(solution: Solution, tau1: Array) -> Array | None:

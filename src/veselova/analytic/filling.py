@@ -12,12 +12,12 @@ from veselova.analytic.clock import Clock
 from veselova.analytic.pieces import Pieces
 from veselova.analytic.trial import SUM_ROUNDING, Cells, Evaluation, Trial
 
-__all__ = ["Along", "Filling"]
+__all__ = ["AT_ONCE", "Along", "Filling"]
 
 Array = NDArray[np.float64]
 
 #: Times evaluated one by one at once. It bounds the memory.
-_TIMES = 32768
+AT_ONCE = 32768
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,9 @@ class Filling:
 
     def completed(self) -> Along:
         """Return the answer, with what is still open evaluated time by time."""
-        if self._times.size <= _TIMES and self._open.all():
-            tau1, z = self._clock.tau1(self._times)
-            return Along(tau1, self._evaluation(tau1, z)[1], self._error, int(tau1.size))
         rest = np.flatnonzero(self._open)
-        for k in range(0, rest.size, _TIMES):
-            rows = rest[k : k + _TIMES]
+        for k in range(0, rest.size, AT_ONCE):
+            rows = rest[k : k + AT_ONCE]
             tau1, z = self._clock.tau1(self._times[rows])
             _, series = self._evaluation(tau1, z)
             self._evaluations += rows.size

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -83,10 +84,10 @@ class FourierClock(Clock):
         offset = 2 * np.pi * (self._modes @ self._in_tau1.start)
         cosine, sine = np.cos(offset), np.sin(offset)
         sizes = 2 * np.stack([amplitudes, 2 * coefficients, -coefficients * pace, -coefficients * pace**2 / 3], axis=1)
+        of_products = sizes * np.stack([cosine, -sine, cosine, -sine], axis=1)
         of_squares = -sizes * np.stack([sine, cosine, sine, cosine], axis=1)
-        self._weights = np.stack([sizes * np.stack([cosine, -sine, cosine, -sine], axis=1), of_squares])
-        self._at_start = np.cumsum(np.vstack([[mean, 0.0, 0.0], -of_squares[:, 1:] / 2]), axis=0)
-        self._highest = int(np.max(np.abs(self._modes), initial=0))
+        self._sum, few = _Sum.of(mean, self._modes, of_products, of_squares), max(_FIRST_MODES, int(_FIRST_PART * len(modes)))
+        self._first = _Sum.of(mean, self._modes[:few], of_products[:few], of_squares[:few]) if few < len(modes) else None
         self._reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
         self._longest = 1 / np.maximum(np.abs(np.concatenate([pace / 2, np.pi * at_edge])), np.finfo(float).tiny)
@@ -106,7 +107,7 @@ class FourierClock(Clock):
     def ahead(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
-        return np.asarray(self._periodic(advance, self.size)[0]), (self._in_time.start + advance)[:, : self._genus]
+        return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[:, : self._genus]
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
@@ -114,9 +115,12 @@ class FourierClock(Clock):
         So are those next to them that are left out, and others are smaller. An error of phase k moves τ₁ by 2F_m 2πm_k/F_0 of it
         for as long. Errors of different modes add in squares. To these comes one rounding of δ.
         """
-        elapsed = max(abs(float(tau1[0])), abs(float(tau1[-1])))
+        elapsed = max(abs(tau1.item(0)), abs(tau1.item(-1)))
         of_all, sway = self._swayed if elapsed > self._longest_of_all else self._swayed_for(elapsed)
-        return np.abs(tau1) * (sway @ of_rates) + (of_all + sway @ of_start)
+        error = np.abs(tau1)
+        error *= sway @ of_rates
+        error += of_all + sway @ of_start
+        return error
 
     @cached_property
     def _swayed(self) -> tuple[float, Array]:
@@ -131,7 +135,7 @@ class FourierClock(Clock):
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
-        return np.asarray(self._mean * tau1 + self._periodic(self._in_tau1.advance(tau1), self.size)[0])
+        return np.asarray(self._mean * tau1 + self._sum.at(self._in_tau1.advance(tau1))[0])
 
     def _last_step(self, coefficients: Array, pace: Array) -> float:
         """Return the step of τ₁ that leaves _OPEN: of s stays |a³ − 2ab + c| s⁴, with t(τ₁+x) − t(τ₁) ∝ x + ax² + bx³ + cx⁴ …"""
@@ -141,45 +145,71 @@ class FourierClock(Clock):
         a, b, c = (float(np.sum(np.abs(coefficients * pace**k))) / (least * d) for k, d in ((1, 1), (2, 3), (3, 12)))
         return float((_OPEN / (self._fastest * (a**3 + 2 * a * b + c))) ** 0.25) if a else np.inf
 
-    def _periodic(self, advance: Array, size: int) -> Array:
-        """Return t − F_0τ₁, summed over the first ``size`` modes at z = z⁰ + advance, and t's Taylor coefficients in τ₁, (4, N).
-
-        The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
-        """
-        result = np.empty((advance.shape[0], 4))
-        modes, weights = self._modes[:size], self._weights[:, :size].reshape(-1, 4)
-        block = max(1, min(advance.shape[0], _BLOCK // max(size, 1)))
-        room = np.empty((2, size, block))
-        for first in range(0, advance.shape[0], block):
-            rows = slice(first, first + block)
-            half = waves_at(np.pi * advance[rows], modes, self._highest, room[:, :, : advance.shape[0] - first])
-            cosines, sines = half
-            cosines *= sines
-            sines *= sines
-            np.matmul(half.reshape(len(weights), half.shape[2]).T, weights, out=result[rows])
-        result[:, 1:] += self._at_start[size]
-        return result.T
-
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0; large modes come first."""
         uniform, delta = self._in_time.advance(times), np.zeros(times.size)
-        reach, least = np.full(times.size, self._reach), _LEAST_SLOPE * self._mean
+        reach, mean, rates = np.full(times.size, self._reach), self._mean, self._in_tau1.rates
 
-        def excess(delta: Array, rows: Rows, size: int = self.size) -> tuple[Array, Array]:
-            value, slope, a, b = self._periodic(uniform[rows] + delta[:, None] * self._in_tau1.rates, size)
-            value += self._mean * delta
-            # A step of fourth order is one of Newton's with this in place of the slope; far away at most twice that, or half.
-            step = value / slope
-            bent = step * (a - b * step) / (slope - a * step)
-            return value, slope * (1 - np.minimum(np.maximum(bent, -1), 0.5))
+        def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:
+            value, *rise = self._sum.at(uniform[rows] + delta[:, None] * rates)
+            value += mean * delta
+            return value, _divisor(value, *rise)
 
-        first = max(_FIRST_MODES, int(_FIRST_PART * self.size))
-        if self.size > first:  # a truncated sum need not increase: one plain step towards it is all it is good for
-            value, slope = excess(delta, slice(None), first)
-            delta = np.maximum(np.minimum(-value / np.maximum(slope, least), reach), -reach)
+        if self._first is not None:  # a truncated sum need not increase: one plain step towards it is all it is good for
+            value, *rise = self._first.at(uniform)
+            delta = np.maximum(np.minimum(-value / np.maximum(_divisor(value, *rise), _LEAST_SLOPE * mean), reach), -reach)
         delta = increasing_root(excess, delta, -reach, reach, self._settled, _SETTLED / self._fastest)
-        z = self._in_time.start + uniform + delta[:, None] * self._in_tau1.rates
-        return times / self._mean + delta, z[:, : self._genus]
+        z = self._in_time.start + uniform + delta[:, None] * rates
+        return times / mean + delta, z[:, : self._genus]
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """t − F_0τ₁ summed over M modes, and t's Taylor coefficients in τ₁.
+
+    orders (M, g) · highest: their largest entry · weights (2M, 4): what cos h sin h and sin² h of each are multiplied with,
+    h = πm·(z−z⁰) · at_start (3,): the coefficients at z⁰
+    """
+
+    orders: Integers
+    highest: int
+    weights: Array
+    at_start: Array
+
+    @classmethod
+    def of(cls, mean: float, orders: Integers, of_products: Array, of_squares: Array) -> _Sum:
+        """Return the sum from the weights (M, 4) of products and of squares."""
+        at_start = np.array([mean, 0.0, 0.0]) - of_squares[:, 1:].sum(axis=0) / 2
+        return cls(orders, int(np.max(np.abs(orders), initial=0)), np.concatenate([of_products, of_squares]), at_start)
+
+    def at(self, advance: Array) -> Array:
+        """Return the sum at z = z⁰ + advance (N, g) and the coefficients of the first three powers, shape (4, N).
+
+        The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
+        """
+        (count, _), (modes, _) = advance.shape, self.orders.shape
+        result = np.empty((count, 4))
+        block = max(1, min(count, _BLOCK // max(modes, 1)))
+        room = np.empty((2, modes, block))
+        for first in range(0, count, block):
+            rows = slice(first, first + block)
+            half = waves_at(np.pi * advance[rows], self.orders, self.highest, room[:, :, : count - first])
+            cosines, sines = half
+            cosines *= sines
+            sines *= sines
+            np.matmul(half.reshape(2 * modes, half.shape[2]).T, self.weights, out=result[rows])
+        result[:, 1:] += self.at_start
+        return result.T
+
+
+def _divisor(value: Array, slope: Array, a: Array, b: Array) -> Array:
+    """Return what a step of fourth order divides the value by, where a step of Newton's divides by the slope.
+
+    Far away it is twice that at most, or half of it.
+    """
+    step = value / slope
+    bent = step * (a - b * step) / (slope - a * step)
+    return np.asarray(slope * (1 - np.minimum(np.maximum(bent, -1), 0.5)))
 
 
 def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:

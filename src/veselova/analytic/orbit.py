@@ -73,8 +73,9 @@ class LinearFlow:
 
         x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
         """
-        product, error = exact_product(x[:, None], self.rates, self._halves)
-        return np.asarray(np.fmod(product, 2.0) + (error + x[:, None] * self.rests))
+        column = x[:, None]
+        product, error = exact_product(column, self.rates, self._halves)
+        return np.asarray(np.fmod(product, 2.0) + (error + column * self.rests))
 
     def phases(self, x: Array) -> Array:
         """Return z(x), reduced as ``advance`` is."""

@@ -6,19 +6,18 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
-from veselova.analytic.clock import Clock, ClockRate, UniformClock, clock_rate
-from veselova.analytic.costs import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs, expected_modes
+from veselova.analytic.clock import ClockRate, clock_rate
+from veselova.analytic.costs import expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
 from veselova.analytic.frame import Attitude, Frame
 from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.quotients import ThetaQuotients
@@ -28,18 +27,13 @@ from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
 from veselova.analytic.survey import FEW, Survey, drawn_phases
 from veselova.analytic.transforms import Transforms
-from veselova.analytic.trial import NODES
-from veselova.analytic.windows import FEW_TIMES, Windows
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
 from veselova.mechanics.torus_problem import TorusProblem
 
-__all__ = ["METHODS", "WIDEST_RATE", "Solution"]
+__all__ = ["WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
-
-#: The routes from phases to attitude; sums at every time, by products of matrices or transforms, are never cheaper than windows.
-METHODS = ("theta", "products", "nufft", "angles")
 
 #: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10; for g = 5 it is 24 and 8.
 _THETA_GENUS = 4
@@ -53,9 +47,6 @@ _LARGE_CANCELLATION = 10.0
 #: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still give 1e-12;
 #: and the largest genus at which theta sums are taken there.
 _NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
-
-#: Cycles from which guarded frequencies leave no digit of the phases.
-_MOST_CYCLES = 1e28
 
 #: By how much dt/dτ₁ may vary for a Fourier clock.
 WIDEST_RATE = 1e10
@@ -108,7 +99,7 @@ class Solution:
     def _rate_of_position(self) -> Callable[[Array], Array]:
         return clock_rate(self.spectrum, self.problem.time, DOUBLE)
 
-    @property
+    @cached_property
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
         narrow = NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
@@ -136,41 +127,20 @@ class Solution:
         return LinearFlow.of(self._origin, self.periods.frequencies / self.rate.mean)
 
     @cached_property
-    def _guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
+    def guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
         from veselova.analytic.guarded import guarded_flows  # loads python-flint
 
         return guarded_flows(self.spectrum, self._origin, self.problem.time)
 
-    def clock(self, times: Array, name: str | None = None, method: str | None = None) -> Clock:
-        """Return a clock for the given times: ``fourier`` or ``panels``, by cost where no name is given.
-
-        Panels take dt/dτ₁ along the orbit by ``method``, the route to the attitude.
-        """
-        cycles = self.cycles(times)
-        guarded = cycles > GUARDED_FROM
-        if not cycles <= _MOST_CYCLES:
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; frequencies are known to {GUARD_DIGITS} digits")
-        if self.problem.time == "tau1":
-            return UniformClock(self._guarded[1] if guarded else self.in_time, self.mean_rate)
-        if name is None and self.moving.rate_variation > WIDEST_RATE:
-            name = "fourier" if cycles > PANEL_CYCLES else "panels"
-        if (name or self.costs(times).cheaper_clock(self.inversions(times, method), not self.near_separatrix)) == "fourier":
-            return self._fourier(guarded)
-        if cycles > PANEL_CYCLES:
-            reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
-            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}; {reached}")
-        earliest, latest = self.windows(times, "panels", method).span
-        in_tau1, rate = self._guarded[0] if guarded else self.in_tau1, partial(self.rate_at, method=method)
-        return PanelClock(rate, self.mean_rate, in_tau1, earliest, latest)
-
-    def _fourier(self, guarded: bool) -> FourierClock:
+    def fourier_clock(self, guarded: bool) -> FourierClock:
+        """Return the Fourier clock, with guard digits or without; raises Unsolved (``beyond-floats``)."""
         if (variation := self.moving.rate_variation) > WIDEST_RATE:
             raise Unsolved(
                 "beyond-floats", f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 of its mean"
             )
         if guarded not in self._fourier_clocks:
-            flows = self._guarded if guarded else (self.in_tau1, self.in_time, self.mean_rate)
+            flows = self.guarded if guarded else (self.in_tau1, self.in_time, self.mean_rate)
             self._fourier_clocks[guarded] = FourierClock(self.rate, *flows)
         return self._fourier_clocks[guarded]
 
@@ -178,35 +148,15 @@ class Solution:
     def _fourier_clocks(self) -> dict[bool, FourierClock]:
         return {}
 
-    def is_guarded(self, times: Array) -> bool:
-        """Return whether frequencies for these times carry guard digits."""
-        return self.cycles(times) > GUARDED_FROM
-
-    def costs(self, times: Array) -> Costs:
-        """Return what the clocks cost for given times."""
-        return Costs(self.curve.genus, self.modes, self.cycles(times))
-
     @cached_property
     def modes(self) -> float:
         """Return about how many modes a Fourier clock has."""
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
         return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
-    def windows(self, times: Array, clock: str, method: str | None) -> Windows:
-        """Return the windows in which many times are interpolated where that is cheaper with the clock and the method has any."""
-        none = times.size < FEW_TIMES or method in ("products", "nufft")
-        return Windows(times, self._fastest, times.size + 1 if none else self.costs(times).fewest_in_window(NODES, clock))
-
-    def inversions(self, times: Array, method: str | None) -> int:
-        """Return how often a Fourier clock is asked at least: at every time, or at the starts of windows."""
-        return times.size if times.size < FEW_TIMES else self.windows(times, "fourier", method).inversions
-
-    def cycles(self, times: Array) -> float:
-        """Return the most cycles that any phase makes between t = 0 and the times, which increase."""
-        return self._fastest * max(abs(float(times[0])), abs(float(times[-1])))
-
     @cached_property
-    def _fastest(self) -> float:
+    def fastest(self) -> float:
+        """Return the most cycles that a phase makes in a unit of time."""
         return float(np.max(np.abs(self.in_time.rates)))
 
     @cached_property

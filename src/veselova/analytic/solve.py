@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.body_motion import BodyMotion
-from veselova.analytic.clock import Clock
-from veselova.analytic.error import estimated_error
-from veselova.analytic.filling import Along
 from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
-from veselova.analytic.solution import METHODS, Solution
+from veselova.analytic.route import METHODS, Route
+from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Series
@@ -114,66 +112,38 @@ class _TorusMotion(Motion[TorusProblem]):
         return Solution(self.problem)
 
     @cached_property
-    def _neighbours(self) -> tuple[Solution, ...]:
-        if not self._solution.separatrices:
-            return ()
-        return tuple(Solution(self.problem, sign * _DATA_ROUNDING) for sign in (1, -1))
+    def _routes(self) -> tuple[Route, ...]:
+        """Return the solution by its method, and after it, for a start on a separatrix, those of starts a rounding away."""
+        solutions, method = [self._solution], self.method or self._solution.default_method()
+        if self._solution.separatrices:
+            solutions += [Solution(self.problem, sign * _DATA_ROUNDING) for sign in (1, -1)]
+        return tuple(Route(solution, method) for solution in solutions)
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        solution, route = self._solution, self.method or self._solution.default_method()
-        clock = solution.clock(grid, self.clock, route)
-        along, error = _along(solution, clock, grid, route)
-        for neighbour in self._neighbours:
-            other = _along(neighbour, neighbour.clock(grid, self.clock, route), grid, route)[0]
-            error = np.maximum(error, np.max(np.abs(other.series[1] - along.series[1]), axis=(1, 2)))
+        route, *neighbours = self._routes
+        horizon = route.to(grid)
+        clock = horizon.clock(self.clock)
+        along, error = route.along(horizon, clock)
+        for other in neighbours:
+            there = other.to(grid)
+            moved = other.along(there, there.clock(self.clock))[0]
+            error = np.maximum(error, np.max(np.abs(moved.series[1] - along.series[1]), axis=(1, 2)))
         if not (settled := error <= _NO_DIGIT).all():
             lost = grid[~settled]
             first = lost[np.argmin(np.abs(lost))]
-            cause = "the data determine no digit there" + _OR_CANCELLATION * (route == "nufft")
+            cause = "the data determine no digit there" + _OR_CANCELLATION * (route.method == "nufft")
             raise Unsolved("no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
-        sums = None if route == "angles" else solution.transforms if route == "nufft" else solution.quotients.theta
-        costs = solution.costs(grid).estimates(solution.inversions(grid, route)) if clock.name != "uniform" else {}
+        solution = route.solution
         details = {
             "regime": solution.regime,
             "clock": clock.name,
             "clock_size": clock.size,
             "evaluations": along.evaluations,
-            "clock_estimates": costs,
-            "guard_digits": solution.is_guarded(grid),
+            "clock_estimates": horizon.costs.estimates(horizon.inversions) if clock.name != "uniform" else {},
+            "guard_digits": horizon.is_guarded,
             "quadrature_nodes": solution.periods.quadrature_nodes,
-            "theta_terms": sums.size if sums else 0,
+            "theta_terms": route.terms,
         }
         states = (along.tau1 * solution.tau1_unit, *along.series)
         series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
-        return series, self.problem.bound(series, error), route, details
-
-
-def _along(solution: Solution, clock: Clock, grid: Array, route: str) -> tuple[Along, Array]:
-    """Return the motion at the times, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
-
-    Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
-    does not.
-    """
-    windows = solution.windows(grid, clock.name, route)
-    with_coordinates = route == "angles" and windows.inversions == grid.size
-
-    def evaluation(tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
-        further: tuple[Array, ...] = ()
-        if route == "nufft":
-            attitude, rounding = solution.transforms.at(tau1, z)
-            further = (rounding,)
-        else:
-            attitude = solution.attitude(z, route)
-            if with_coordinates:
-                further = (solution.spheroconic(attitude),)
-        rate, *series = solution.states(attitude)
-        pace = solution.rate_at(z, route) if route in ("theta", "products") and not solution.is_even else 1 / rate
-        return pace, (*series, *further)
-
-    along = windows.along(clock, solution.in_tau1.rates, evaluation)
-    error = estimated_error(solution, grid, along.tau1, clock, route)
-    error += along.error
-    if route == "nufft":
-        error += along.series[2]
-        along = replace(along, series=along.series[:2])
-    return along, error
+        return series, self.problem.bound(series, error), route.method, details

@@ -73,6 +73,12 @@ class Theta:
         return list(self._coordinates.waves), self._coordinates.gaussians
 
     @cached_property
+    def _to_coordinates(self) -> Array:
+        """Return the matrix from z to y, (g, g): first the coordinates with Gaussians, then those of the waves."""
+        F, G = self._split
+        return np.asarray(self._coordinates.U[[*G, *F]].T, dtype=np.float64)
+
+    @cached_property
     def _parts(self) -> tuple[Array, Array, Array, float]:
         """Return (S, C, T_GG⁻¹, det T_GG^{−1/2})."""
         S, C, inverse = schur(self._coordinates.form(self.T), *self._split)
@@ -105,7 +111,7 @@ class Theta:
 
         |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
         """
-        wanted, y = tuple(characteristics), self._coordinates.points(z - 2 * np.rint(z / 2))
+        wanted, y = tuple(characteristics), (z - 2 * np.rint(z / 2)) @ self._to_coordinates
         if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
             blocks = self._blocks(wanted)
             return blocks.values(*self._bells(y, blocks.shifts))
@@ -119,7 +125,7 @@ class Theta:
         return result.T
 
     def _fill(self, groups: list[Group], y: Array, result: Array) -> None:
-        """Write the values of some groups at points (N, g) of our coordinates to their places, the rows of the result."""
+        """Write the values of some groups at points y (N, g) to their places, the rows of the result."""
         bells, angles, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
         for k, group in enumerate(groups):
             half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
@@ -131,11 +137,12 @@ class Theta:
 
         ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |F|) and (P, N, |G|).
         """
-        y_G = y[:, self._split[1]] + shifts[:, None, :]
+        gaussians = shifts.shape[1]
+        y_G = y[:, :gaussians] + shifts[:, None, :]
         nearest = np.rint(y_G)
         r = y_G - nearest
-        angles = np.pi * (y[:, self._split[0]] - r @ self._parts[1].T)
-        if r.shape[2] == 0:
+        angles = np.pi * (y[:, gaussians:] - r @ self._parts[1].T)
+        if not gaussians:
             return np.ones((*y_G.shape[:2], 1)), angles, nearest
         constant, linear, quadratic = self._exponents
         exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]

@@ -142,4 +142,4 @@ def in_blocks(rows: NDArray[Any], blocks: NDArray[np.intp], count: int) -> Array
 
 def _stacked(given: Array) -> Array:
     """Return the blocks (P, N, d) of N points below each other, one column each, shape (P·d, N)."""
-    return np.asarray(np.swapaxes(given, 1, 2).reshape(-1, given.shape[1]))
+    return given.swapaxes(1, 2).reshape(-1, given.shape[1])

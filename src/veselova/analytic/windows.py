@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
-from veselova.analytic.filling import Along, Filling
+from veselova.analytic.filling import AT_ONCE, Along, Filling
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.track import Track
 from veselova.analytic.trial import MOST_HALVINGS, Cells, Evaluation, Trial
@@ -107,6 +107,9 @@ class Windows:
 
     def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
+        if not self._stretches.windows and self._times.size <= AT_ONCE:
+            tau1, z = clock.tau1(self._times)
+            return Along(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
         filling = Filling(self._times, self._fewest, clock, rates, evaluation)
         if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
             cells, count = self._over_stretches(filling, clock)

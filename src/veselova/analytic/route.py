@@ -1,0 +1,85 @@
+"""One solution by one method: its states at given times, and how far they may be off. What does not depend on times is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import Clock
+from veselova.analytic.error import ErrorBound
+from veselova.analytic.filling import Along
+from veselova.analytic.horizon import Horizon
+from veselova.analytic.solution import Solution
+
+__all__ = ["METHODS", "Route"]
+
+Array = NDArray[np.float64]
+
+#: The routes from phases to attitude; sums at every time, by products of matrices or transforms, are never cheaper than windows.
+METHODS = ("theta", "products", "nufft", "angles")
+
+
+@dataclass(frozen=True)
+class Route:
+    """A solution, and the method of its attitudes."""
+
+    solution: Solution
+    method: str
+
+    def to(self, times: Array) -> Horizon:
+        """Return what the times (N,) ask for."""
+        return Horizon(self.solution, times, self.method)
+
+    def along(self, horizon: Horizon, clock: Clock) -> tuple[Along, Array]:
+        """Return the motion, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
+
+        Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
+        does not.
+        """
+        windows = horizon.windows(clock.name)
+        with_coordinates = self.method == "angles" and windows.inversions == horizon.times.size
+        evaluation = self._with_coordinates if with_coordinates else self._states
+        along = windows.along(clock, self.solution.in_tau1.rates, evaluation)
+        error = self._bound.at(horizon, along.tau1, clock)
+        error += along.error
+        if self.method == "nufft":
+            error += along.series[2]
+            along = replace(along, series=along.series[:2])
+        return along, error
+
+    @cached_property
+    def _bound(self) -> ErrorBound:
+        return ErrorBound(self.solution, self.method)
+
+    @cached_property
+    def terms(self) -> int:
+        """Return the terms of a theta sum, or of the transforms; zero in angles."""
+        if self.method == "angles":
+            return 0
+        return (self.solution.transforms if self.method == "nufft" else self.solution.quotients.theta).size
+
+    @cached_property
+    def _pace_from_rate(self) -> bool:
+        # On uneven tori dt/dτ₁ is more accurate in angles.
+        return self.method not in ("theta", "products") or self.solution.is_even
+
+    def _states(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
+        """Return dt/dτ₁, and q̇ and the frame, after them the rounding of transforms."""
+        solution = self.solution
+        further: tuple[Array, ...] = ()
+        if self.method == "nufft":
+            attitude, rounding = solution.transforms.at(tau1, z)
+            further = (rounding,)
+        else:
+            attitude = solution.attitude(z, self.method)
+        rate, *series = solution.states(attitude)
+        return 1 / rate if self._pace_from_rate else solution.rate_at(z, self.method), (*series, *further)
+
+    def _with_coordinates(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
+        """Return dt/dτ₁, and q̇, the frame and λ, in angles."""
+        attitude = self.solution.attitude(z, self.method)
+        rate, *series = self.solution.states(attitude)
+        return 1 / rate, (*series, self.solution.spheroconic(attitude))
