@@ -24,11 +24,14 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.precision import Arithmetic, Decimals, Values
 from veselova.analytic.spectrum import Spectrum
 
-__all__ = ["Clock", "ClockRate", "Rate", "clock_rate", "rate_factor"]
+__all__ = ["STRETCH_POWERS", "Clock", "ClockRate", "Rate", "clock_rate", "rate_factor"]
 
 Array = NDArray[np.float64]
 
 P = TypeVar("P", bound=AngleSeries)
+
+#: d(time)/dτ₁ is a constant times this power of √(q,Aq).
+STRETCH_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 @dataclass(frozen=True)

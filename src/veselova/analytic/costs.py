@@ -39,7 +39,7 @@ _LARGEST_EXPONENT = 70.0
 #: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
 _MODE_INVERTED, _INVERSION = 0.02e-6, 1e-6
-_PANEL_CYCLE = {1: 1.6e-5, 2: 4e-5, 3: 6e-5, 4: 1.6e-4}
+_PANEL_CYCLE = {1: 1.5e-5, 2: 2.5e-5, 3: 4e-5, 4: 6e-5}
 _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
 _HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 

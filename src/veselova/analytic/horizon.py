@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -24,18 +23,15 @@ Array = NDArray[np.float64]
 _MOST_CYCLES = 1e28
 
 
-@dataclass(frozen=True)
 class Horizon:
-    """Times (N,), increasing, at which one solution is wanted; ``method``: the route to the attitude, None for the default."""
+    """Times (N,), increasing, at which one solution is wanted; ``method``: the route to the attitude, None for the default.
 
-    solution: Solution
-    times: Array
-    method: str | None = None
+    cycles: the most that any phase makes between t = 0 and the times
+    """
 
-    @cached_property
-    def cycles(self) -> float:
-        """Return the most cycles that any phase makes between t = 0 and the times."""
-        return self.solution.fastest * max(abs(self.times.item(0)), abs(self.times.item(-1)))
+    def __init__(self, solution: Solution, times: Array, method: str | None = None) -> None:
+        self.solution, self.times, self.method = solution, times, method
+        self.cycles = solution.fastest * max(abs(times.item(0)), abs(times.item(-1)))
 
     @property
     def is_guarded(self) -> bool:

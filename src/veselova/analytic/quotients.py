@@ -77,17 +77,30 @@ class ThetaQuotients:
         return np.asarray((values / values[:, :1])[:, self.places])
 
     @cached_property
-    def constants(self) -> Array:
-        """Return the κ's in the order of the functions."""
-        half_periods = self.frame.half_periods
-        attitude = self.at_half_periods
+    def _at_half_periods(self) -> tuple[Array, Array]:
+        """Return the entries of the attitude at half periods, and θ[η]/θ there, (2^g, n + g + n·g) both."""
+        half_periods, attitude = self.frame.half_periods, self.at_half_periods
         if attitude is None:
             attitude = self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
-        raw = self._raw(self.theta.values(half_periods / 2, self.functions))
+        return exact, self._raw(self.theta.values(half_periods / 2, self.functions))
+
+    @cached_property
+    def constants(self) -> Array:
+        """Return the κ's in the order of the functions."""
+        exact, raw = self._at_half_periods
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
+
+    def peak_inverted(self, power: int) -> float:
+        """Return 1 over the largest value on the torus of a power of the stretch.
+
+        It is known at half periods, where (q',γ), which is the stretch but for a constant, is exact; that is found by least
+        squares over all of them, since an orbit takes its rounding along.
+        """
+        exact, raw = (np.abs(values[:, 2 * self.theta.genus]) for values in self._at_half_periods)
+        return float(((exact @ raw) / (raw @ raw)) ** power / np.max(exact**power))
 
     @cached_property
     def rounding(self) -> float:
@@ -100,13 +113,6 @@ class ThetaQuotients:
         T = np.asarray(periods.riemann_matrix, dtype=np.float64)
         off = DOUBLE.epsilon * max(1.0, float(np.max(periods.cancellation))) * float(np.max(np.abs(T)))
         return off / (math.e * float(np.linalg.eigvalsh(T)[0]))
-
-    def position(self, z: Array) -> Array:
-        """Return q along sorted axes at points z of shape (N, g), modulo 2."""
-        n = self.theta.genus + 1
-        constants = self.constants[:n]  # first: it makes the tables of all functions, of which those of q are rows
-        values = self.theta.values(z, [self.functions[i] for i in (0, *self.places[:n].tolist())])
-        return np.asarray(values[:, 1:] / values[:, :1] * constants)
 
     def stretch(self, z: Array) -> Array:
         """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a constant, and never zero.

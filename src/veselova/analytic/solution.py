@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.abel_jacobi import NARROW_GAP, AbelJacobi
-from veselova.analytic.clock import ClockRate, clock_rate
+from veselova.analytic.clock import STRETCH_POWERS, ClockRate, clock_rate
 from veselova.analytic.costs import expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
@@ -90,10 +90,16 @@ class Solution:
         return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
     def rate_at(self, z: Array, method: str | None = None) -> Array:
-        """Return dt/dτ₁ at phases z (N, g): from q near a separatrix, in angles on uneven tori, else as the method has it."""
+        """Return dt/dτ₁ at phases z (N, g): by theta near a separatrix, in angles on uneven tori, else as the method has it."""
         if not self.near_separatrix and (not self.is_even or (method or self.default_method()) == "angles"):
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return np.asarray(1 / self._rate_of_position(self.quotients.position(z)))
+        power = STRETCH_POWERS[self.problem.time]
+        return np.asarray(self._of_stretch * self.quotients.stretch(z) ** power) if power else np.full(len(z), self._of_stretch)
+
+    @cached_property
+    def _of_stretch(self) -> float:
+        """Return dt/dτ₁ over that power of the stretch; its largest value, at a half period, is the scale of the rate."""
+        return float(self.rate.scale) * self.quotients.peak_inverted(STRETCH_POWERS[self.problem.time])
 
     @cached_property
     def _rate_of_position(self) -> Callable[[Array], Array]:

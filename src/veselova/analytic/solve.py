@@ -128,8 +128,8 @@ class _TorusMotion(Motion[TorusProblem]):
             there = other.to(grid)
             moved = other.along(there, there.clock(self.clock))[0]
             error = np.maximum(error, np.max(np.abs(moved.series[1] - along.series[1]), axis=(1, 2)))
-        if not (settled := error <= _NO_DIGIT).all():
-            lost = grid[~settled]
+        if not error.max() <= _NO_DIGIT:  # or it is no number
+            lost = grid[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
             cause = "the data determine no digit there" + _OR_CANCELLATION * (route.method == "nufft")
             raise Unsolved("no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")

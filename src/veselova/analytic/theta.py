@@ -90,10 +90,13 @@ class Theta:
         return centred_points(self._parts[2], RADIUS)
 
     @cached_property
-    def _exponents(self) -> tuple[Array, Array, Array]:
-        """Return what −π(k−r)ᵀT_GG⁻¹(k−r) is made of, all k at once: −πkᵀT_GG⁻¹k, 2πT_GG⁻¹k, (|G|, K), and −πT_GG⁻¹."""
+    def _of_cell(self) -> tuple[Array, Array]:
+        """Return −πkᵀT_GG⁻¹k, (K,), all k at once, and what a point r of the cell is multiplied with, (|G|, K + |G| + |F|).
+
+        These are 2πT_GG⁻¹k and −πT_GG⁻¹, of which the exponents −π(k−r)ᵀT_GG⁻¹(k−r) are made, and −πC, which turns the waves.
+        """
         k, inverse = self._gaussian_lattice, -np.pi * self._parts[2]
-        return np.sum((k @ inverse) * k, axis=1), -2 * inverse @ k.T, inverse
+        return np.sum((k @ inverse) * k, axis=1), np.hstack([-2 * inverse @ k.T, inverse, -np.pi * self._parts[1].T])
 
     @property
     def cost(self) -> float:
@@ -140,13 +143,16 @@ class Theta:
         gaussians = shifts.shape[1]
         y_G = y[:, :gaussians] + shifts[:, None, :]
         nearest = np.rint(y_G)
-        r = y_G - nearest
-        angles = np.pi * (y[:, gaussians:] - r @ self._parts[1].T)
         if not gaussians:
-            return np.ones((*y_G.shape[:2], 1)), angles, nearest
-        constant, linear, quadratic = self._exponents
-        exponents = constant + r @ linear + ((r @ quadratic) * r).sum(axis=2)[:, :, None]
-        return np.exp(np.where(exponents > _VANISHING, exponents, -np.inf)), angles, nearest
+            return np.ones((*y_G.shape[:2], 1)), np.pi * y[None], nearest
+        constant, of_cell = self._of_cell
+        r, ends = y_G - nearest, (constant.size, constant.size + gaussians)
+        made = r @ of_cell
+        angles = np.pi * y[:, gaussians:] + made[:, :, ends[1] :]
+        exponents = constant + made[:, :, : ends[0]]
+        exponents += (made[:, :, ends[0] : ends[1]] * r).sum(axis=2, keepdims=True)
+        exponents[exponents <= _VANISHING] = -np.inf
+        return np.exp(exponents, out=exponents), angles, nearest
 
     @cached_property
     def _size_in_blocks(self) -> int:

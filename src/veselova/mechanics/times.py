@@ -27,8 +27,7 @@ def validated_times(times: Any) -> Array:
         array = to_float(exact_vector(times, ("times",)))
     if array.size == 0:
         raise InvalidInput(("times",), "at least one time", "none")
-    falls = array[1:] <= array[:-1]
-    if falls.any():
+    if array.size > 1 and (falls := array[1:] <= array[:-1]).any():
         i = int(np.argmax(falls)) + 1
         raise InvalidInput(
             ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))

@@ -120,7 +120,7 @@ class Veselova(TorusProblem):
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
         return f"Veselova({', '.join(parts)})".replace("\n", "")
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Return whether the body moves at all (q̇ ≠ 0)."""
         return bool(self.q_dot.any())
