@@ -10,7 +10,7 @@ import pytest
 
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
-from veselova import Veselova, solve
+from veselova import EllipsoidGeodesic, Veselova, solve
 from veselova.analytic import fourier_clock
 from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock
 from veselova.analytic.horizon import Horizon
@@ -138,6 +138,20 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
         slope = (after - before)[k - 1] / (2 * step) + (solution.mean_rate if k == 1 else 0)
         size = np.max(np.abs(coefficients[k]))
         assert np.allclose(slope, k * coefficients[k], rtol=0, atol=1e-5 * size)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("time", ["t", "s"])
+def test_two_theta_functions_give_the_rate_that_angles_give(n: int, time: str, rng: np.random.Generator) -> None:
+    """dt/dτ₁ is a power of |θ[η(0)]/θ|; what all places share, and an orbit adds up, is less than they scatter."""
+    for _ in range(4):
+        body = random_problem(rng, n, 5.0)
+        problem = body if time == "t" else EllipsoidGeodesic(body.A, body.q, body.q_dot, normalize=True)
+        solution, z = Solution(problem), rng.uniform(0, 2, (200, n - 1))
+        assert solution.problem.time == time
+        off = solution.rate_at(z, "theta") / solution.rate_at(z, "angles") - 1
+        assert np.max(np.abs(off)) < 40 * np.finfo(float).eps
+        assert abs(np.mean(off)) < 4 * np.finfo(float).eps
 
 
 def test_the_mean_rate_is_an_average_over_the_orbit() -> None:

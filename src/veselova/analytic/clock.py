@@ -184,7 +184,7 @@ class Clock(ABC):
 
     @abstractmethod
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0, (N,), or (1,) for all times.
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0, (N,), the caller's own.
 
         of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some m·f nearly vanishes.
         """

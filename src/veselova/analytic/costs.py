@@ -36,10 +36,12 @@ _HIGH_BODY = 0.29
 #: Modes of a clock that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
 
-#: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels and of an evaluation.
+#: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels, by theta functions or in
+#: angles, and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
 _MODE_INVERTED, _INVERSION = 0.02e-6, 1e-6
 _PANEL_CYCLE = {1: 1.5e-5, 2: 2.5e-5, 3: 4e-5, 4: 6e-5}
+_PANEL_CYCLE_IN_ANGLES = {1: 1.6e-5, 2: 1.5e-4, 3: 3e-4, 4: 5e-4}
 _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
 _HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
 
@@ -58,11 +60,15 @@ def expected_modes(genus: int, log_determinant: float) -> float:
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of an orbit over so many cycles of its fastest phase; ``modes`` is about how many the Fourier clock has."""
+    """The costs of an orbit over so many cycles of its fastest phase.
+
+    modes: about how many the Fourier clock has · in_angles: whether panels take dt/dτ₁ from angles, not from theta functions
+    """
 
     genus: int
     modes: float
     cycles: float
+    in_angles: bool = False
 
     def fewest_in_window(self, nodes: int, clock: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""
@@ -78,7 +84,8 @@ class Costs:
         if self.cycles > PANEL_CYCLES:
             return math.inf
         cycles = self.cycles if self.cycles < _LONG_STRETCH else _PROBES + _LONGER_PANELS * self.cycles
-        of_panels = (cycles + _PANEL_MARGIN) * _PANEL_CYCLE.get(self.genus, _HIGH_PANEL_CYCLE)
+        of_cycles = (_PANEL_CYCLE_IN_ANGLES if self.in_angles else _PANEL_CYCLE).get(self.genus, _HIGH_PANEL_CYCLE)
+        of_panels = (cycles + _PANEL_MARGIN) * of_cycles
         return of_panels + inversions * _PANEL_INVERSION
 
     def estimates(self, inversions: int) -> dict[str, float]:

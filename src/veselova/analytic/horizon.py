@@ -41,7 +41,8 @@ class Horizon:
     @cached_property
     def costs(self) -> Costs:
         """Return what the clocks cost."""
-        return Costs(self.solution.curve.genus, self.solution.modes, self.cycles)
+        solution = self.solution
+        return Costs(solution.curve.genus, solution.modes, self.cycles, solution.takes_rate_from_angles(self.method))
 
     @cached_property
     def inversions(self) -> int:

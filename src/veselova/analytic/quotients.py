@@ -77,21 +77,22 @@ class ThetaQuotients:
         return np.asarray((values / values[:, :1])[:, self.places])
 
     @cached_property
-    def _at_half_periods(self) -> tuple[Array, Array]:
-        """Return the entries of the attitude at half periods, and θ[η]/θ there, (2^g, n + g + n·g) both."""
+    def constants(self) -> Array:
+        """Return the κ's in the order of the functions."""
+        return self._from_half_periods[0]
+
+    @cached_property
+    def _from_half_periods(self) -> tuple[Array, Array, Array]:
+        """Return the κ's, and (q',γ) and the quotient of its function at all half periods, (2^g,) both."""
         half_periods, attitude = self.frame.half_periods, self.at_half_periods
         if attitude is None:
             attitude = self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
-        return exact, self._raw(self.theta.values(half_periods / 2, self.functions))
-
-    @cached_property
-    def constants(self) -> Array:
-        """Return the κ's in the order of the functions."""
-        exact, raw = self._at_half_periods
+        raw = self._raw(self.theta.values(half_periods / 2, self.functions))
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
-        columns = np.arange(raw.shape[1])
-        return np.asarray(exact[best, columns] / raw[best, columns])
+        columns, of_stretch = np.arange(raw.shape[1]), 2 * self.theta.genus
+        constants = np.asarray(exact[best, columns] / raw[best, columns])
+        return constants, exact[:, of_stretch].copy(), raw[:, of_stretch].copy()
 
     def peak_inverted(self, power: int) -> float:
         """Return 1 over the largest value on the torus of a power of the stretch.
@@ -99,7 +100,7 @@ class ThetaQuotients:
         It is known at half periods, where (q',γ), which is the stretch but for a constant, is exact; that is found by least
         squares over all of them, since an orbit takes its rounding along.
         """
-        exact, raw = (np.abs(values[:, 2 * self.theta.genus]) for values in self._at_half_periods)
+        exact, raw = map(np.abs, self._from_half_periods[1:])
         return float(((exact @ raw) / (raw @ raw)) ** power / np.max(exact**power))
 
     @cached_property

@@ -91,10 +91,14 @@ class Solution:
 
     def rate_at(self, z: Array, method: str | None = None) -> Array:
         """Return dt/dτ₁ at phases z (N, g): by theta near a separatrix, in angles on uneven tori, else as the method has it."""
-        if not self.near_separatrix and (not self.is_even or (method or self.default_method()) == "angles"):
+        if self.takes_rate_from_angles(method):
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         power = STRETCH_POWERS[self.problem.time]
         return np.asarray(self._of_stretch * self.quotients.stretch(z) ** power) if power else np.full(len(z), self._of_stretch)
+
+    def takes_rate_from_angles(self, method: str | None = None) -> bool:
+        """Return whether ``rate_at`` inverts z to angles."""
+        return not self.near_separatrix and (not self.is_even or (method or self.default_method()) == "angles")
 
     @cached_property
     def _of_stretch(self) -> float:

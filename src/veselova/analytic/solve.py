@@ -112,19 +112,22 @@ class _TorusMotion(Motion[TorusProblem]):
         return Solution(self.problem)
 
     @cached_property
-    def _routes(self) -> tuple[Route, ...]:
-        """Return the solution by its method, and after it, for a start on a separatrix, those of starts a rounding away."""
-        solutions, method = [self._solution], self.method or self._solution.default_method()
-        if self._solution.separatrices:
-            solutions += [Solution(self.problem, sign * _DATA_ROUNDING) for sign in (1, -1)]
-        return tuple(Route(solution, method) for solution in solutions)
+    def _route(self) -> Route:
+        return Route(self._solution, self.method or self._solution.default_method())
+
+    @cached_property
+    def _neighbours(self) -> tuple[Route, ...]:
+        """Return the same from starts a rounding away, where the start is on a separatrix."""
+        if not self._solution.separatrices:
+            return ()
+        return tuple(Route(Solution(self.problem, sign * _DATA_ROUNDING), self._route.method) for sign in (1, -1))
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        route, *neighbours = self._routes
+        route = self._route
         horizon = route.to(grid)
         clock = horizon.clock(self.clock)
         along, error = route.along(horizon, clock)
-        for other in neighbours:
+        for other in self._neighbours:
             there = other.to(grid)
             moved = other.along(there, there.clock(self.clock))[0]
             error = np.maximum(error, np.max(np.abs(moved.series[1] - along.series[1]), axis=(1, 2)))
