@@ -62,9 +62,9 @@ class Route:
         return (self.solution.transforms if self.method == "nufft" else self.solution.quotients.theta).size
 
     @cached_property
-    def _pace_from_rate(self) -> bool:
-        # On uneven tori dt/dτ₁ is more accurate in angles.
-        return self.method not in ("theta", "products") or self.solution.is_even
+    def _pace_in_angles(self) -> bool:
+        # Windows alone ask for dt/dτ₁: products and nufft have none, and angles have it from the attitude.
+        return self.method == "theta" and self.solution.takes_rate_from_angles(self.method)
 
     def _states(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
         """Return dt/dτ₁, and q̇ and the frame, after them the rounding of transforms."""
@@ -76,7 +76,7 @@ class Route:
         else:
             attitude = solution.attitude(z, self.method)
         rate, *series = solution.states(attitude)
-        return 1 / rate if self._pace_from_rate else solution.rate_at(z, self.method), (*series, *further)
+        return solution.rate_at(z, self.method) if self._pace_in_angles else 1 / rate, (*series, *further)
 
     def _with_coordinates(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
         """Return dt/dτ₁, and q̇, the frame and λ, in angles."""

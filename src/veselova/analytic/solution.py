@@ -93,8 +93,7 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g): by theta near a separatrix, in angles on uneven tori, else as the method has it."""
         if self.takes_rate_from_angles(method):
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        power = STRETCH_POWERS[self.problem.time]
-        return np.asarray(self._of_stretch * self.quotients.stretch(z) ** power) if power else np.full(len(z), self._of_stretch)
+        return np.asarray(self._of_stretch * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
 
     def takes_rate_from_angles(self, method: str | None = None) -> bool:
         """Return whether ``rate_at`` inverts z to angles."""
