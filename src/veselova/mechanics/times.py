@@ -21,18 +21,17 @@ MOST_TIMES = 10_000_000
 
 def validated_times(times: Any) -> Array:
     """Return the times as a read-only float64 array; raises InvalidInput unless finite and strictly increasing."""
-    if _are_doubles(times) and np.isfinite(array := np.array(times)).all():
-        array.setflags(write=False)
-    else:
-        array = to_float(exact_vector(times, ("times",)))
+    array = np.array(times) if _are_doubles(times) else to_float(exact_vector(times, ("times",)))
+    array.setflags(write=False)
+    # NaN is greater than nothing: where each is greater than the one before it, all are finite if the first and the last are.
+    if array.size and (array[1:] > array[:-1]).all() and np.isfinite(array[[0, -1]]).all():
+        return array
+    if not np.isfinite(array).all():
+        exact_vector(times, ("times",))  # raises, and says which is not
     if array.size == 0:
         raise InvalidInput(("times",), "at least one time", "none")
-    if array.size > 1 and (falls := array[1:] <= array[:-1]).any():
-        i = int(np.argmax(falls)) + 1
-        raise InvalidInput(
-            ("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i]))
-        )
-    return array
+    i = int(np.argmax(array[1:] <= array[:-1])) + 1
+    raise InvalidInput(("times", i), f"a time greater than the one before it ({float(array[i - 1])!r})", repr(float(array[i])))
 
 
 def _are_doubles(times: Any) -> bool:
