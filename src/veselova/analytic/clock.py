@@ -183,8 +183,9 @@ class Clock(ABC):
         """Return t at Neumann times."""
 
     @abstractmethod
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0, (N,), the caller's own.
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array | float, float]:
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0: what does not grow, (N,) or one for all
+        times, and what is to be multiplied with |τ₁|.
 
         of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some m·f nearly vanishes.
         """
@@ -220,9 +221,9 @@ class UniformClock(Clock):
         """Return τ₁ in the problem's unit."""
         return self._rate * tau1
 
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
         """Return zero: nothing is integrated."""
-        return np.zeros_like(tau1)
+        return 0.0, 0.0
 
     @property
     def size(self) -> int:

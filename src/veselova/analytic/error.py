@@ -57,10 +57,11 @@ class ErrorBound:
             steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
             at_once = self._of_one_evaluation(steepness)
         rounding = _GUARDED_RATE if horizon.is_guarded else _RATE * _EPSILON
-        error = clock.error(tau1, self._of_start, rounding * self._frequencies)  # in place: fresh memory costs more than sums
-        error *= steepness.along_flow
+        of_clock, drift = clock.error(tau1, self._of_start, rounding * self._frequencies)
         # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
-        error += np.abs(tau1) * (rounding * (float(self._frequencies @ steepness.by_phase) + steepness.along_flow))
+        error = np.abs(tau1)  # and in place from here on: fresh memory costs more than sums
+        error *= rounding * float(self._frequencies @ steepness.by_phase) + (rounding + drift) * steepness.along_flow
+        error += of_clock * steepness.along_flow
         if (slowness := _slowness(solution, tau1)) is not None:
             error *= slowness
         error += at_once

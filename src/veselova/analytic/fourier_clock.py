@@ -109,7 +109,7 @@ class FourierClock(Clock):
         advance = self._in_time.advance(means)
         return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[:, : self._genus]
 
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
 
         So are those next to them that are left out, and others are smaller. An error of phase k moves τ₁ by 2F_m 2πm_k/F_0 of it
@@ -117,10 +117,7 @@ class FourierClock(Clock):
         """
         elapsed = max(abs(tau1.item(0)), abs(tau1.item(-1)))
         of_all, sway = self._swayed if elapsed > self._longest_of_all else self._swayed_for(elapsed)
-        error = np.abs(tau1)
-        error *= sway @ of_rates
-        error += of_all + sway @ of_start
-        return error
+        return of_all + float(sway @ of_start), float(sway @ of_rates)
 
     @cached_property
     def _swayed(self) -> tuple[float, Array]:

@@ -74,20 +74,20 @@ class PanelClock(Clock):
             self.panels = integrated(self._rate, self.in_tau1, low, high)
         return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share.
 
         What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
         """
-        elapsed, panels = np.abs(tau1), self.panels
+        panels = self.panels
         # The tails are those of t; divided by the mean rate they are those of τ₁.
-        error = panels.error(tau1) / panels.mean_size + _SHARED_ROUNDING * elapsed
+        error = panels.error(tau1) / panels.mean_size
         # The fastest phase has no part in them where it takes orders that are not there to make up for it.
         rates = np.abs(self.in_tau1.rates)
         slow = _HIGHEST * (rates.sum() - rates) >= rates
         if slow.any():
-            error += _TURN * self._drift(tau1) * (float(of_start @ slow) + float(of_rates @ slow) * elapsed)
-        return np.asarray(error)
+            error += _TURN * self._drift(tau1) * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
+        return np.asarray(error), _SHARED_ROUNDING
 
     def _drift(self, tau1: Array) -> Array:
         """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero and Neumann times, (N,)."""

@@ -91,6 +91,7 @@ class SeparableOrbit:
         """Return a bound on the error of q and the lines, (N,), and that of τ; ``further`` is added to the steepness."""
         rates, elapsed = np.abs(self.in_tau.rates), np.abs(tau)
         start = _PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation
-        along = _RATE * DOUBLE.epsilon * elapsed + clock.error(tau, start, _RATE * DOUBLE.epsilon * rates)
+        of_clock, drift = clock.error(tau, start, _RATE * DOUBLE.epsilon * rates)
+        along = (_RATE * DOUBLE.epsilon + drift) * elapsed + of_clock
         phase = start + along[:, None] * rates
         return np.asarray(_EVALUATION * DOUBLE.epsilon + phase @ (self.steepness + further)), np.asarray(along)

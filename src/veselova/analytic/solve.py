@@ -147,6 +147,6 @@ class _TorusMotion(Motion[TorusProblem]):
             "quadrature_nodes": solution.periods.quadrature_nodes,
             "theta_terms": route.terms,
         }
-        states = (along.tau1 * solution.tau1_unit, *along.series)
+        states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
         series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
         return series, self.problem.bound(series, error), route.method, details
