@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ import pytest
 from draws import random_problem
 from problems import TABLE, Case, tagged
 from veselova import NeumannSystem, solve
-from veselova.analytic import track
+from veselova.analytic import pieces, track
 from veselova.analytic.costs import Costs, expected_modes
 from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
@@ -148,3 +151,42 @@ def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     far, alone = (solve_analytic(problem, times, clock="panels") for times in (np.append(-7000 * cycle, near), near))
     difference = np.max(np.abs(far.frame[1:] - alone.frame), axis=(1, 2))
     assert np.all(difference <= SLACK * (far.error[1:] + alone.error))
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.75, -3.0, 3e5, -(2.0**40)])
+def test_times_next_to_borders_are_placed_as_if_these_were_not_rounded(begin: float) -> None:
+    offsets = np.sort(np.random.default_rng(6).uniform(0, 3, 200))
+    sums = begin + offsets
+    times = np.unique(np.concatenate([sums, np.nextafter(sums, np.inf), np.nextafter(sums, -np.inf)]))
+    found = pieces._first_from(times, np.full(200, begin), offsets)
+    exact = [Fraction(t) for t in times.tolist()]
+    expected = [next(i for i, t in enumerate(exact) if t >= Fraction(begin) + Fraction(o)) for o in offsets.tolist()]
+    assert found.tolist() == expected
+
+
+def test_the_first_step_in_a_piece_is_of_fourth_order() -> None:
+    slope, a, b = 2.0, 0.3, -0.2
+
+    def left(h: float) -> float:
+        value = -slope * (h + a * h**2 + b * h**3)
+        return abs(float(pieces._step(np.array([[value]]), np.array([[slope, 2 * slope * a, 3 * slope * b]]))[0, 0]) + h)
+
+    assert 14 < left(0.02) / left(0.01) < 18
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts what glibc asks the system for")
+def test_temporaries_stay_in_the_process() -> None:
+    code = """
+import resource
+import numpy as np
+from veselova import Veselova, solve
+
+for k in range(8):
+    problem = Veselova(A=[4, 3, 2, 1 + k / 100], q=[1, 1, 1, 1], q_dot=[0.3, -0.7, 0.4, 0], normalize=True)
+    if k == 4:
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    solve(problem, np.linspace(0, 100, 1000))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+    asked = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(asked.stdout) < 300  # a dozen; a thousand and more where every temporary comes anew

@@ -15,6 +15,7 @@ from veselova.analytic.trial import SUM_ROUNDING, Cells, Evaluation, Trial
 __all__ = ["AT_ONCE", "Along", "Filling"]
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 #: Times evaluated one by one at once. It bounds the memory.
 AT_ONCE = 32768
@@ -90,15 +91,15 @@ class Filling:
         cells, first, last, places = cells[held], first[held], last[held], places[: len(cells)][held]
         trial = self.trial(cells, z[places])
         pieces, tails = trial.in_pieces(count)
-        settled = trial.settled(tails)
-        for w in np.flatnonzero(settled).tolist():
-            rows = slice(first[w], last[w])
-            since = (self._times[rows] - cells.starts[w]) - ahead[places[w]]
-            self.fill(rows, pieces, w, since, tails[w])
-        return Cells(cells.length, cells.starts, tails)[~settled]
+        done = trial.settled(tails)
+        self.fill(pieces[done], first[done], last[done], cells.starts[done], ahead[places][done], tails[done])
+        return Cells(cells.length, cells.starts, tails)[~done]
 
-    def fill(self, rows: slice, pieces: Pieces, window: int, since: Array, tail: float) -> None:
-        """Fill the times of one window, ``since`` its start."""
-        pieces.fill(window, since, self._states[:, rows])
-        self._open[rows] = False
-        self._error[rows] = 2 * tail + SUM_ROUNDING
+    def fill(self, pieces: Pieces, first: Places, last: Places, starts: Array, ahead: Array, tails: Array) -> None:
+        """Fill the times, from the first up to the last, of W windows, which start at starts + ahead; (W,) all of them."""
+        begins = np.flatnonzero(first != np.append(-1, last[:-1])).tolist()
+        for run in map(slice, begins, [*begins[1:], first.size]):  # windows that adjoin
+            rows = slice(first[run][0], last[run][-1])
+            pieces[run].fill(self._times[rows], starts[run], ahead[run], self._states[:, rows])
+            self._open[rows] = False
+            self._error[rows] = np.repeat(2 * tails[run] + SUM_ROUNDING, (last - first)[run])

@@ -24,18 +24,21 @@ Array = NDArray[np.float64]
 #: Coefficients of a piece in time.
 ORDER = 20
 
-#: A Newton step of this size, in half pieces, leaves an error of its square.
-_SETTLED = 1e-9
+#: A Newton step of this size, in half pieces, leaves an error of a fifth of its square at most.
+_SETTLED = 2e-8
 
-#: Times whose powers are formed at once: they stay in the cache.
-_TIMES = 4096
+#: Times that are placed in their pieces at once, and of which powers are formed at once: they stay in the cache.
+#: No power of two: rows so far apart take turns in the same places of a cache.
+_PLACED, _TIMES = 64000, 4000
 
 
 #: Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
 _X, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(ORDER)), DOUBLE.cosine_series(np.eye(ORDER)).T
-#: Integrals of T_0 … T_{ORDER−1} over [−1, 1], and x^0 … x^ORDER at the points.
+#: Integrals of T_0 … T_{ORDER−1} over [−1, 1].
 _INTEGRALS = np.array([2 / (1 - k * k) if k % 2 == 0 else 0.0 for k in range(ORDER)])
+#: x^0 … x^ORDER at the points; of those before the last, the coefficients of their Taylor series there as well, to the second.
 _AT_POINTS = polynomial.polyvander(_X, ORDER).T
+_EXPANDED = np.hstack([_AT_POINTS[:-1], *(polynomial.polyval(_X, polynomial.polyder(np.eye(ORDER), m)) / m for m in (1, 2))])
 #: From Chebyshev coefficients to those of powers.
 _TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
 
@@ -52,7 +55,7 @@ class Pieces:
     """The pieces of W windows.
 
     borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers; the first row is the part of
-    the window's Neumann time that has passed · tails (W,) the largest of the last Chebyshev coefficients
+    the window's Neumann time that has passed · tails (W,) the largest of the last Chebyshev coefficients, against their sizes
     """
 
     borders: Array
@@ -60,8 +63,11 @@ class Pieces:
     tails: Array
 
     @classmethod
-    def of(cls, rates: Array, series: Array, stretch: float, count: int) -> Pieces:
-        """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns)."""
+    def of(cls, rates: Array, series: Array, sizes: Array, stretch: float, count: int) -> Pieces:
+        """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns).
+
+        sizes (columns,) of the series · stretch: how long a window is in τ₁
+        """
         windows, nodes = rates.shape
         restriction, half = _restriction(nodes, count), stretch / (2 * count)
         pace = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
@@ -75,8 +81,8 @@ class Pieces:
             return np.asarray(value - target[rows]), np.asarray(rise)
 
         one = np.ones_like(target)
-        with np.errstate(all="ignore"):  # a first step of Newton's from the same points everywhere is a product of matrices
-            guess = np.clip(_X - (elapsed.T @ _AT_POINTS - target) / (slope.T @ _AT_POINTS[:-1]), -1, 1)
+        with np.errstate(all="ignore"):
+            guess = np.clip(_X - _step(elapsed.T @ _AT_POINTS - target, slope.T @ _EXPANDED), -1, 1)
         x = increasing_root(excess, guess, -one, one, _SETTLED)
         in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
         # Points first: the matrices that are the same for all pieces take them at once.
@@ -86,32 +92,64 @@ class Pieces:
         coefficients = _TO_COEFFICIENTS @ at_times.reshape(ORDER, -1)
         borders = np.zeros((windows, count + 1))
         np.cumsum(durations.reshape(windows, count), axis=1, out=borders[:, 1:])
-        tails = np.max(np.abs(coefficients[-3:]).reshape(3, windows, -1), axis=(0, 2))
+        last = np.max(np.abs(coefficients[-3:]).reshape(3, windows, count, -1), axis=(0, 2))
+        tails = np.max(last / np.append(1.0, sizes), axis=1)
         tables = (coefficients.T @ _TO_POWERS.T).reshape(windows, count, -1, ORDER)
         return cls(borders, np.asarray(tables), tails)
 
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> Pieces:
-        return self if np.all(chosen) else Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
+    def __getitem__(self, chosen: slice | NDArray[np.bool_]) -> Pieces:
+        if isinstance(chosen, np.ndarray) and chosen.all():
+            return self
+        return Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
-    def fill(self, window: int, since: Array, out: Array) -> None:
-        """Fill ``out`` (C, N) with the series at increasing times since the start of a window."""
-        borders, scale = self.borders[window], 2 / np.diff(self.borders[window])
-        for first in range(0, since.size, _TIMES):
-            block = since[first : first + _TIMES]
-            ends = [0, *np.searchsorted(block, borders[1:-1]).tolist(), block.size]
-            counts = np.diff(ends)
-            x = block - np.repeat(borders[:-1], counts)
-            x *= np.repeat(scale, counts)
+    def fill(self, times: Array, starts: Array, ahead: Array, out: Array) -> None:
+        """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start at starts + ahead, (W,) both.
+
+        Starts of few bits are taken from the times exactly; only then comes what has all its digits.
+        """
+        begins = np.repeat(starts, self.borders.shape[1] - 1)
+        offsets, scales = (ahead[:, None] + self.borders[:, :-1]).ravel(), (2 / np.diff(self.borders)).ravel()
+        ends = np.append(_first_from(times, begins[1:], offsets[1:]), times.size)
+        for first in range(0, times.size, _PLACED):
+            block = times[first : first + _PLACED]
+            counts = np.diff(np.clip(ends - first, 0, block.size), prepend=0)
+            x = block - np.repeat(begins, counts)
+            x -= np.repeat(offsets, counts)
+            x *= np.repeat(scales, counts)
             x -= 1
-            powers = _powers(x)
-            for table, begin, end in zip(self.tables[window], ends[:-1], ends[1:], strict=True):
-                if begin < end:
-                    np.matmul(table, powers[:, begin:end], out=out[:, first + begin : first + end])
+            self._sum(x, counts, out[:, first : first + block.size])
+
+    def _sum(self, x: Array, counts: NDArray[np.intp], out: Array) -> None:
+        """Fill ``out`` (C, N) with the sums of powers at x (N,), so many of them in each piece."""
+        tables, ends = self.tables.reshape(-1, *self.tables.shape[2:]), np.cumsum(counts)
+        cuts = np.unique(np.concatenate([[0], ends, np.arange(0, x.size, _TIMES)]))
+        pieces, room = np.searchsorted(ends, cuts[:-1], side="right").tolist(), np.empty((ORDER, min(x.size, _TIMES)))
+        for piece, begin, end in zip(pieces, cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+            if begin % _TIMES == 0:
+                base, powers = begin, _powers(x[begin : begin + _TIMES], room)
+            np.matmul(tables[piece], powers[:, begin - base : end - base], out=out[:, begin:end])
 
 
-def _powers(x: Array) -> Array:
-    """Return x^0 … x^{ORDER−1}, the order first."""
-    result = np.empty((ORDER, x.size))
+def _first_from(times: Array, begins: Array, offsets: Array) -> NDArray[np.intp]:
+    """Return the first of increasing times that is not before each begin + offset, as if these were not rounded."""
+    sums = begins + offsets
+    rounded_down = offsets > sums - begins  # the difference is exact, as in a sum by Dekker
+    return np.maximum.accumulate(np.searchsorted(times, np.where(rounded_down, np.nextafter(sums, np.inf), sums)))
+
+
+def _step(value: Array, expanded: Array) -> Array:
+    """Return a first step of fourth order from the same points everywhere, where it is made by products of matrices.
+
+    It reverts value + s(x + ax² + bx³); ``expanded`` has the Taylor coefficients s, 2sa and 3sb of the slope side by side.
+    """
+    slope, twice, thrice = np.split(expanded, 3, axis=1)
+    step, a, b = value / slope, twice / (2 * slope), thrice / (3 * slope)
+    return np.asarray(step * (1 + step * (a + step * (2 * a * a - b))))
+
+
+def _powers(x: Array, room: Array) -> Array:
+    """Return x^0 … x^{ORDER−1}, the order first, in the room for as many or more."""
+    result = room[:, : x.size]
     result[0], result[1] = 1.0, x
     for k in range(2, ORDER):
         np.multiply(result[k - 1], x, out=result[k])

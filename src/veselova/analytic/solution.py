@@ -246,9 +246,10 @@ class Solution:
     def states(self, attitude: Attitude) -> tuple[Array, Array, Array]:
         """Return dτ₁/dt, q̇ and the frame along the problem's principal axes."""
         rate, moving, n = self._rate_of_position(attitude.q), self.moving, self.problem.n
-        frame = np.empty((attitude.q.shape[0], n, n))
+        (count, along, genus), frame = attitude.normals.shape, np.empty((attitude.q.shape[0], n, n))
+        turned = attitude.normals.reshape(-1, genus) @ self.rotation  # one product, not one for every time
         frame[:, :, 0] = attitude.q @ moving.directions.T
-        frame[:, :, 1:] = moving.directions @ (attitude.normals @ self.rotation)
+        frame[:, :, 1:] = moving.directions @ turned.reshape(count, along, -1)
         if moving.frozen:
             frame[:, :, 1:] += self._frozen_part
         return rate, (attitude.q_prime @ moving.directions.T) * rate[:, None], frame

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,17 +72,9 @@ class Track:
 
     def fill(self, times: Array, panels: Panels) -> None:
         """Fill the answer at increasing times within the windows."""
-        for part, w, left in self._windows():
-            k = int(np.searchsorted(panels.borders, left))
-            low, high = panels.values[k : k + 2]
-            first, last = np.searchsorted(times, [low, high])
-            if high == panels.values[-1]:
-                last = times.size
-            if first < last:
-                rows = slice(int(first), int(last))
-                self._filling.fill(rows, part.pieces, w, times[rows] - low, part.tails[w])
-
-    def _windows(self) -> Iterator[tuple[_Part, int, float]]:
         for part in self._parts:
-            for w, start in enumerate(part.panels[0].tolist()):
-                yield part, w, start
+            k = np.searchsorted(panels.borders, part.panels[0])
+            low, high = panels.values[k], panels.values[k + 1]
+            first, last = np.searchsorted(times, [low, high])
+            last[high == panels.values[-1]] = times.size
+            self._filling.fill(part.pieces, first, last, low, np.zeros_like(low), part.tails)

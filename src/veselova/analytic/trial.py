@@ -72,7 +72,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Trial:
-    """W windows in Neumann time: Chebyshev coefficients of dt/dτ₁ (W, NODES) and of the series (W, NODES, C), of size one.
+    """W windows in Neumann time: Chebyshev coefficients of dt/dτ₁ (W, NODES) and of the series (W, NODES, C).
 
     starts (W,) and stretch: where they start and how long they are, in τ₁ · sizes (C,) of the series, of the ``shapes``
     before (W,) tails of longer windows
@@ -94,7 +94,7 @@ class Trial:
         rate, series = evaluation((starts[:, None] + offsets).ravel(), nodes.reshape(-1, z.shape[1]))
         columns = [part.reshape(starts.size, NODES, -1) for part in series]
         sizes = np.repeat([float(np.max(np.abs(part))) or 1.0 for part in series], [part.shape[2] for part in columns])
-        in_tau1 = _TO_COEFFICIENTS @ (np.concatenate(columns, axis=2) / sizes)
+        in_tau1 = _TO_COEFFICIENTS @ np.concatenate(columns, axis=2)
         rates = rate.reshape(-1, NODES) @ _TO_COEFFICIENTS.T
         return cls(rates, in_tau1, starts, stretch, sizes, [part.shape[1:] for part in series], before)
 
@@ -105,19 +105,17 @@ class Trial:
 
     @cached_property
     def tails(self) -> Array:
-        """Return the largest of the last coefficients of anything, (W,)."""
-        return np.asarray(np.maximum(self.rate_tails, np.max(np.abs(self.series[:, -3:]), axis=(1, 2))))
+        """Return the largest of the last coefficients of anything against its size, (W,)."""
+        return np.asarray(np.maximum(self.rate_tails, np.max(np.max(np.abs(self.series[:, -3:]), axis=1) / self.sizes, axis=1)))
 
     def settled(self, tails: Array) -> NDArray[np.bool_]:
         """Return which windows are resolved, by the tails of anything that was made of them."""
         return are_settled(tails, self.before, _NOISE_TAIL)
 
     def in_pieces(self, count: int) -> tuple[Pieces, Array]:
-        """Return the pieces in time, of τ₁ and the series as they are, and their tails or those of the windows, whichever are
-        larger."""
-        pieces = Pieces.of(self.rates, self.series, self.stretch, count)
+        """Return the pieces in time, of τ₁ and the series, and their tails or those of the windows, whichever are larger."""
+        pieces = Pieces.of(self.rates, self.series, self.sizes, self.stretch, count)
         tables = pieces.tables
-        tables[:, :, 1:] *= self.sizes[:, None]
         tables[:, :, 0] *= self.stretch
         tables[:, :, 0, 0] += self.starts[:, None]
         return pieces, np.maximum(self.tails, pieces.tails)
