@@ -140,7 +140,7 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
         assert np.allclose(slope, k * coefficients[k], rtol=0, atol=1e-5 * size)
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 7])
 @pytest.mark.parametrize("time", ["t", "s"])
 def test_two_theta_functions_give_the_rate_that_angles_give(n: int, time: str, rng: np.random.Generator) -> None:
     """dt/dτ₁ is a power of |θ[η(0)]/θ|; what all places share, and an orbit adds up, is less than they scatter."""
@@ -149,9 +149,23 @@ def test_two_theta_functions_give_the_rate_that_angles_give(n: int, time: str, r
         problem = body if time == "t" else EllipsoidGeodesic(body.A, body.q, body.q_dot, normalize=True)
         solution, z = Solution(problem), rng.uniform(0, 2, (200, n - 1))
         assert solution.problem.time == time
-        off = solution.rate_at(z, "theta") / solution.rate_at(z, "angles") - 1
+        off = solution.rate_at(z, in_angles=False) / solution.rate_at(z, in_angles=True) - 1
         assert np.max(np.abs(off)) < 40 * np.finfo(float).eps
         assert abs(np.mean(off)) < 4 * np.finfo(float).eps
+
+
+@pytest.mark.parametrize("n", [6, 7])
+def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: int) -> None:
+    problem = random_problem(np.random.default_rng(n), n, 5.0)
+    solution = Solution(problem)
+    times = np.array([1.0, 40.0, 100.0]) / solution.fastest
+    assert [solution.takes_rate_from_angles(None, cycles) for cycles in (1.0, 100.0)] == [True, False]
+    assert solution.takes_rate_from_angles("angles", 100.0)
+    found, in_angles = solve(problem, times), solve(problem, times, method="angles")
+    assert found.provenance.method == in_angles.provenance.method == "angles"
+    assert found.provenance.details["clock"] == "panels"
+    assert np.any(found.tau1 != in_angles.tau1)
+    assert np.all(np.abs(found.frame - in_angles.frame).max(axis=(1, 2)) < 1e-12)
 
 
 def test_the_mean_rate_is_an_average_over_the_orbit() -> None:

@@ -40,10 +40,10 @@ _LARGEST_EXPONENT = 70.0
 #: angles, and of an evaluation.
 _MODE, _MODES = 12e-6, 1e-3
 _MODE_INVERTED, _INVERSION = 0.02e-6, 1e-6
-_PANEL_CYCLE = {1: 1.5e-5, 2: 2.5e-5, 3: 4e-5, 4: 6e-5}
-_PANEL_CYCLE_IN_ANGLES = {1: 1.6e-5, 2: 1.5e-4, 3: 3e-4, 4: 5e-4}
+_PANEL_CYCLE = {1: 1.7e-5, 2: 2.5e-5, 3: 4e-5, 4: 6.5e-5, 5: 1.5e-4, 6: 4e-4}
+_PANEL_CYCLE_IN_ANGLES = {1: 2.2e-5, 2: 2e-4, 3: 2.6e-4, 4: 4e-4, 5: 6e-4, 6: 8e-4}
 _EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
-_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 6e-4, 1e-5
+_HIGH_PANEL_CYCLE, _HIGH_EVALUATION = 1e-3, 1e-5
 
 #: Cycles from which panels are longer ones of more nodes: what finding them takes in such cycles, and what one costs then.
 _LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 48.0, 0.4

@@ -42,7 +42,12 @@ class Horizon:
     def costs(self) -> Costs:
         """Return what the clocks cost."""
         solution = self.solution
-        return Costs(solution.curve.genus, solution.modes, self.cycles, solution.takes_rate_from_angles(self.method))
+        return Costs(solution.curve.genus, solution.modes, self.cycles, self._in_angles)
+
+    @cached_property
+    def _in_angles(self) -> bool:
+        """Return whether panels take dt/dτ₁ from angles."""
+        return self.solution.takes_rate_from_angles(self.method, self.cycles)
 
     @cached_property
     def inversions(self) -> int:
@@ -58,7 +63,8 @@ class Horizon:
     def clock(self, name: str | None = None) -> Clock:
         """Return a clock for the times: ``fourier`` or ``panels``, by cost where no name is given.
 
-        Panels take dt/dτ₁ along the orbit by the method. Raises Unsolved (``too-far``, ``beyond-floats``).
+        Panels take dt/dτ₁ along the orbit by the method that is given, or by the cheaper one. Raises Unsolved (``too-far``,
+        ``beyond-floats``).
         """
         solution = self.solution
         if not self.cycles <= _MOST_CYCLES:
@@ -74,5 +80,5 @@ class Horizon:
             reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{self.cycles:.3g} cycles of the fastest phase at n = {solution.problem.n}; {reached}")
         in_tau1 = solution.guarded[0] if self.is_guarded else solution.in_tau1
-        rate = partial(solution.rate_at, method=self.method)
+        rate = partial(solution.rate_at, in_angles=self._in_angles)
         return PanelClock(rate, solution.mean_rate, in_tau1, *self.windows("panels").span)

@@ -39,12 +39,13 @@ _MOST_KEPT = 64
 class ThetaQuotients:
     """The theta route to the attitude of one torus; agrees with Frame after Abel–Jacobi inversion, and shares only κ with it.
 
-    ``at_half_periods``: the attitudes at the frame's half periods, where they are known already.
+    ``at_half_periods``: the attitudes at the frame's half periods, where they are known already · ``cost``: ``Theta.cost``.
     """
 
     theta: Theta | EnclosedTheta
     frame: Frame
     at_half_periods: Attitude | None = None
+    cost: float = math.inf
 
     @classmethod
     def of(cls, T: Array, frame: Frame) -> ThetaQuotients:
@@ -55,11 +56,11 @@ class ThetaQuotients:
         if not (np.all(np.isfinite(T)) and np.linalg.eigvalsh(T)[0] > 0):
             raise Unsolved("beyond-floats", "periods leave the range of a float: the A's are too far apart")
         theta, functions = Theta(T), len(T) * (len(T) + 3) + 1
-        terms = theta.cost if len(T) <= _LARGEST_GENUS else np.inf
-        if not terms * functions <= _MOST_TERMS:
-            wanted = f"n = {len(T) + 1} takes {functions} theta functions of {min(terms, 1e11):.1e} terms or more"
+        cost = theta.cost if len(T) <= _LARGEST_GENUS else math.inf
+        if not cost * functions <= _MOST_TERMS:
+            wanted = f"n = {len(T) + 1} takes {functions} theta functions of {min(cost, 1e11):.1e} terms or more"
             raise Unsolved("too-many-terms", f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n")
-        return cls(theta, frame)
+        return cls(theta, frame, cost=cost)
 
     @cached_property
     def functions(self) -> tuple[Characteristic, ...]:
@@ -100,8 +101,22 @@ class ThetaQuotients:
         It is known at half periods, where (q',γ), which is the stretch but for a constant, is exact; that is found by least
         squares over all of them, since an orbit takes its rounding along.
         """
-        exact, raw = map(np.abs, self._from_half_periods[1:])
+        exact, raw = map(np.abs, self._stretch_at_half_periods())
         return float(((exact @ raw) / (raw @ raw)) ** power / np.max(exact**power))
+
+    def _stretch_at_half_periods(self) -> tuple[Array, Array]:
+        """Return (q',γ) and the quotient of its function there, (2^g,) both: by these two alone where the attitude takes none."""
+        if self.at_half_periods is not None:
+            return self._from_half_periods[1:]
+        half_periods = self.frame.half_periods
+        exact = self.frame.at(self.frame.periods.arithmetic.pi * half_periods).components[:, -1]
+        values = self.theta.values(half_periods / 2, self._of_stretch)
+        return np.asarray(exact), np.asarray(values[:, 1] / values[:, 0])
+
+    @property
+    def _of_stretch(self) -> list[Characteristic]:
+        """Return the characteristics of the denominator and of c_1 = 0."""
+        return [self.functions[0], self.functions[self.places[2 * self.theta.genus]]]
 
     @cached_property
     def rounding(self) -> float:
@@ -120,8 +135,7 @@ class ThetaQuotients:
 
         For (q,Aq) = Π λ_s/Π I_i, and Π_s (λ_s − b) is a constant times (θ[η(b)]/θ)² at every branch point b.
         """
-        of_zero = self.functions[self.places[2 * self.theta.genus]]
-        values = self.theta.values(z, [self.functions[0], of_zero])
+        values = self.theta.values(z, self._of_stretch)
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
 
     def slopes(self, z: Array) -> Array:

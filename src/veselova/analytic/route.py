@@ -24,14 +24,19 @@ METHODS = ("theta", "products", "nufft", "angles")
 
 @dataclass(frozen=True)
 class Route:
-    """A solution, and the method of its attitudes."""
+    """A solution, and the method of its attitudes; None for its default one."""
 
     solution: Solution
-    method: str
+    given: str | None = None
+
+    @cached_property
+    def method(self) -> str:
+        """Return the method."""
+        return self.given or self.solution.default_method()
 
     def to(self, times: Array) -> Horizon:
         """Return what the times (N,) ask for."""
-        return Horizon(self.solution, times, self.method)
+        return Horizon(self.solution, times, self.given)
 
     def along(self, horizon: Horizon, clock: Clock) -> tuple[Along, Array]:
         """Return the motion, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
@@ -76,7 +81,7 @@ class Route:
         else:
             attitude = solution.attitude(z, self.method)
         rate, *series = solution.states(attitude)
-        return solution.rate_at(z, self.method) if self._pace_in_angles else 1 / rate, (*series, *further)
+        return solution.rate_at(z, in_angles=True) if self._pace_in_angles else 1 / rate, (*series, *further)
 
     def _with_coordinates(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
         """Return dt/dτ₁, and q̇, the frame and λ, in angles."""

@@ -38,6 +38,10 @@ Array = NDArray[np.float64]
 #: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10; for g = 5 it is 24 and 8.
 _THETA_GENUS = 4
 
+#: Largest genus at which panels take dt/dτ₁, of two functions, from them; the cycles from which that pays for what is made once
+#: where the attitude has no use for it; and the terms of a sum that cost as much as an inversion.
+_RATE_GENUS, _RATE_CYCLES, _RATE_TERMS = 6, {5: 10.0, 6: 40.0}, 6e4
+
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
 
@@ -89,15 +93,21 @@ class Solution:
         """Return dt/dτ₁ on the torus, in double precision."""
         return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
-    def rate_at(self, z: Array, method: str | None = None) -> Array:
-        """Return dt/dτ₁ at phases z (N, g): by theta near a separatrix, in angles on uneven tori, else as the method has it."""
-        if self.takes_rate_from_angles(method):
+    def rate_at(self, z: Array, in_angles: bool | None = None) -> Array:
+        """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions; None: as ``takes_rate_from_angles``."""
+        if self.takes_rate_from_angles() if in_angles is None else in_angles:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return np.asarray(self._of_stretch * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
 
-    def takes_rate_from_angles(self, method: str | None = None) -> bool:
-        """Return whether ``rate_at`` inverts z to angles."""
-        return not self.near_separatrix and (not self.is_even or (method or self.default_method()) == "angles")
+    def takes_rate_from_angles(self, method: str | None = None, cycles: float = np.inf) -> bool:
+        """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix, always on uneven tori and where
+        that is the method; by what is cheaper where none is given."""
+        if self.near_separatrix or not self.is_even:
+            return not self.near_separatrix
+        genus = self.curve.genus
+        if method is not None or genus <= _THETA_GENUS:
+            return method == "angles"
+        return genus > _RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
 
     @cached_property
     def _of_stretch(self) -> float:

@@ -113,7 +113,7 @@ class _TorusMotion(Motion[TorusProblem]):
 
     @cached_property
     def _route(self) -> Route:
-        return Route(self._solution, self.method or self._solution.default_method())
+        return Route(self._solution, self.method)
 
     @cached_property
     def _neighbours(self) -> tuple[Route, ...]:
