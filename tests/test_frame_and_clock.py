@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import mpmath
@@ -168,6 +169,15 @@ def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: in
     assert np.all(np.abs(found.frame - in_angles.frame).max(axis=(1, 2)) < 1e-12)
 
 
+def test_angles_that_are_asked_for_make_no_theta_functions() -> None:
+    problem = random_problem(np.random.default_rng(600), 6, 1000.0)  # dt/dτ₁ varies so much that the error looks at it
+    solution = Solution(problem)
+    assert solution.moving.rate_variation > 10
+    assert solution.is_even
+    solve_analytic(problem, np.array([1.0, 100.0]) / solution.fastest, method="angles", solution=solution)
+    assert "quotients" not in vars(solution)
+
+
 def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
     solution = Solution(tagged("generic")[1].problem())
     tau1 = np.linspace(-2e4, 2e4, 40_001)
@@ -185,7 +195,7 @@ def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
 
 def test_panels_stretch_to_the_wanted_times() -> None:
     solution = Solution(tagged("generic")[3].problem())
-    clock = PanelClock(solution.rate_at, solution.mean_rate, solution.in_tau1, -0.5, 33.0)
+    clock = PanelClock(partial(solution.rate_at, in_angles=False), solution.mean_rate, solution.in_tau1, -0.5, 33.0)
     assert np.allclose(clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13)
 
 

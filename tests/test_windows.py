@@ -153,7 +153,7 @@ def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     assert np.all(difference <= SLACK * (far.error[1:] + alone.error))
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.75, -3.0, 3e5, -(2.0**40)])
+@pytest.mark.parametrize("begin", [0.0, 0.75, -3.0, 3e5, -(2.0**40), 0.0031415926535897934, -0.31415926535897934])
 def test_times_next_to_borders_are_placed_as_if_these_were_not_rounded(begin: float) -> None:
     offsets = np.sort(np.random.default_rng(6).uniform(0, 3, 200))
     sums = begin + offsets

@@ -113,7 +113,8 @@ class EnclosedSolution:
                 self._quotients = ThetaQuotients(theta, self.frame)
             stretch = None if self._quotients is None else self._quotients.stretch
             # Doubles do not see every direction that moves.
-            coarse_rate = coarse.rate_at if coarse.moving.size == self.moving.size else None
+            in_angles = coarse.takes_rate_from_angles(coarse.default_method())
+            coarse_rate = partial(coarse.rate_at, in_angles=in_angles) if coarse.moving.size == self.moving.size else None
             self.orbit = Orbit(self.spectrum, rate, origin, frequencies, stretch, coarse_rate)
 
     def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:

@@ -62,7 +62,7 @@ class ErrorBound:
         error = np.abs(tau1)  # and in place from here on: fresh memory costs more than sums
         error *= rounding * float(self._frequencies @ steepness.by_phase) + (rounding + drift) * steepness.along_flow
         error += of_clock * steepness.along_flow
-        if (slowness := _slowness(solution, tau1)) is not None:
+        if (slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))) is not None:
             error *= slowness
         error += at_once
         if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
@@ -100,7 +100,7 @@ class ErrorBound:
         return result + evaluation * max(1.0, solution.largest_period) * _EPSILON
 
 
-def _slowness(solution: Solution, tau1: Array) -> Array | None:
+def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:
     """Return F_0 over dt/dτ₁, where that is more than one, for A's by which the rate varies much; None for others.
 
     An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the mean.
@@ -108,6 +108,6 @@ def _slowness(solution: Solution, tau1: Array) -> Array | None:
     if solution.moving.rate_variation < _WIDE:
         return None
     rows = slice(None) if tau1.size <= _MANY else np.linspace(0, tau1.size - 1, _MANY).astype(int)
-    rates = solution.rate_at(solution.in_tau1.phases(tau1[rows]))
+    rates = solution.rate_at(solution.in_tau1.phases(tau1[rows]), in_angles)
     slowness = np.maximum(1.0, solution.mean_rate / rates)
     return slowness if tau1.size <= _MANY else np.asarray(np.max(slowness))

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: Coefficients of a piece in time.
 ORDER = 20
 
-#: A Newton step of this size, in half pieces, leaves an error of a fifth of its square at most.
+#: A Newton step of this size, in half pieces, leaves an error of a quarter of its square at most.
 _SETTLED = 2e-8
 
 #: Times that are placed in their pieces at once, and of which powers are formed at once: they stay in the cache.
@@ -133,8 +133,9 @@ class Pieces:
 def _first_from(times: Array, begins: Array, offsets: Array) -> NDArray[np.intp]:
     """Return the first of increasing times that is not before each begin + offset, as if these were not rounded."""
     sums = begins + offsets
-    rounded_down = offsets > sums - begins  # the difference is exact, as in a sum by Dekker
-    return np.maximum.accumulate(np.searchsorted(times, np.where(rounded_down, np.nextafter(sums, np.inf), sums)))
+    of_offsets = sums - begins
+    rest = (begins - (sums - of_offsets)) + (offsets - of_offsets)  # exact (Knuth)
+    return np.maximum.accumulate(np.searchsorted(times, np.where(rest > 0, np.nextafter(sums, np.inf), sums)))
 
 
 def _step(value: Array, expanded: Array) -> Array:

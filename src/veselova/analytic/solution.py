@@ -93,9 +93,9 @@ class Solution:
         """Return dt/dτ₁ on the torus, in double precision."""
         return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
 
-    def rate_at(self, z: Array, in_angles: bool | None = None) -> Array:
-        """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions; None: as ``takes_rate_from_angles``."""
-        if self.takes_rate_from_angles() if in_angles is None else in_angles:
+    def rate_at(self, z: Array, in_angles: bool) -> Array:
+        """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions."""
+        if in_angles:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
         return np.asarray(self._of_stretch * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
 
