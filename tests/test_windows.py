@@ -15,6 +15,7 @@ from problems import TABLE, Case, tagged
 from veselova import NeumannSystem, solve
 from veselova.analytic import pieces, track
 from veselova.analytic.costs import Costs, expected_modes
+from veselova.analytic.increasing import fourth_order_divisor
 from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 
@@ -165,11 +166,11 @@ def test_times_next_to_borders_are_placed_as_if_these_were_not_rounded(begin: fl
 
 
 def test_the_first_step_in_a_piece_is_of_fourth_order() -> None:
-    slope, a, b = 2.0, 0.3, -0.2
+    slope, a, b = np.array(2.0), np.array(0.6), np.array(-0.4)
 
     def left(h: float) -> float:
-        value = -slope * (h + a * h**2 + b * h**3)
-        return abs(float(pieces._step(np.array([[value]]), np.array([[slope, 2 * slope * a, 3 * slope * b]]))[0, 0]) + h)
+        value = -(slope * h + a * h**2 + b * h**3)
+        return abs(float(value / fourth_order_divisor(value, slope, a, b)) + h)
 
     assert 14 < left(0.02) / left(0.01) < 18
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock, Rate
-from veselova.analytic.increasing import Rows, increasing_root
+from veselova.analytic.increasing import Rows, fourth_order_divisor, increasing_root
 from veselova.analytic.modes import Integers, grown
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
@@ -150,11 +150,13 @@ class FourierClock(Clock):
         def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:
             value, *rise = self._sum.at(uniform[rows] + delta[:, None] * rates)
             value += mean * delta
-            return value, _divisor(value, *rise)
+            return value, fourth_order_divisor(value, *rise)
 
         if self._first is not None:  # a truncated sum need not increase: one plain step towards it is all it is good for
             value, *rise = self._first.at(uniform)
-            delta = np.maximum(np.minimum(-value / np.maximum(_divisor(value, *rise), _LEAST_SLOPE * mean), reach), -reach)
+            delta = np.maximum(
+                np.minimum(-value / np.maximum(fourth_order_divisor(value, *rise), _LEAST_SLOPE * mean), reach), -reach
+            )
         delta = increasing_root(excess, delta, -reach, reach, self._settled, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * rates
         return times / mean + delta, z[:, : self._genus]
@@ -197,16 +199,6 @@ class _Sum:
             np.matmul(half.reshape(2 * modes, half.shape[2]).T, self.weights, out=result[rows])
         result[:, 1:] += self.at_start
         return result.T
-
-
-def _divisor(value: Array, slope: Array, a: Array, b: Array) -> Array:
-    """Return what a step of fourth order divides the value by, where a step of Newton's divides by the slope.
-
-    Far away it is twice that at most, or half of it.
-    """
-    step = value / slope
-    bent = step * (a - b * step) / (slope - a * step)
-    return np.asarray(slope * (1 - np.minimum(np.maximum(bent, -1), 0.5)))
 
 
 def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from veselova.analytic.precision import Values
 from veselova.mechanics.errors import InternalContradiction
 
-__all__ = ["Rows", "doublings", "increasing_root", "interval_step", "is_shown"]
+__all__ = ["Rows", "doublings", "fourth_order_divisor", "increasing_root", "interval_step", "is_shown"]
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,16 @@ def increasing_root(
                 rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]
                 low, high, before, x = low[open_], high[open_], before[open_], x[open_]
     raise InternalContradiction("inversion of an increasing function did not settle")
+
+
+def fourth_order_divisor(value: Array, slope: Array, a: Array, b: Array) -> Array:
+    """Return what a step of fourth order (Householder) divides the value by, where a step of Newton's divides by the slope.
+
+    The function is value + slope x + ax² + bx³ around the point. Far away the divisor is twice the slope at most, or half of it.
+    """
+    step = value / slope
+    bent = step * (a - b * step) / (slope - a * step)
+    return np.asarray(slope * (1 - np.minimum(np.maximum(bent, -1), 0.5)))
 
 
 def doublings(digits: int) -> list[int]:

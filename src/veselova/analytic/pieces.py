@@ -14,8 +14,9 @@ import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import NDArray
 
-from veselova.analytic.increasing import Rows, increasing_root
+from veselova.analytic.increasing import Rows, fourth_order_divisor, increasing_root
 from veselova.analytic.precision import DOUBLE
+from veselova.analytic.twofold import exact_sum
 
 __all__ = ["ORDER", "Pieces"]
 
@@ -36,9 +37,10 @@ _PLACED, _TIMES = 64000, 4000
 _X, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(ORDER)), DOUBLE.cosine_series(np.eye(ORDER)).T
 #: Integrals of T_0 … T_{ORDER−1} over [−1, 1].
 _INTEGRALS = np.array([2 / (1 - k * k) if k % 2 == 0 else 0.0 for k in range(ORDER)])
-#: x^0 … x^ORDER at the points; of those before the last, the coefficients of their Taylor series there as well, to the second.
+#: x^0 … x^ORDER at the points; and the integrals of those before the last in Taylor series there: the coefficients of x, x², x³.
 _AT_POINTS = polynomial.polyvander(_X, ORDER).T
-_EXPANDED = np.hstack([_AT_POINTS[:-1], *(polynomial.polyval(_X, polynomial.polyder(np.eye(ORDER), m)) / m for m in (1, 2))])
+_SLOPES = [polynomial.polyval(_X, polynomial.polyder(np.eye(ORDER), m)) for m in (1, 2)]
+_EXPANDED = np.hstack([_AT_POINTS[:-1], _SLOPES[0] / 2, _SLOPES[1] / 6])
 #: From Chebyshev coefficients to those of powers.
 _TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
 
@@ -81,8 +83,9 @@ class Pieces:
             return np.asarray(value - target[rows]), np.asarray(rise)
 
         one = np.ones_like(target)
-        with np.errstate(all="ignore"):
-            guess = np.clip(_X - _step(elapsed.T @ _AT_POINTS - target, slope.T @ _EXPANDED), -1, 1)
+        value = elapsed.T @ _AT_POINTS - target
+        with np.errstate(all="ignore"):  # from the same points everywhere a first step is made by products of matrices
+            guess = np.clip(_X - value / fourth_order_divisor(value, *np.split(slope.T @ _EXPANDED, 3, axis=1)), -1, 1)
         x = increasing_root(excess, guess, -one, one, _SETTLED)
         in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
         # Points first: the matrices that are the same for all pieces take them at once.
@@ -132,20 +135,8 @@ class Pieces:
 
 def _first_from(times: Array, begins: Array, offsets: Array) -> NDArray[np.intp]:
     """Return the first of increasing times that is not before each begin + offset, as if these were not rounded."""
-    sums = begins + offsets
-    of_offsets = sums - begins
-    rest = (begins - (sums - of_offsets)) + (offsets - of_offsets)  # exact (Knuth)
+    sums, rest = exact_sum(begins, offsets)
     return np.maximum.accumulate(np.searchsorted(times, np.where(rest > 0, np.nextafter(sums, np.inf), sums)))
-
-
-def _step(value: Array, expanded: Array) -> Array:
-    """Return a first step of fourth order from the same points everywhere, where it is made by products of matrices.
-
-    It reverts value + s(x + ax² + bx³); ``expanded`` has the Taylor coefficients s, 2sa and 3sb of the slope side by side.
-    """
-    slope, twice, thrice = np.split(expanded, 3, axis=1)
-    step, a, b = value / slope, twice / (2 * slope), thrice / (3 * slope)
-    return np.asarray(step * (1 + step * (a + step * (2 * a * a - b))))
 
 
 def _powers(x: Array, room: Array) -> Array:

@@ -82,12 +82,14 @@ class ThetaQuotients:
         """Return the κ's in the order of the functions."""
         return self._from_half_periods[0]
 
+    def _half_period_attitudes(self) -> Attitude:
+        """Return the attitudes at the half periods, made where they are not known."""
+        return self.at_half_periods or self.frame.at(self.frame.periods.arithmetic.pi * self.frame.half_periods)
+
     @cached_property
     def _from_half_periods(self) -> tuple[Array, Array, Array]:
         """Return the κ's, and (q',γ) and the quotient of its function at all half periods, (2^g,) both."""
-        half_periods, attitude = self.frame.half_periods, self.at_half_periods
-        if attitude is None:
-            attitude = self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
+        half_periods, attitude = self.frame.half_periods, self._half_period_attitudes()
         exact = np.concatenate([attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)], axis=1)
         raw = self._raw(self.theta.values(half_periods / 2, self.functions))
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
@@ -108,10 +110,8 @@ class ThetaQuotients:
         """Return (q',γ) and the quotient of its function there, (2^g,) both: by these two alone where the attitude takes none."""
         if self.at_half_periods is not None:
             return self._from_half_periods[1:]
-        half_periods = self.frame.half_periods
-        exact = self.frame.at(self.frame.periods.arithmetic.pi * half_periods).components[:, -1]
-        values = self.theta.values(half_periods / 2, self._of_stretch)
-        return np.asarray(exact), np.asarray(values[:, 1] / values[:, 0])
+        values = self.theta.values(self.frame.half_periods / 2, self._of_stretch)
+        return self._half_period_attitudes().components[:, -1], np.asarray(values[:, 1] / values[:, 0])
 
     @property
     def _of_stretch(self) -> list[Characteristic]:

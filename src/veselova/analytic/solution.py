@@ -102,8 +102,10 @@ class Solution:
     def takes_rate_from_angles(self, method: str | None = None, cycles: float = np.inf) -> bool:
         """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix, always on uneven tori and where
         that is the method; by what is cheaper where none is given."""
-        if self.near_separatrix or not self.is_even:
-            return not self.near_separatrix
+        if self.near_separatrix:
+            return False
+        if not self.is_even:
+            return True
         genus = self.curve.genus
         if method is not None or genus <= _THETA_GENUS:
             return method == "angles"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Twofold", "exact_product", "halves", "stacked", "where"]
+__all__ = ["Twofold", "exact_product", "exact_sum", "halves", "stacked", "where"]
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,8 @@ class Twofold:
 
     def __add__(self, other: Any) -> Twofold:
         other = Twofold.of(other)
-        high, error = _exact_sum(self.high, other.high)
-        low, rest = _exact_sum(self.low, other.low)
+        high, error = exact_sum(self.high, other.high)
+        low, rest = exact_sum(self.low, other.low)
         high, error = _ordered_sum(high, error + low)
         return Twofold(*_ordered_sum(high, error + rest))
 
@@ -114,7 +114,7 @@ def halves(x: Array) -> tuple[Array, Array]:
     return high, x - high
 
 
-def _exact_sum(a: Array, b: Array) -> tuple[Array, Array]:
+def exact_sum(a: Array, b: Array) -> tuple[Array, Array]:
     """Return (s, e) with a + b = s + e exactly, s the rounded sum."""
     total = a + b
     part = total - a
