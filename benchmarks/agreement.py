@@ -2,7 +2,7 @@
 
     python benchmarks/agreement.py [problems per n]      default 200; needs the extra `fast`
 
-Prints per n: the largest difference of q and frame, the largest difference over the sum of the two error estimates, the
+Prints per n: the largest difference of q and frame, the largest difference over the sum of the two errors, the
 narrowest gap or cut drawn (relative to the largest branch point), seconds per problem of each engine, and every failure.
 Nothing is dropped: a draw that an engine refuses is listed.
 """
@@ -31,7 +31,7 @@ def random_problem(rng: np.random.Generator, n: int) -> vs.Veselova:
 
 
 def main(count: int) -> None:
-    print("n   problems  failures   largest difference   over estimates   narrowest interval   s analytic   s heyoka")
+    print("n   problems  failures   largest difference   over errors      narrowest interval   s analytic   s heyoka")
     for n in range(2, 9):
         rng = np.random.default_rng(n)
         worst = ratio = 0.0

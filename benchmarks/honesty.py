@@ -3,7 +3,7 @@
     python benchmarks/honesty.py [problems per n]      default 40; needs the extra `fast`
 
 Prints per n and method the largest and median true error of the frame, the median reported one, and the largest true error over
-the reported one at the same time: the stated slack is 2.
+the reported one at the same time, at most 1.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     python benchmarks/integrators.py [PROBLEMS]      heyoka needs the extra `fast`, diffrax is taken where it is installed
 
 Random problems, A within a factor of 5, unit speed; processor seconds of one call, the problem new to everybody, libraries
-loaded. "closed form" has its error estimate; the others are one integration each, projected every ten radians, without any.
+loaded. "closed form" has its error; the others are one integration each, projected every ten radians, without any.
 DOP853 is SciPy's, at the least tolerance that it takes and at the one with which it comes nearest to an error of 1e-11;
 heyoka once with the compilation of the field, which it needs for every new n, and once without. "first" is the first call of
 all for that n, what is compiled then included. The error is that of the frame against the closed form with 30 digits; each

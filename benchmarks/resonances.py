@@ -4,7 +4,7 @@
 
 Random problems, n = 3 and 4, tuned to a relative distance of 1e-9 to 1e-2 from a resonance with |m_k| ≤ 4; truth by balls of 25
 digits, which takes seconds for each. Prints per n and clock the largest true error of the frame, the largest reported one, and
-the largest true error over the reported one at the same time: the stated slack is 2.
+the largest true error over the reported one at the same time, at most 1.
 """
 
 from __future__ import annotations

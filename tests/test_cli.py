@@ -45,7 +45,7 @@ def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
     answer = run("demo", "--plot", "motion.png", cwd=tmp_path)
     text = answer.stdout.decode()
     assert answer.returncode == 0, answer.stderr
-    for word in ("frame", "omega", "conditioning floor", "error estimate, analytic", "error estimate, numeric", "agree within"):
+    for word in ("frame", "omega", "conditioning floor", "error bound, analytic", "error bound, numeric", "agree within"):
         assert word in text
     deviations = {
         line.split()[0]: float(line.split()[1]) for line in text.splitlines() if line[:5] in ("q    ", "frame", "omega")

@@ -73,7 +73,7 @@ def test_more_digits_confirm_those_promised(n: int, rng: np.random.Generator) ->
 
 @pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> None:
-    """Proven radii hold what many more digits give, and the ordinary error estimate is no smaller than what is proven."""
+    """Proven radii hold what many more digits give, and the ordinary error is no smaller than what is proven."""
     problem = random_problem(rng, n)
     times = np.array([-2.0, 0.0, 1.0, 7.0])
     proven = vs.solve(problem, times, certified=True).decimals

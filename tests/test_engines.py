@@ -18,9 +18,6 @@ from veselova import EulerPoisson, Unsolved, Veselova, compare, solve, torus
 from veselova.analytic.solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 
-#: The stated slack of every error estimate: the true error stays below this many times the reported one.
-SLACK = 2.0
-
 METHODS = [
     ("analytic", "theta"),
     ("analytic", "products"),
@@ -110,11 +107,11 @@ def test_true_errors_never_exceed_reported_ones(case: Case, engine: str, method:
     found = solve(case.problem(), case.times(), engine, method)
     frame, q_dot, tau1 = truth(case)
     error = np.max(np.abs(found.frame - frame), axis=(1, 2))
-    assert np.all(error <= SLACK * found.error)
-    assert np.all(np.abs(found.q - frame[:, :, 0]) <= SLACK * found.error[:, None])
+    assert np.all(error <= found.error)
+    assert np.all(np.abs(found.q - frame[:, :, 0]) <= found.error[:, None])
     speed = np.max(np.linalg.norm(q_dot, axis=1))
-    assert np.all(np.max(np.abs(found.q_dot - q_dot), axis=1) <= 20 * SLACK * found.error * speed)
-    assert np.all(np.abs(found.tau1 - tau1) <= 20 * SLACK * found.error * (1 + np.max(np.abs(tau1))))
+    assert np.all(np.max(np.abs(found.q_dot - q_dot), axis=1) <= 20 * found.error * speed)
+    assert np.all(np.abs(found.tau1 - tau1) <= 20 * found.error * (1 + np.max(np.abs(tau1))))
 
 
 @pytest.mark.parametrize(("case", "engine", "method"), table(tagged("generic"), METHODS))
@@ -132,8 +129,8 @@ def test_what_must_hold_at_every_time_does(case: Case, engine: str, method: str)
 
 
 @pytest.mark.parametrize(("case", "engine", "bound"), table(tagged("generic"), [("analytic", 1e-11), ("numeric", 1e-8)]))
-def test_error_estimates_are_not_empty_promises(case: Case, engine: str, bound: float) -> None:
-    """The estimates stay useful: at |ωt| of order 50, below 1e-11 in closed form and 1e-8 by DOP853."""
+def test_errors_are_not_empty_promises(case: Case, engine: str, bound: float) -> None:
+    """Errors stay useful: at |ωt| of order 50, below 1e-11 in closed form and 1e-8 by DOP853."""
     assert np.max(solve(case.problem(), case.times(), engine).error) < bound
 
 
@@ -162,7 +159,7 @@ def test_adversarial_starts_are_served_honestly(seed: int) -> None:
     times = np.array([-5, 0, 0.1, 1, 5]) * min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
     found = solve(problem, times)
     frame = true_motion(problem, times)[0]
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error), name
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error), name
     assert np.max(found.error) < 1e-9, name
 
 
@@ -177,7 +174,7 @@ def test_very_wide_inertia_is_served_honestly_by_every_route(method: str, count:
     found = solve(problem, times, method=method)
     rows = np.searchsorted(times, wanted)
     error = np.max(np.abs(found.frame[rows] - true_motion(problem, wanted)[0]), axis=(1, 2))
-    assert np.all(error <= SLACK * found.error[rows])
+    assert np.all(error <= found.error[rows])
 
 
 def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
@@ -187,7 +184,7 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     assert found.provenance.details["regime"] == "separatrix"
     assert found.error[-1] > 1e3 * found.error[1]
     frame = true_motion(case.problem(), times)[0]
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)
     with pytest.raises(Unsolved, match="no-digit-left"):
         solve(case.problem(), [1.0, 100.0])
 
@@ -199,7 +196,7 @@ def test_errors_grow_where_guard_digits_end() -> None:
     for t in (3.0, 3e9, 3e16, 3e21, 3e25):
         one, other = solve(problem, [t]), solve(scaled, [t / 3])
         if 3 * (t / 3) == t:
-            assert np.max(np.abs(one.frame - other.frame)) <= SLACK * (one.error + other.error)
+            assert np.max(np.abs(one.frame - other.frame)) <= one.error + other.error
         assert np.max(np.abs(np.swapaxes(one.frame, 1, 2) @ one.frame - np.eye(4))) < 1e-13
     for t in (1e40, 1e302):
         for engine in ("analytic", "numeric"):
@@ -217,7 +214,7 @@ def test_a_matrix_of_inertia_adds_the_rounding_of_its_axes() -> None:
     for t in (50.0, 1e3, 1e6):
         plain, rotated = solve(Veselova([3, 2, 1], q, q_dot), [t]), solve(Veselova(A, *turned), [t])
         expected = np.array(R, dtype=float) @ plain.q[0]
-        assert np.max(np.abs(rotated.q[0] - expected)) <= SLACK * (rotated.error[0] + plain.error[0])
+        assert np.max(np.abs(rotated.q[0] - expected)) <= rotated.error[0] + plain.error[0]
 
 
 @pytest.mark.parametrize(("n", "cycles"), [(5, 150), (7, 120)])
@@ -254,7 +251,7 @@ def test_far_times_agree_with_integration() -> None:
     times = np.array([-200.0, 700.0])
     frame, _, tau1 = true_motion(problem, times)
     found = solve(problem, times)
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= SLACK * found.error)
+    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)
     assert np.allclose(found.tau1, tau1, rtol=1e-15, atol=1e-12)
     assert np.max(found.error) < 1e-11
 

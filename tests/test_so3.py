@@ -157,7 +157,7 @@ def test_two_formulations_agree_and_keep_the_integrals(potential: str, system: A
         times = np.linspace(-3, 10, 6)
         first, second = (solve(problem, times, "numeric", formulation=name) for name in system.formulations)
         difference = np.max(np.abs(first.frame - second.frame), axis=(1, 2))
-        assert np.all(difference <= 2 * (first.error + second.error))
+        assert np.all(difference <= first.error + second.error)
         assert np.max(difference) < 1e-9
         assert relative_drift(problem, first) < DRIFT
 
@@ -167,7 +167,7 @@ def test_the_taylor_method_keeps_the_integrals_to_rounding(rng: np.random.Genera
     times = np.linspace(0, 40, 9)
     fine, usual = solve(problem, times, "numeric", "taylor"), solve(problem, times)
     assert relative_drift(problem, fine) < 2e-14
-    assert np.all(np.max(np.abs(fine.frame - usual.frame), axis=(1, 2)) <= 2 * (fine.error + usual.error))
+    assert np.all(np.max(np.abs(fine.frame - usual.frame), axis=(1, 2)) <= fine.error + usual.error)
 
 
 def test_off_the_constraint_the_integrals_of_the_paper_are_kept(rng: np.random.Generator) -> None:
@@ -208,7 +208,7 @@ def test_without_potential_the_motion_is_that_of_the_closed_form(rng: np.random.
         times = np.linspace(-30, 100, 27)
         numeric, closed = solve(problem, times), solve(problem.rank_one(), times, "analytic")
         difference = np.max(np.abs(numeric.frame - closed.frame), axis=(1, 2))
-        assert np.all(difference <= 2 * (numeric.error + closed.error))
+        assert np.all(difference <= numeric.error + closed.error)
         assert np.max(difference) < 1e-10
         assert np.isclose(problem.rank_one().energy, numeric.integrals["energy"][0], rtol=1e-13)
 
@@ -282,7 +282,7 @@ def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     fine = solve(problem, times, "numeric", "taylor")
     assert np.all(trajectory.gamma[:, 0] > 0)
     assert np.sum(np.diff(np.sign(np.diff(trajectory.gamma[:, 0]))) > 0) >= 3  # it came near and went away, several times
-    assert np.all(np.max(np.abs(trajectory.frame - fine.frame), axis=(1, 2)) <= 2 * (trajectory.error + fine.error))
+    assert np.all(np.max(np.abs(trajectory.frame - fine.frame), axis=(1, 2)) <= trajectory.error + fine.error)
     assert relative_drift(problem, fine) < 1e-13
     assert relative_drift(problem, trajectory) < 1e-10
 
@@ -611,7 +611,7 @@ def test_the_true_error_is_at_most_twice_the_reported_one(potential: str, rng: n
     expected = true_frames(problem, times)
     for method in ("dop853", "taylor"):
         found = solve(problem, times, "numeric", method)
-        assert np.all(np.max(np.abs(found.frame - expected), axis=(1, 2)) <= 2 * found.error)
+        assert np.all(np.max(np.abs(found.frame - expected), axis=(1, 2)) <= found.error)
 
 
 @pytest.mark.sweep
@@ -628,6 +628,6 @@ def test_fifty_random_bodies_keep_their_integrals_and_formulations_agree(potenti
         assert relative_drift(problem, fine) < 1e-13
         for other in (second, fine):
             difference = np.max(np.abs(first.frame - other.frame), axis=(1, 2))
-            assert np.all(difference <= 2 * (first.error + other.error))
+            assert np.all(difference <= first.error + other.error)
             # Without the additional integral motions are chaotic, and roundings grow exponentially.
             assert np.max(difference) < 1e-9 or not {"F2", "f2"} & set(first.integrals)

@@ -14,9 +14,6 @@ from veselova import Trajectory, Unsolved, Veselova, solve
 from veselova.analytic import transforms
 from veselova.analytic.solution import Solution
 
-#: The stated slack of every error estimate.
-SLACK = 2.0
-
 MOVING = [case for case in TABLE if "at-rest" not in case.tags and case.problem().n <= 6]
 
 
@@ -118,7 +115,7 @@ def test_adversarial_starts_are_served_honestly_or_refused_by_name(seed: int) ->
         return
     chosen = np.linspace(0, times.size - 1, 9).astype(int)
     frame = true_motion(problem, times[chosen])[0]
-    assert np.all(np.max(np.abs(found.frame[chosen] - frame), axis=(1, 2)) <= SLACK * found.error[chosen]), name
+    assert np.all(np.max(np.abs(found.frame[chosen] - frame), axis=(1, 2)) <= found.error[chosen]), name
 
 
 def test_sums_that_leave_no_digit_are_a_named_outcome() -> None:

@@ -48,7 +48,7 @@ class Comparison:
 
     @cached_property
     def agrees(self) -> bool:
-        """Return whether the bounded outputs differ, at every time, by no more than the two error estimates together."""
+        """Return whether the bounded outputs differ, at every time, by no more than the sum of both errors."""
         allowed = self.analytic.error + self.numeric.error
         return bool(all(np.all(self.difference(name) <= allowed) for name in self.analytic.problem.bounded))
 

@@ -72,8 +72,8 @@ class Decimals:
     """The series of a trajectory to more digits than a double has, or with certified errors.
 
     midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape, which may be made when they
-    are first asked for; the exact value lies within midpoint ± radius, proven where ``certified``, and otherwise to the honesty
-    of all our error estimates.
+    are first asked for; the exact value lies within midpoint ± radius, proven where ``certified``, and otherwise
+    up to truncations that are estimated.
     error (N,) the largest radius of q and frame at each time
     """
 

@@ -29,7 +29,7 @@ def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Fig
 
     First the series that the problem calls its portrait: a curve on the sphere with the frame axes at a few times where it has
     three components, else the components. Then the spheroconic coordinates, or where there are none the drift of the integrals.
-    With a comparison: the difference of the engines, their error estimates and the conditioning floor on a logarithmic axis.
+    With a comparison: the difference of the engines, their errors and the conditioning floor on a logarithmic axis.
     """
     try:
         from matplotlib.figure import Figure

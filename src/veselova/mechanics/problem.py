@@ -29,7 +29,7 @@ class Problem(ABC):
 
     #: The series of a trajectory, with the names of the axes that follow the time axis; the order of every listing and file.
     outputs: ClassVar[Mapping[str, tuple[str, ...]]]
-    #: Those that follow from the others, by ``derive``; and those whose every component ``error`` bounds.
+    #: Those that follow from the others, by ``derive``; and those whose true errors ``error`` bounds.
     derived: ClassVar[tuple[str, ...]] = ()
     bounded: ClassVar[tuple[str, ...]]
 

@@ -51,7 +51,7 @@ class Provenance:
 class Trajectory:
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as ``trajectory.q``.
 
-    times (N,) · error (N,) a bound on every component of the problem's ``bounded`` series at each time, in absolute value
+    times (N,) · error (N,) bounds the true error of every component of the problem's ``bounded`` series: true ≤ error
     arrays: the series that do not follow from others, by name, first axis the times, which may be the last in memory
     decimals: the same series to more digits, or with certified errors, where that was asked for
 

@@ -64,7 +64,7 @@ def _told_apart(times: Any) -> list[str]:
 
 
 def print_trajectory(console: Console, trajectory: Trajectory) -> None:
-    """Print the motion at some of its times, the error estimate and the drift of the integrals."""
+    """Print the motion at some of its times, the error and the drift of the integrals."""
     console.print(_describe(trajectory), highlight=False)
     problem = trajectory.problem
     series = trajectory.series(problem.portrait)
@@ -95,7 +95,7 @@ def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
-    """Print how the engines agree, quantity by quantity, against their own error estimates and the conditioning floor."""
+    """Print how the engines agree, quantity by quantity, against their errors and the conditioning floor."""
     console.print(_describe(comparison.analytic), highlight=False)
     console.print(_describe(comparison.numeric), highlight=False)
     _heading(console, "Largest difference of the two engines")
@@ -105,15 +105,13 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     console.print(table)
     _heading(console, "What to hold it against")
     table = _table("bound", "largest value")
-    table.add_row("error estimate, analytic", f"{np.max(comparison.analytic.error):.1e}")
-    table.add_row("error estimate, numeric", f"{np.max(comparison.numeric.error):.1e}")
+    table.add_row("error bound, analytic", f"{np.max(comparison.analytic.error):.1e}")
+    table.add_row("error bound, numeric", f"{np.max(comparison.numeric.error):.1e}")
     table.add_row("conditioning floor (one rounding of the data)", f"{np.max(comparison.conditioning_floor):.1e}")
     console.print(table)
     _print_drift(console, {"analytic": comparison.analytic, "numeric": comparison.numeric})
     verdict = (
-        "The engines agree within their error estimates."
-        if comparison.agrees
-        else "The engines DISAGREE beyond their error estimates."
+        "The engines agree within their error bounds." if comparison.agrees else "The engines DISAGREE beyond their error bounds."
     )
     console.print(f"\n{verdict}", highlight=False)
 

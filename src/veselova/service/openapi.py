@@ -76,7 +76,8 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "error": {
                 "type": "array",
                 "items": _NUMBER_OR_DECIMAL,
-                "description": "a bound on every component of the bounded series (q and frame of system veselova) at each time",
+                "description": "bounds the true error of every component of the bounded series at each time: true ≤ error; "
+                "bounded series of system veselova: q and frame",
             },
             "provenance": _PROVENANCE,
         },
@@ -85,7 +86,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     "Comparison": _object(
         {
             "deviation": {**_BY_NAME, "description": "largest difference of the engines, per output"},
-            "agrees": {"type": "boolean", "description": "whether they differ by no more than both error estimates"},
+            "agrees": {"type": "boolean", "description": "whether they differ by no more than the sum of both errors"},
             "conditioning_floor": {"type": "number", "description": "what one rounding of the data moves at the last time"},
             "error": _BY_NAME,
             "drift": {"type": "object", "additionalProperties": _BY_NAME},
