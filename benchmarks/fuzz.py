@@ -20,7 +20,7 @@ from collections import Counter
 from typing import Any
 
 from veselova.mechanics.errors import VeselovaError
-from veselova.service.admission import decoded
+from veselova.service.json_text import decoded
 from veselova.service.problem_details import Refused, problem_document
 from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 from veselova.service.sweep_request import SweepRequest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -103,7 +104,9 @@ def full_disk(tmp_path: Path) -> str:
 
 def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk: str) -> None:
     answer = tmp_path / "answer"
-    delivery = solved(GOOD, Wanted("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6))
+    delivery = solved(
+        pickle.dumps(GOOD), Wanted("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6)
+    )
     assert delivery.not_stored == "No space left on device"
     assert (delivery.stored, delivery.entry) == (0, None)
     assert answer.read_bytes()
@@ -112,7 +115,7 @@ def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk
 
 def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> None:
     with pytest.raises(Refused) as raised:
-        solved(GOOD, Wanted("csv", "identity", full_disk), None)
+        solved(pickle.dumps(GOOD), Wanted("csv", "identity", full_disk), None)
     assert raised.value.code == "storage-full"
     assert not Path(full_disk).is_symlink()
     assert Path("/dev/full").exists()
@@ -132,13 +135,13 @@ def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
     tmp_path: Path, changes: dict[str, Any], form: str
 ) -> None:
     entry, wanted = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6), Wanted(form, "identity")
-    made = solved({**GOOD, **changes}, wanted, entry)
+    made = solved(pickle.dumps({**GOOD, **changes}), wanted, entry)
     assert made.entry
     assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
     for again in (
         restored(made.entry, wanted),
         restored(entry.path, wanted),
-        solved({**GOOD, **changes}, wanted, entry),
+        solved(pickle.dumps({**GOOD, **changes}), wanted, entry),
     ):
         assert (again.body, again.provenance, again.kept) == (made.body, made.provenance, True)
         assert (again.stored, again.entry) == (0, None)
@@ -152,7 +155,7 @@ def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) 
     with pytest.raises(DamagedEntry):
         restored(str(tmp_path / "other"), IN_MEMORY)
     entry = Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6)
-    made = solved(GOOD, IN_MEMORY, entry)
+    made = solved(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert (made.kept, made.damaged) == (False, True)
     assert made.entry
     assert entry.write_packed(made.entry)
@@ -163,7 +166,9 @@ def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Pa
     """Spheroconic coordinates are kept where the engine found them; where it did not, they follow from the frame."""
     for method in ("theta", "angles"):
         request = {**GOOD, "method": method}
-        made = solved({**request, "outputs": ["q"]}, IN_MEMORY, Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6))
+        made = solved(
+            pickle.dumps({**request, "outputs": ["q"]}), IN_MEMORY, Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
+        )
         assert made.entry
         kept, expected = unpacked(made.entry)[1], requested_trajectory(read_request(TrajectoryRequest, request))
         for name in expected.problem.outputs:
@@ -173,10 +178,10 @@ def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Pa
 def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("veselova.service.delivery._MOST_SENT", 100)
     entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
-    made = solved(GOOD, IN_MEMORY, entry)
+    made = solved(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert made.entry is None
     assert made.stored == (tmp_path / "kept").stat().st_size
-    assert solved(GOOD, IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
+    assert solved(pickle.dumps(GOOD), IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
     assert list(tmp_path.iterdir()) == [tmp_path / "kept"]
 
 

@@ -2,7 +2,7 @@
 
 VeselovaError
 ├── InvalidInput            bad input; names the field, what was required, what was given   (also a ValueError)
-├── InvalidRequest          a JSON request with one or more such faults                     (also a ValueError)
+│   └── InvalidRequest      several such faults at once
 ├── Unsolved                an engine's named outcome: it cannot serve this problem, and why
 ├── BackendMissing          an optional library that was asked for is not installed          (also an ImportError)
 ├── InternalContradiction   two results that must agree do not: a bug of ours
@@ -13,13 +13,16 @@ VeselovaError
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from reprlib import Repr
+from typing import Any, TypeVar
 
 __all__ = [
+    "MOST_FAULTS",
     "BackendMissing",
+    "Faults",
     "InternalContradiction",
     "InvalidInput",
     "InvalidRequest",
@@ -29,10 +32,20 @@ __all__ = [
     "Unsolved",
     "VeselovaError",
     "shown",
+    "summary",
 ]
 
 #: Longest rendering of a given value in a message: enough to recognise it, short enough for one line.
 _SHOWN_CHARACTERS = 60
+
+#: Faults of one request that are reported, and those that its message spells out.
+MOST_FAULTS = 100
+_SPELLED_OUT = 10
+
+#: A name in a path is quoted up to here.
+_LONGEST_NAME = 100
+
+T = TypeVar("T")
 
 #: Texts besides numerals that are shown in quotes.
 _QUOTED = ("", "None", "True", "False")
@@ -40,14 +53,41 @@ _QUOTED = ("", "None", "True", "False")
 
 def shown(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
+    if isinstance(value, str):
+        value = value[: 2 * _SHOWN_CHARACTERS]
     try:
         bare = isinstance(value, (Fraction, Decimal)) or (isinstance(value, str) and not _reads_otherwise(value))
-        text = str(value) if bare else repr(value)
+        text = str(value) if bare else _SHORT.repr(value)
     except ValueError:  # an int of more digits than Python is willing to print
         text = f"an integer of about {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else "a value"
-    # Lone surrogates, which JSON strings can carry, cannot be written as UTF-8.
-    text = " ".join(text.encode("utf-8", "backslashreplace").decode("utf-8").split())
+    text = " ".join(_writable(text).split())
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+class _Short(Repr):
+    """``repr`` of no more than the beginning of a value: what was given may be as large as a request."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel = 10
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxarray = _SHOWN_CHARACTERS
+        self.maxstring = self.maxother = 4 * _SHOWN_CHARACTERS
+        self.maxlong = 5000
+
+    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
+        """Return the beginning of a dictionary, in its own order."""
+        if level <= 0:
+            return "{...}"
+        items = list(x.items())[:_SHOWN_CHARACTERS] if len(x) > _SHOWN_CHARACTERS else x.items()
+        return "{" + ", ".join(f"{self.repr1(key, level - 1)}: {self.repr1(item, level - 1)}" for key, item in items) + "}"
+
+
+_SHORT = _Short()
+
+
+def _writable(text: str) -> str:
+    """Return a text that UTF-8 can hold: lone surrogates, which JSON strings can carry, are spelled out."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _reads_otherwise(text: str) -> bool:
@@ -81,10 +121,15 @@ class InvalidInput(VeselovaError, ValueError):
     """
 
     def __init__(self, path: Sequence[str | int], required: str, given: str) -> None:
-        self.path = tuple(path)
-        self.required = required
-        self.given = given
-        super().__init__(f"{self.field}: required {required}; given {given}.")
+        self.path = tuple(_writable(part[:_LONGEST_NAME]) if isinstance(part, str) else part for part in path)
+        self.required = _writable(required)
+        self.given = _writable(given)
+        super().__init__(f"{self.field}: required {self.required}; given {self.given}.")
+
+    @property
+    def faults(self) -> tuple[InvalidInput, ...]:
+        """Return the faults that were found: this one, or all of an InvalidRequest."""
+        return (self,)
 
     @property
     def field(self) -> str:
@@ -97,12 +142,62 @@ class InvalidInput(VeselovaError, ValueError):
         return InvalidInput((*parents, *self.path), self.required, self.given)
 
 
-class InvalidRequest(VeselovaError, ValueError):
-    """A JSON request with faults, each an InvalidInput whose path starts at the request's root."""
+class InvalidRequest(InvalidInput):
+    """Several faults at once, each an InvalidInput; path, required and given are those of the first.
+
+    ``faults`` has the first MOST_FAULTS of them, and ``further`` says how many there are besides.
+    """
 
     def __init__(self, faults: Sequence[InvalidInput]) -> None:
-        self.faults = tuple(faults)
-        super().__init__(" ".join(str(fault) for fault in self.faults))
+        found = [single for fault in faults for single in fault.faults]
+        self._faults = tuple(found[:MOST_FAULTS])
+        self.further = len(found) - len(self._faults) + sum(getattr(fault, "further", 0) for fault in faults)
+        first = self._faults[0]
+        super().__init__(first.path, first.required, first.given)
+        self.args = (summary(self._faults, self.further),)
+
+    @property
+    def faults(self) -> tuple[InvalidInput, ...]:
+        """Return the faults that were found, MOST_FAULTS of them at most."""
+        return self._faults
+
+    def below(self, *parents: str | int) -> InvalidInput:
+        """Return the same faults, located inside the given parents."""
+        moved = InvalidRequest([fault.below(*parents) for fault in self._faults])
+        moved.further = self.further
+        return moved
+
+
+def summary(faults: Sequence[InvalidInput], further: int = 0) -> str:
+    """Return the first faults in words, and how many there are besides them and ``further`` ones."""
+    unsaid = len(faults[_SPELLED_OUT:]) + further
+    return " ".join(map(str, faults[:_SPELLED_OUT])) + (f" And {unsaid} more." if unsaid else "")
+
+
+class Faults:
+    """Collects the faults of parts that can be looked at one by one, so that all are reported at once."""
+
+    def __init__(self) -> None:
+        self.found: list[InvalidInput] = []
+
+    def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
+        """Return what a call gives, or None where it raises InvalidInput, whose faults are kept."""
+        try:
+            return call(*arguments, **options)
+        except InvalidInput as error:
+            self.found.append(error)
+            return None
+
+    def add(self, path: Sequence[str | int], required: str, given: str) -> None:
+        """Note a fault."""
+        self.found.append(InvalidInput(path, required, given))
+
+    def require_none(self) -> None:
+        """Raise InvalidInput for one fault, InvalidRequest for several."""
+        if len(self.found) == 1:
+            raise self.found[0]
+        if self.found:
+            raise InvalidRequest(self.found)
 
 
 class Unsolved(VeselovaError):

@@ -11,28 +11,26 @@ from anyio import to_thread
 from starlette.requests import Request
 from starlette.responses import Response
 
-from veselova.mechanics.decimals import FEWEST_DIGITS
-from veselova.service.admission import admit, read_json, require_acceptable
+from veselova.service.admission import require_acceptable
 from veselova.service.cache import Cache
 from veselova.service.connection import while_connected
 from veselova.service.delivery import Delivery, Wanted, answered, restored, solved
 from veselova.service.entry import DamagedEntry
 from veselova.service.formats import FORMATS, Format, format_of
-from veselova.service.identity import entity_tag, identity, is_identity, matches
+from veselova.service.identity import entity_tag, is_identity, matches
 from veselova.service.metrics import Metrics
 from veselova.service.negotiation import accepted_coding, accepted_type
 from veselova.service.pending import Pending
 from veselova.service.problem_details import Refused
-from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.reading import Reader
 from veselova.service.settings import Settings
 from veselova.service.spool import Spool, SpooledResponse
-from veselova.service.tasks import TASKS
 from veselova.service.workers import Workers
 
 __all__ = ["PROVENANCE", "Answers"]
 
-#: Numbers from which an answer is written to a file, and bytes of a kept one.
-_LARGE_NUMBERS, _LARGE_BYTES = 100_000, 1_000_000
+#: Bytes of a kept answer that is written to a file.
+_LARGE_BYTES = 1_000_000
 
 #: The header field that has the provenance of a trajectory, whatever its format, as JSON.
 PROVENANCE = "Veselova-Provenance"
@@ -47,8 +45,8 @@ _HIT = "veselova; hit"
 class Answers:
     """What one server answers, from its workers, its cache and its spool."""
 
-    def __init__(self, settings: Settings, workers: Workers, metrics: Metrics) -> None:
-        self._settings, self._workers, self._metrics = settings, workers, metrics
+    def __init__(self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics) -> None:
+        self._settings, self._workers, self._reader, self._metrics = settings, workers, reader, metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
         self._pending = Pending(self._cache)
         self._spool = Spool(settings.data_dir / "spool")
@@ -66,12 +64,12 @@ class Answers:
     async def document(self, kind: str, request: Request) -> Response:
         """Return the JSON answer of a comparison or a torus."""
         require_acceptable(_header(request, "accept"))
-        asked = await self._asked(TASKS[kind][0], request)
-        wanted = Wanted("json", _coding(request), self._place(_is_large(asked)))
+        asked = await self._reader.asked(kind, request)
+        wanted = Wanted("json", _coding(request), self._place(asked.large))
 
         async def work() -> Response:
-            with self._metrics.work(kind, asked.model_dump()):
-                delivery = await self._workers.run(answered, kind, asked.model_dump(), wanted, budget_s=asked.budget_s)
+            with self._metrics.work(kind, asked.system, asked.engine):
+                delivery = await self._workers.run(answered, kind, asked.content, wanted, budget_s=asked.budget_s)
             return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
 
         return await self._guarded(request, work, wanted.place)
@@ -79,16 +77,15 @@ class Answers:
     async def trajectory(self, request: Request) -> Response:
         """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
         form = _format(request)
-        asked = await self._asked(TrajectoryRequest, request)
-        stated = asked.model_dump()
-        name = identity(asked, stated)
+        asked = await self._reader.asked("trajectory", request)
+        name = asked.name
         await self._require_news(request, name, entity_tag(name, form.name))
-        wanted = Wanted(form.name, _coding(request), self._place(_is_large(asked)))
+        wanted = Wanted(form.name, _coding(request), self._place(asked.large))
         entry, content = self._cache.entry(name), self._pending.find(name)
-        task = (restored, content, wanted) if content else (solved, stated, wanted, entry)
+        task = (restored, content, wanted) if content else (solved, asked.content, wanted, entry)
 
         async def work() -> Response:
-            with self._metrics.work("trajectory", stated) as ending:
+            with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
                     delivery = await self._workers.run(*task, budget_s=asked.budget_s)
                     ending.kept = delivery.kept
@@ -146,11 +143,6 @@ class Answers:
 
         return await self._guarded(request, work, wanted.place)
 
-    async def _asked(self, model: type[TorusRequest], request: Request) -> Any:
-        asked = read_request(model, await read_json(request, self._settings))
-        admit(asked, self._settings)
-        return asked
-
     async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, budget_s: float) -> Delivery | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
@@ -205,13 +197,6 @@ def _format(request: Request) -> Format:
 
 def _coding(request: Request) -> str:
     return accepted_coding(_header(request, "accept-encoding"))
-
-
-def _is_large(asked: TorusRequest) -> bool:
-    if not isinstance(asked, ComparisonRequest):
-        return False
-    numbers = asked.time_count() * asked.problem.dimension**2 * asked.digits / FEWEST_DIGITS
-    return numbers > _LARGE_NUMBERS
 
 
 def _bytes(kept: bytes | str) -> int:

@@ -27,6 +27,7 @@ from veselova.service.metrics import Metrics
 from veselova.service.openapi import openapi_document
 from veselova.service.problem_details import Refused, problem_code, problem_response
 from veselova.service.readiness import missing_parts
+from veselova.service.reading import Reader
 from veselova.service.request_log import Failures, RequestLog, note
 from veselova.service.routes import router
 from veselova.service.security_headers import SecurityHeaders, add_documentation
@@ -52,7 +53,8 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     limits = settings or Settings()
     metrics = Metrics()
     workers = Workers(limits, metrics)
-    answers = Answers(limits, workers, metrics)
+    reader = Reader(limits, workers)
+    answers = Answers(limits, workers, reader, metrics)
     keys = open_keys(limits) if Policy.requires_keys(limits, loopback) else None
     if keys is not None and not any(key.revoked_at is None for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")
@@ -74,7 +76,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         redoc_url=None,
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
-    routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(limits, jobs))
+    routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(reader, jobs))
     for part in routers:
         app.router.routes.extend(part.routes)
     add_documentation(app)

@@ -41,12 +41,12 @@ def main() -> None:
 
 @contextmanager
 def _reported() -> Iterator[None]:
-    from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError
+    from veselova.mechanics.errors import InvalidInput, VeselovaError
     from veselova.service.problem_details import Refused
 
     try:
         yield
-    except (InvalidInput, InvalidRequest) as error:
+    except InvalidInput as error:
         _fail(str(error), 2)
     except Refused as error:
         _fail(str(error), 1 if error.code == "over-budget" else 2)
@@ -227,7 +227,7 @@ app.add_typer(server_commands.keys, name="keys")
 
 def _document(file: str) -> Any:
     from veselova.mechanics.errors import InvalidInput
-    from veselova.service.admission import decoded
+    from veselova.service.json_text import decoded
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")

@@ -7,8 +7,11 @@ import logging
 import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, nullcontext
+from importlib import import_module
 from typing import Any
 from urllib.parse import urlsplit
+
+import anyio.to_thread
 
 from veselova.mechanics.errors import BackendMissing, InvalidInput
 from veselova.service.interrupts import children_deaf
@@ -56,6 +59,8 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
     """
     require_scheduler(settings)
     try:
+        # It takes half a second to load, for which the server goes on answering.
+        await anyio.to_thread.run_sync(import_module, "distributed")
         import dask
         from distributed import Client, LocalCluster
         from distributed.security import Security

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Callable, Mapping
+import pickle
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -54,14 +55,14 @@ class Delivery:
     not_stored: str | None = None
 
 
-def answered(kind: str, request: Mapping[str, Any], wanted: Wanted) -> Delivery:
-    """Return the JSON answer of a kind other than a trajectory; ``request`` is the dump of a validated request."""
+def answered(kind: str, request: bytes, wanted: Wanted) -> Delivery:
+    """Return the JSON answer of a kind other than a trajectory; ``request`` is the pickle of a validated request's fields."""
     model, compute = TASKS[kind]
-    document = compute(model.model_validate(request))
+    document = compute(model.model_validate(pickle.loads(request)))
     return _delivered(lambda stream: write_document(document, stream), wanted, wanted.coding)
 
 
-def solved(request: Mapping[str, Any], wanted: Wanted, entry: Entry | None) -> Delivery:
+def solved(request: bytes, wanted: Wanted, entry: Entry | None) -> Delivery:
     """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed, and kept if that can be.
 
     A small entry is not written: it goes to the server, which does that when the answer has been sent.
@@ -76,13 +77,14 @@ def solved(request: Mapping[str, Any], wanted: Wanted, entry: Entry | None) -> D
             damaged = True
         except OSError as error:
             failure = error.strerror or str(error)
-    asked = TrajectoryRequest.model_validate(request)
+    stated = pickle.loads(request)
+    asked = TrajectoryRequest.model_validate(stated)
     trajectory = requested_trajectory(asked)
     kept: dict[str, Any] = {"damaged": damaged, "not_stored": failure}
     if entry is not None and failure is None:
-        content = packed(request, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
+        content = packed(stated, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
         try:
-            kept |= {"entry": content} if content else {"stored": entry.write(request, trajectory)}
+            kept |= {"entry": content} if content else {"stored": entry.write(stated, trajectory)}
         except OSError as error:
             kept["not_stored"] = error.strerror or str(error)
     return _written(asked, trajectory, wanted, **kept)

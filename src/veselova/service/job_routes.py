@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import anyio
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.mechanics.errors import InvalidInput
-from veselova.service.admission import admit, read_json, require_acceptable
+from veselova.service.admission import require_acceptable
 from veselova.service.download import MEDIA_TYPES
 from veselova.service.job_document import JobDocument, job_document
 from veselova.service.job_service import JobService
 from veselova.service.negotiation import accepted_type
 from veselova.service.problem_details import Refused
-from veselova.service.schemas import read_request
-from veselova.service.settings import Settings
-from veselova.service.sweep_request import SweepRequest
+from veselova.service.reading import Reader
 
 if TYPE_CHECKING:
     from veselova.service.jobs import Jobs, JobStatus
@@ -60,9 +58,9 @@ _Key = Annotated[str | None, Header(description="a request that comes again with
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
 
-def job_router(settings: Settings, service: JobService) -> APIRouter:
+def job_router(reader: Reader, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
-    routes, jobs = APIRouter(tags=["sweeps"]), _JobRoutes(settings, service)
+    routes, jobs = APIRouter(tags=["sweeps"]), _JobRoutes(reader, service)
     table: tuple[tuple[str, str, Any, str, dict[str, Any], dict[int | str, Any]], ...] = (
         ("POST", "/v1/sweeps", jobs.sweep, "Solve many problems", {"status_code": 202, "openapi_extra": _BODY}, _ACCEPTED),
         ("GET", "/v1/jobs", jobs.listed, "List the jobs, newest first", {}, {}),
@@ -85,10 +83,10 @@ def job_router(settings: Settings, service: JobService) -> APIRouter:
 
 
 class _JobRoutes:
-    """The endpoints, over one server's settings and jobs."""
+    """The endpoints, over one server's reader and jobs."""
 
-    def __init__(self, settings: Settings, service: JobService) -> None:
-        self._settings = settings
+    def __init__(self, reader: Reader, service: JobService) -> None:
+        self._reader = reader
         self._service = service
 
     async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
@@ -96,10 +94,8 @@ class _JobRoutes:
         require_acceptable(request.headers.get("accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")
-        document = await read_json(request, self._settings)
-        asked = await anyio.to_thread.run_sync(read_request, SweepRequest, document)
-        admit(asked, self._settings)
-        job = await self._service.ask(lambda jobs: jobs.submit(asked, idempotency_key))
+        asked = await self._reader.asked("sweep", request)
+        job = await self._service.ask(lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key))
         if not job.ended:
             (await self._service.sweeps()).begin(job.id)
         return _json(await self._document(job.id, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})

@@ -19,7 +19,7 @@ from veselova.service.database import chunks, connect, idempotency_keys, in_utc,
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
-from veselova.service.sweep_request import SweepRequest
+from veselova.service.sweep_request import SweepPlan, SweepRequest
 from veselova.service.whole_file import whole_file
 
 __all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs"]
@@ -93,7 +93,7 @@ class Jobs:
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(self, sweep: SweepRequest, key: str | None = None) -> Job:
+    def submit(self, sweep: SweepPlan | SweepRequest, key: str | None = None) -> Job:
         """Return the job of a sweep: a new one, or the one that the same request made, which goes on if it had been stopped,
         and is run again if its results were lost.
 
@@ -106,7 +106,7 @@ class Jobs:
             self._submit(sweep, key)
         return self.get(sweep.id)
 
-    def _submit(self, sweep: SweepRequest, key: str | None) -> None:
+    def _submit(self, sweep: SweepPlan | SweepRequest, key: str | None) -> None:
         with self._engine.begin() as connection:
             if key is not None:
                 self._claim(connection, key, sweep)
@@ -120,11 +120,11 @@ class Jobs:
             if key is not None and not _job_of(connection, key):
                 connection.execute(sa.insert(idempotency_keys).values(key=key, job_id=sweep.id))
 
-    def _claim(self, connection: sa.Connection, key: str, sweep: SweepRequest) -> None:
+    def _claim(self, connection: sa.Connection, key: str, sweep: SweepPlan | SweepRequest) -> None:
         if _job_of(connection, key) not in (None, sweep.id):
             raise InvalidInput(("Idempotency-Key",), "a key of its own for every request", "one that came with another request")
 
-    def _admit(self, connection: sa.Connection, sweep: SweepRequest) -> None:
+    def _admit(self, connection: sa.Connection, sweep: SweepPlan | SweepRequest) -> None:
         """Refuse a sweep that is beyond the limits, before anything of it is stored."""
         limits, size = self._settings, sweep.total * sweep.row_values * 8
         if sweep.total > limits.max_sweep_problems:
@@ -262,7 +262,7 @@ def _status(row: sa.RowMapping) -> dict[str, Any]:
     return {**{column: row[column] for column in _STATUS_COLUMNS}, **times, "done": int(row["done"])}
 
 
-def _new(sweep: SweepRequest) -> dict[str, Any]:
+def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
     return {
         "id": sweep.id,
         "request": sweep.canonical.decode(),

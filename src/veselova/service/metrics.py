@@ -16,7 +16,6 @@ from prometheus_fastapi_instrumentator import Instrumentator
 
 from veselova.service.problem_details import problem_code
 from veselova.service.request_log import note
-from veselova.service.systems import SYSTEMS
 from veselova.version import __version__
 
 __all__ = ["Ending", "Metrics"]
@@ -48,12 +47,12 @@ class Metrics:
         self._cache = Counter("veselova_cache", "Answers looked up in the cache, by result", ["result"], **here)
 
     @contextmanager
-    def work(self, kind: str, request: Mapping[str, Any]) -> Iterator[Ending]:
+    def work(self, kind: str, system: str, engine: str) -> Iterator[Ending]:
         """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too.
 
         An answer that was kept, and so needed no work, is not counted.
         """
-        engine, outcome, began, ending = _engine(kind, request), "stopped", time.perf_counter(), Ending()
+        outcome, began, ending = "stopped", time.perf_counter(), Ending()
         try:
             yield ending
             outcome = "solved"
@@ -64,7 +63,7 @@ class Metrics:
             if not ending.kept:
                 self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
                 self._outcomes.labels(kind, engine, outcome).inc()
-                note(system=request["problem"]["system"], engine=engine, outcome=outcome)
+                note(system=system, engine=engine, outcome=outcome)
 
     def refused(self, code: str) -> None:
         """Count a request that the service refused with this problem code."""
@@ -102,10 +101,3 @@ class _Family(Collector):
         for value, number in self._values().items():
             family.add_metric([value], number)
         return [family]
-
-
-def _engine(kind: str, request: Mapping[str, Any]) -> str:
-    """Return the engine that a valid request is for, the system's own where it names none."""
-    if kind != "trajectory":
-        return "both" if kind == "comparison" else "analytic"
-    return request["engine"] or next(iter(SYSTEMS[request["problem"]["system"]].problem_class.engines))

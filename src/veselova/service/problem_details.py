@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import orjson
 
-from veselova.mechanics.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved
+from veselova.mechanics.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved, summary
 
 if TYPE_CHECKING:
     from starlette.exceptions import HTTPException
@@ -62,8 +62,15 @@ _REFUSALS = {
     "over-budget": (504, "The time budget was used up"),
 }
 
-#: Python's spelling of constants → that of JSON.
-_JSON_CONSTANTS = {"None": "null", "True": "true", "False": "false"}
+#: Python's spelling of constants → that of JSON, or of those who write what JSON has not.
+_JSON_CONSTANTS = {
+    "None": "null",
+    "True": "true",
+    "False": "false",
+    "nan": "NaN",
+    "inf": "Infinity",
+    "-inf": "-Infinity",
+}
 
 
 class Refused(Exception):
@@ -90,10 +97,13 @@ def problem_document(error: Exception) -> dict[str, Any]:
     status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
     detail = str(error) if code != "internal-error" else "An unexpected error; it has been logged."
     document = _document(status, code, title, detail)
-    if isinstance(error, (InvalidInput, InvalidRequest)):
-        faults = [_in_json(fault) for fault in (error.faults if isinstance(error, InvalidRequest) else (error,))]
-        document["detail"] = " ".join(str(fault) for fault in faults)
+    if isinstance(error, InvalidInput):
+        faults = [_in_json(fault) for fault in error.faults]
+        further = getattr(error, "further", 0)
+        document["detail"] = summary(faults, further)
         document["errors"] = [{"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults]
+        if further:
+            document["further_errors"] = further
     if isinstance(error, Unsolved):
         document["outcome"] = error.outcome
     return document

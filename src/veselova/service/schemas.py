@@ -6,7 +6,6 @@ problem is built, so that Python, command line and HTTP refuse the same input wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -17,9 +16,10 @@ from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
 from veselova.mechanics.exact import exact_number, to_float
 from veselova.mechanics.times import uniform_times, validated_times
 from veselova.service.examples import BODY4, BODY4_PROBLEM
+from veselova.service.json_text import layers
 from veselova.service.systems import SYSTEMS, ProblemModel, Request, Times
 
-__all__ = ["ComparisonRequest", "TorusRequest", "TrajectoryRequest", "layers", "read_request"]
+__all__ = ["MOST_OUTPUTS", "ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
 _DEEPEST = 8
@@ -28,7 +28,7 @@ _DEEPEST = 8
 _MOST_FIELDS = 40
 
 #: No system has as many series.
-_MOST_OUTPUTS = 20
+MOST_OUTPUTS = 20
 
 #: A field name is quoted up to here.
 _LONGEST_NAME = 100
@@ -61,7 +61,7 @@ class ComparisonRequest(TorusRequest):
     formulation: Annotated[str | None, Field(description="numeric: which equations of the system are integrated")] = None
     outputs: Annotated[
         list[str] | None,
-        Field(min_length=1, max_length=_MOST_OUTPUTS, description="series of the system (GET /v1/systems); all when left out"),
+        Field(min_length=1, max_length=MOST_OUTPUTS, description="series of the system (GET /v1/systems); all when left out"),
     ] = None
     digits: Annotated[
         int, Field(ge=FEWEST_DIGITS, le=FEWEST_DIGITS, description="a comparison has the digits of the numeric engine")
@@ -150,19 +150,6 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     return request
 
 
-def layers(document: Any) -> Iterator[list[Any]]:
-    """Yield the values of a document level by level, the document itself first, without recursion."""
-    layer = [document]
-    while layer:
-        yield layer
-        layer = [
-            item
-            for value in layer
-            if isinstance(value, (dict, list))
-            for item in (value.values() if isinstance(value, dict) else value)
-        ]
-
-
 def _is_deeper(document: Any, levels: int) -> bool:
     """Return whether a document nests deeper than so many levels."""
     return any(isinstance(value, (dict, list)) for value in next(islice(layers(document), levels, None), ()))
@@ -190,7 +177,7 @@ def _fault(item: Any) -> InvalidInput:
         "literal_error": str(item.get("ctx", {}).get("expected", "")),
         "bool_type": "true or false",
         "too_short": "at least one entry",
-        "too_long": f"at most {_MOST_OUTPUTS} entries",
+        "too_long": f"at most {MOST_OUTPUTS} entries",
         "float_type": "a number",
         "int_type": "a whole number",
         "greater_than": "a number greater than 0",

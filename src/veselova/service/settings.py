@@ -41,7 +41,7 @@ class Settings(BaseSettings):
     worker_memory_mb: int = Field(
         default=2048, ge=256, description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused"
     )
-    max_body_bytes: int = Field(default=4_000_000, ge=1000, description="largest request body (200 000 times as a list)")
+    max_body_bytes: int = Field(default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)")
     max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
     max_text: int = Field(default=2100, ge=20, description="longest text in a request body (a number as a string)")
     max_dimension: int = Field(default=64, ge=2, description="largest n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -19,11 +20,11 @@ from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.veselova import Veselova
 from veselova.service.examples import BODY4_PROBLEM
 from veselova.service.parameters import Axis, Draw, Parameter, Path, components, is_double, parameters, replaced, tabulated
-from veselova.service.schemas import TorusRequest, TrajectoryRequest, read_request
+from veselova.service.schemas import MOST_OUTPUTS, TorusRequest, TrajectoryRequest, read_request
 from veselova.service.systems import SYSTEMS, Times
 from veselova.version import __version__
 
-__all__ = ["SweepRequest", "sweep_document"]
+__all__ = ["SweepPlan", "SweepRequest", "sweep_document"]
 
 _NUMBER = {"type": "number"}
 _PAIR = {"type": "array", "items": {"anyOf": [_NUMBER, {"type": "string"}]}, "minItems": 2, "maxItems": 2}
@@ -92,7 +93,8 @@ class SweepRequest(TorusRequest):
     method: Annotated[str | None, Field(description="of the motions")] = None
     formulation: Annotated[str | None, Field(description="of the motions")] = None
     outputs: Annotated[
-        list[str] | None, Field(min_length=1, description="series whose extremes are asked for; all when left out")
+        list[str] | None,
+        Field(min_length=1, max_length=MOST_OUTPUTS, description="series whose extremes are asked for; all when left out"),
     ] = None
     trajectories: Annotated[bool, Field(description="whether the outputs themselves are kept, as a Zarr store")] = False
     budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which one problem is given up")] = 10.0
@@ -225,7 +227,7 @@ class SweepRequest(TorusRequest):
         rows = _CHUNK_TORI if together else _CHUNK_ROWS
         return max(1, min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
 
-    @property
+    @cached_property
     def canonical(self) -> bytes:
         """Return the request as JSON, defaults filled in and fields sorted: equal for requests that mean the same.
 
@@ -236,9 +238,27 @@ class SweepRequest(TorusRequest):
         return orjson.dumps(document)
 
     @property
+    def plan(self) -> SweepPlan:
+        """Return what the store of jobs is told."""
+        numbers = (self.total, self.row_values, self.chunk_rows)
+        return SweepPlan(self.id, self.canonical, *numbers, self.trajectories)
+
+    @cached_property
     def id(self) -> str:
         """Return the hash of the request and the version of the engines."""
         return hashlib.sha256(self.canonical + __version__.encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What the store of jobs is told of a sweep: its hash, its canonical JSON, and how much there is to compute and keep."""
+
+    id: str
+    canonical: bytes
+    total: int
+    row_values: int
+    chunk_rows: int
+    trajectories: bool
 
 
 def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
