@@ -44,6 +44,7 @@ def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Array | None]:
     """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix.
 
+    The axes are a rotation, determinant +1, so that vector products and determinants of frames are the same along them.
     ``name``: of the argument, for its refusals.
     """
     if not is_matrix(A):
@@ -59,4 +60,10 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Ar
     values, axes = np.linalg.eigh(matrix / 2 + matrix.T / 2)  # the sum itself may leave the range of a float
     if values[0] <= n * np.finfo(float).eps * values[-1]:
         raise InvalidInput((name,), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
-    return tuple(map(Fraction, values.tolist())), axes
+    return tuple(map(Fraction, values.tolist())), _right_handed(axes)
+
+
+def _right_handed(axes: Array) -> Array:
+    """Return the axes, the last one reversed where the determinant is −1: eigenvectors come with any sign."""
+    axes[:, -1] *= np.linalg.slogdet(axes)[0]
+    return axes

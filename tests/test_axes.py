@@ -1,0 +1,151 @@
+"""Axes given as a matrix, in any order or reflected: no motion depends on the orientation that an eigensolver or a sort picks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stiefel_draws import random_columns
+from veselova import (
+    EllipsoidGeodesic,
+    EulerPoisson,
+    LRSystem,
+    NeumannSystem,
+    SeparableVeselova,
+    StiefelFlow,
+    Veselova,
+    VeselovaSO3,
+    solve,
+)
+from veselova.mechanics.euler_poisson import dual
+
+#: Matrices for each system, and the times of their motions.
+DRAWS = 60
+TIMES = [-0.7, 1.1]
+
+
+def orthogonal(rng: np.random.Generator, n: int) -> Any:
+    """Return a random orthogonal matrix: every other one is a reflection."""
+    return np.linalg.qr(rng.normal(size=(n, n)))[0]
+
+
+def tensors(rng: np.random.Generator, *sizes: int) -> Iterator[tuple[Any, Any, Any]]:
+    """Yield orthogonal matrices Q, diagonals D within a factor of 5, and Q D Qᵀ, symmetric, of the sizes in turn."""
+    for k in range(DRAWS):
+        n = sizes[k % len(sizes)]
+        turn, values = orthogonal(rng, n), np.exp(rng.uniform(0, np.log(5), n))
+        tensor = turn @ np.diag(values) @ turn.T
+        yield turn, values, (tensor + tensor.T) / 2
+
+
+def start(rng: np.random.Generator, n: int) -> tuple[Any, Any]:
+    """Return a unit vector and a unit tangent."""
+    q, v = orthogonal(rng, n)[:, :2].T
+    return q, v
+
+
+def agree(first: Any, second: Any, *names: str) -> None:
+    """Hold two trajectories of one motion within both errors, and rounding of a turn."""
+    for name in names:
+        gap = np.abs(first.series(name) - second.series(name)).reshape(len(TIMES), -1).max(axis=1)
+        assert np.all(gap <= first.error + second.error + 1e-11), name
+
+
+def test_a_body_whose_eigenvectors_are_a_reflection_runs_forwards() -> None:
+    problem = VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], [0.6, 0, 0.8], [0.8, 1, -0.6])
+    for engine in ("analytic", "numeric"):
+        trajectory = solve(problem, [1.0], engine)
+        assert np.max(np.abs(trajectory.gamma[0] - [-0.323967005, 0.834201826, 0.446265271])) < 1e-9
+    assert np.isclose(np.linalg.det(problem.axes), 1.0)
+
+
+@pytest.mark.parametrize("potential", [None, {"clebsch": 0.4}, {"family": [0.1, 0.2, 0, 0, 0]}])
+def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(potential: Any, rng: np.random.Generator) -> None:
+    for _, _, tensor in tensors(rng, 3):
+        gamma, v = start(rng, 3)
+        problem = VeselovaSO3(tensor, gamma, np.cross(v, gamma), potential, normalize=True)
+        closed, integrated = solve(problem, TIMES, "analytic"), solve(problem, TIMES, "numeric")
+        agree(closed, integrated, "frame", "Omega", "momentum", "multiplier")
+        assert np.allclose(np.linalg.det(closed.frame), 1.0)
+
+
+def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_have_its_orientation(
+    rng: np.random.Generator,
+) -> None:
+    for _, _, tensor in tensors(rng, 3):
+        gamma, v = start(rng, 3)
+        Omega = np.cross(v, gamma)
+        problem = VeselovaSO3(tensor, gamma, Omega, normalize=True)
+        q_dot = np.cross(problem.gamma, problem.Omega)
+        assert np.allclose(problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14)
+        neumann = problem.neumann()
+        assert np.allclose(problem.axes @ neumann.q, problem.gamma, atol=1e-14)
+        assert np.cross(problem.axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
+        assert neumann.q_prime @ problem.axes.T @ q_dot > 0
+        assert np.allclose(np.cross(dual(problem).gamma, dual(problem).Omega), q_dot, atol=1e-13)
+        assert np.allclose(np.linalg.det([problem.frame, dual(problem).frame, neumann.frame]), 1.0)
+
+
+def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Generator) -> None:
+    for turn, values, matrix in tensors(rng, 2, 3, 4):
+        q, v = start(rng, len(turn))
+        given, along = Veselova(matrix, q, v, normalize=True), Veselova(values, turn.T @ q, turn.T @ v, normalize=True)
+        assert np.isclose(np.linalg.det(given.axes), 1.0)
+        assert np.isclose(np.linalg.det(given.to_body_axes(given.frame)), 1.0)
+        closed, there = solve(given, TIMES), solve(along, TIMES)
+        assert np.max(np.abs(closed.q - there.q @ turn.T)) < 1e-11
+        agree(closed, solve(given, TIMES, "numeric"), "frame", "q_dot", "omega")
+
+
+def test_a_free_body_in_reflected_axes_moves_as_its_image(rng: np.random.Generator) -> None:
+    for turn, values, tensor in tensors(rng, 3):
+        gamma, Omega = start(rng, 3)[0], rng.normal(size=3)
+        frame = np.column_stack([gamma, np.linalg.svd(gamma[None])[2][1:].T])
+        handed = np.linalg.det(turn)  # Ω is no vector: a reflection turns it round
+        along = EulerPoisson(values, gamma, Omega, {"clebsch": 0.3}, frame, normalize=True)
+        given = EulerPoisson(tensor, turn @ gamma, handed * turn @ Omega, {"clebsch": 0.3}, turn @ frame, normalize=True)
+        one, other = solve(along, TIMES), solve(given, TIMES)
+        assert np.max(np.abs(other.frame - turn @ one.frame)) < 1e-10
+        assert np.max(np.abs(other.Omega - handed * one.Omega @ turn.T)) < 1e-9
+        natural = EulerPoisson(tensor, turn @ gamma, handed * turn @ Omega, normalize=True)
+        assert np.isclose(np.linalg.det(natural.frame), 1.0)
+
+
+def reflected_operator(turn: Any, matrix: Any) -> Any:
+    """Return 𝓘 of so(n) in turned axes, on the coefficients of E_i∧E_j: Ad_Q 𝓘 Ad_Qᵀ."""
+    n = len(turn)
+    pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
+    adjoint = np.array([[turn[i, k] * turn[j, m] - turn[j, k] * turn[i, m] for k, m in pairs] for i, j in pairs])
+    turned = adjoint @ matrix @ adjoint.T
+    return {"matrix": (turned + turned.T) / 2}
+
+
+def test_an_lr_system_and_its_reduction_in_reflected_axes_move_as_their_images(rng: np.random.Generator) -> None:
+    for _, _, operator in tensors(rng, 3, 6):
+        n = {3: 3, 6: 4}[len(operator)]
+        turn, X, raw = orthogonal(rng, n), random_columns(rng, n, 2), rng.normal(size=(n, 2)) / n
+        plain = StiefelFlow({"matrix": operator}, X, X_dot=raw, normalize=True)
+        image = StiefelFlow(reflected_operator(turn, operator), turn @ plain.X, turn @ plain.P, normalize=True)
+        assert np.max(np.abs(solve(image, TIMES).X - turn @ solve(plain, TIMES).X)) < 1e-10
+        g, skew = orthogonal(rng, n), rng.normal(size=(n, n)) / n
+        omega = skew - skew.T
+        body = LRSystem(n, 1, {"matrix": operator}, g, omega)
+        turned = LRSystem(n, 1, reflected_operator(turn, operator), g @ turn.T, turn @ omega @ turn.T)
+        assert np.max(np.abs(solve(turned, TIMES).frame - turn @ solve(body, TIMES).frame)) < 1e-10
+
+
+def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Generator) -> None:
+    for n in [3, 4] * (DRAWS // 2):
+        A, (q, v) = np.exp(rng.uniform(0, np.log(5), n)), start(rng, n)
+        turn = np.eye(n)[rng.permutation(n)] * rng.choice([-1.0, 1.0], n)
+        order = np.abs(turn).argmax(axis=1)
+        for system in (Veselova, NeumannSystem, SeparableVeselova, EllipsoidGeodesic):
+            x, w = (np.sqrt(A) * q, np.sqrt(A) * v) if system is EllipsoidGeodesic else (q, v)
+            portrait = "X" if system is EllipsoidGeodesic else "q"
+            more = ({"quadratic": 0.3, "quartic": 0.1},) if system is SeparableVeselova else ()
+            one = solve(system(A, x, w, *more, normalize=True), TIMES).series(portrait)
+            other = solve(system(A[order], turn @ x, turn @ w, *more, normalize=True), TIMES).series(portrait)
+            assert np.max(np.abs(other - one @ turn.T)) < 1e-10, system
