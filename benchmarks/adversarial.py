@@ -1,14 +1,17 @@
-"""Starts at which closed forms usually fail, n = 2…8, against the same chain in ball arithmetic.
+"""Starts at which closed forms usually fail, against 20 digits, binary128 or integration; of every system with a closed form.
 
-    python benchmarks/adversarial.py [starts] [seed] [seconds for one truth]      default 1000, 1, 5
+    python benchmarks/adversarial.py [starts] [seed] [seconds for one truth] [system]      default 1000, 1, 5, veselova
 
 Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-300, and exactly zero), equal A's, coordinate subspaces, A's
-over twelve orders of magnitude, speeds from 1e-150 to 1e150; one start in four to ten radians or twenty cycles of the fastest
-phase, the others to three tenths of that. Truth has 20 digits, in balls, within so many seconds of processor time, or 34
-from Neumann's equations in binary128, within a few thousand steps, whichever is tried first (FIRST_INTEGRATED). Prints
-per class how many there were and how many could not be solved, the largest true error of the frame, the largest reported one,
-and the largest true error over the one reported at the same time (at most 1); then the starts that broke a promise.
-"Without truth" are those for which neither truth could be had. Ctrl-C prints what has been seen.
+over twelve orders of magnitude, speeds and entries from 1e-300 to 1e300, rest, equilibria, degenerate potentials; n = 2…8. One
+start in four to ten radians or twenty cycles of the fastest phase, the others to three tenths of that. Truth of tori has 20
+digits, in balls, within so many seconds of processor time, or 34 from Neumann's equations in binary128, within a few thousand
+steps, whichever is tried first (FIRST_INTEGRATED). Where neither serves, with potentials, the closed form is compared with
+heyoka's Taylor series: the difference, against the sum of both errors.
+Prints per class how many there were, how many were refused by name and how many failed, the largest true error of the bounded
+series, the largest reported one, the median of reported over true errors, and the largest true error over the one reported at
+the same time (at most 1); then the starts that broke a promise. "Without truth" are those for which none could be had. True
+errors count as ε/2 at least. Ctrl-C prints what has been seen.
 """
 
 from __future__ import annotations
@@ -26,104 +29,82 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.solution import Solution
+from veselova.mechanics.problem import Problem
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import CLASSES, adversarial_start
-from truth import true_motion
+from system_draws import CLASSES_OF, adversarial_system
+from verdict import against_truth, time_unit
 
-DIGITS = 20
+#: No true error counts as less: half a unit in the last place of one.
+LEAST = float(np.finfo(float).eps) / 2
 
-#: Steps of an integration in binary128: half a minute at n = 8.
-STEPS = 3000
-
-#: Classes at which balls need longer than integration.
-FIRST_INTEGRATED = ("near a separatrix", "separatrix", "wide A's")
-
-
-def time_unit(problem: vs.Veselova) -> float:
-    """Return the time of a radian of turning, or of two cycles of the fastest phase where that is shorter."""
-    fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
-    return min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
+#: What a start ended in besides figures.
+REFUSED, NO_TRUTH = "refused", "without truth"
 
 
-def measured(i: int, seed: int, patience: int) -> tuple[int, str, int, Any]:
-    """Return (i, class, n, answer): (true error, reported error, largest ratio), None without truth, or what failed."""
+def drawn(rng: np.random.Generator, system: str, n: int) -> tuple[str, Callable[[], Problem]]:
+    """Return the class of a start, and what makes it."""
+    if system != "veselova":
+        return adversarial_system(rng, system, n)
+    name, problem = adversarial_start(rng, n)
+    return name, lambda: problem
+
+
+def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, int, Any]:
+    """Return (i, class, n, answer): (true error, reported error, reported/true, largest true/reported), or how it ended."""
     rng = np.random.default_rng([seed, i])
     n = 2 + i % 7
-    name, problem = adversarial_start(rng, n)
+    name, make = drawn(rng, system, n)
     try:
         with warnings.catch_warnings(action="error"):
+            problem = make()
             times = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * time_unit(problem) * (1.0 if i % 4 == 0 else 0.3)
-            found = vs.solve(problem, times)
+            found = vs.solve(problem, times, "analytic")
+    except (vs.InvalidInput, vs.Unsolved) as refusal:
+        return i, name, n, (REFUSED, str(refusal))
     except Exception as error:
         return i, name, n, f"{type(error).__name__}: {error}"[:150]
     try:
-        frame = true_frame(name, problem, times, patience)
+        off, allowed = against_truth(name, found, patience)
+    except (TimeoutError, vs.Unsolved):
+        return i, name, n, (NO_TRUTH, "")
     except Exception as error:
         return i, name, n, f"the truth, {type(error).__name__}: {error}"[:150]
-    if frame is None:
-        return i, name, n, None
-    off = np.max(np.abs(found.frame - frame), axis=(1, 2))
-    return i, name, n, (float(np.max(off)), float(np.max(found.error)), float(np.max(off / found.error)))
+    figures = np.max(off), np.max(found.error), np.median(found.error / np.maximum(off, LEAST)), np.max(off / allowed)
+    return i, name, n, tuple(float(x) for x in figures)
 
 
-def true_frame(name: str, problem: vs.Veselova, times: Any, patience: int) -> Any:
-    """Return the frames in balls or in binary128, whichever can be had, or None."""
-    ways: list[Callable[[], Any]] = [
-        lambda: _within(patience, lambda: vs.solve(problem, times, digits=DIGITS).frame),
-        lambda: true_motion(problem, times, most_steps=STEPS)[0],
-    ]
-    for way in reversed(ways) if name in FIRST_INTEGRATED else ways:
-        try:
-            return way()
-        except (TimeoutError, vs.Unsolved):
-            continue
-    return None
-
-
-def _within(seconds: int, call: Callable[[], Any]) -> Any:
-    signal.signal(signal.SIGPROF, _give_up)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        return call()
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-
-
-def _give_up(*_: object) -> None:
-    raise TimeoutError
-
-
-def main(count: int, seed: int, patience: int) -> None:
-    rows: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    failures: dict[str, int] = defaultdict(int)
-    unverified: dict[str, int] = defaultdict(int)
+def main(count: int, seed: int, patience: int, system: str) -> None:
+    rows: dict[str, list[tuple[float, float, float, float]]] = defaultdict(list)
+    ended: dict[tuple[str, str], int] = defaultdict(int)
     broken = []
+    task = partial(measured, seed=seed, patience=patience, system=system)
     with multiprocessing.get_context("fork").Pool(initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
         try:
-            for i, name, n, answer in pool.imap_unordered(partial(measured, seed=seed, patience=patience), range(count)):
-                if answer is None:
-                    unverified[name] += 1
-                elif isinstance(answer, str):
-                    failures[name] += 1
+            for i, name, n, answer in pool.imap_unordered(task, range(count)):
+                if isinstance(answer, str):
+                    ended[name, "failed"] += 1
                     broken.append((i, name, n, answer))
+                elif isinstance(answer[0], str):
+                    ended[name, answer[0]] += 1
                 else:
                     rows[name].append(answer)
-                    if answer[2] > 1:
-                        broken.append((i, name, n, f"error/reported {answer[2]:.3g}, error {answer[0]:.3g}"))
+                    if not answer[3] <= 1:
+                        broken.append((i, name, n, f"true/reported {answer[3]:.3g}, error {answer[0]:.3g}"))
         except KeyboardInterrupt:
             pool.terminate()
-    print("class                    starts   failures   without truth   largest error   largest reported   error/reported")
-    for name in CLASSES:
-        errors, reported, ratios = np.array(rows[name]).reshape(-1, 3).T if rows[name] else np.zeros((3, 1))
-        total = len(rows[name]) + failures[name] + unverified[name]
-        figures = f"{np.max(errors):13.1e}   {np.max(reported):16.1e}   {np.max(ratios):14.2f}"
-        print(f"{name:22s}   {total:6d}   {failures[name]:8d}   {unverified[name]:13d}   {figures}")
+    print(f"{system:28s} starts  refused  failed  without truth  largest error  largest reported  reported/true  true/reported")
+    for name in CLASSES if system == "veselova" else CLASSES_OF[system]:
+        others = [ended[name, how] for how in (REFUSED, "failed", NO_TRUTH)]
+        errors, reported, pessimism, ratios = np.array(rows[name]).reshape(-1, 4).T if rows[name] else np.zeros((4, 1))
+        figures = f"{np.max(errors):13.1e}  {np.max(reported):16.1e}  {np.median(pessimism):13.1f}  {np.max(ratios):13.2f}"
+        print(f"{name:28s} {len(rows[name]) + sum(others):6d}  {others[0]:7d}  {others[1]:6d}  {others[2]:13d}  {figures}")
     for item in broken:
         print(*item)
 
 
 if __name__ == "__main__":
-    main(*(int(x) for x in (*sys.argv[1:], *("1000", "1", "5")[len(sys.argv) - 1 :])))
+    starts, first, seconds, chosen = (*sys.argv[1:], *("1000", "1", "5", "veselova")[len(sys.argv) - 1 :])
+    main(int(starts), int(first), int(seconds), chosen)

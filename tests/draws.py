@@ -63,7 +63,15 @@ def random_riemann_matrix(rng: np.random.Generator, genus: int, smallest: float 
 
 def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
     """Return the name of a class of starts at which closed forms usually fail, and one of it, in exact rationals."""
-    name = str(rng.choice(CLASSES))
+    name, A, q, v = adversarial_data(rng, n, CLASSES)
+    return name, Veselova(A, q, v, normalize=True)
+
+
+def adversarial_data(
+    rng: np.random.Generator, n: int, classes: tuple[str, ...]
+) -> tuple[str, list[Fraction], list[Fraction], list[Fraction]]:
+    """Return the name of one of the classes, A, q of any length and v not along q, in exact rationals."""
+    name = str(rng.choice(classes))
     A, q, v = (_fractions(rng, n, low) for low in (0.3, -1.0, -1.0))
     A = [a + Fraction(1, 5) for a in A]
     power = Fraction(1, 10 ** int(rng.integers(1, 301)))
@@ -96,7 +104,7 @@ def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
     if name == "along an axis":
         q = [Fraction(int(i == 0)) for i in range(n)]
     v = v if any(_wedge(q, v)) else [q[(i + 1) % n] * (1 if i % 2 else -1) + v[i] for i in range(n)]
-    return name, Veselova(A, q, v, normalize=True)
+    return name, A, q, v
 
 
 #: The classes of adversarial starts; what cannot be had for n = 2 falls back to a plain draw.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.ellipsoid import EllipsoidGeodesic
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.torus_problem import TorusProblem
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _CONTEXT.dps = 45
 
 
 @lru_cache(maxsize=16)
-def _integrator(n: int) -> Any:
+def _integrator(n: int, time: str = "t") -> Any:
     import heyoka as hy
 
     quad = hy.real128
@@ -38,7 +38,7 @@ def _integrator(n: int) -> Any:
     def dot(*factors: Any) -> Any:
         return hy.sum([np.prod(list(terms)) for terms in zip(*factors, strict=True)])
 
-    rate = hy.sqrt(W / dot(A, q, q))
+    rate = {"t": hy.sqrt(W / dot(A, q, q)), "s": W * dot(A, q, q), "tau1": W}[time]  # dτ₁/d(time)
     multiplier = (dot(inverse, q, q) - dot(v, v)) / dot(q, q)
     equations = [(a, rate * b) for a, b in zip(q, v, strict=True)]
     equations += [(b, rate * (multiplier - c) * a) for a, b, c in zip(q, v, inverse, strict=True)]
@@ -51,10 +51,13 @@ def _integrator(n: int) -> Any:
     return hy.taylor_adaptive(equations, zeros, fp_type=quad, compact_mode=True, pars=[quad(1)] * (2 * n + 1))
 
 
-def true_motion(problem: Veselova, times: Array, frame: Any = None, most_steps: int = MOST_STEPS) -> tuple[Array, Array, Array]:
-    """Return (frame, q̇, τ₁) at the times, rounded to double from 34 digits; ``frame`` are exact strings where given.
+def true_motion(
+    problem: TorusProblem, times: Array, frame: Any = None, most_steps: int = MOST_STEPS
+) -> tuple[Array, Array, Array]:
+    """Return (frame, velocity, τ₁) at the problem's own times, rounded to double from 34 digits; ``frame``: exact strings.
 
-    A frame left to the problem is taken as the problem's own doubles, made orthogonal in high precision.
+    A frame left to the problem is taken as the problem's own doubles, made orthogonal in high precision. The velocity is dq/dt,
+    or dq/dτ₁ but for Veselova's system.
     """
     import heyoka as hy
 
@@ -68,10 +71,7 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None, most_steps: 
     q = [x / length for x in q]
     slope = mp.fsum(x * y for x, y in zip(q, q_dot, strict=True))
     q_dot = [y - slope * x for x, y in zip(q, q_dot, strict=True)]
-    speed = max(abs(y) for y in q_dot)
-    q_dot = [y / speed for y in q_dot]
-    wedge = mp.fsum(A[i] * A[j] * (q[i] * q_dot[j] - q[j] * q_dot[i]) ** 2 for j in range(n) for i in range(j))
-    rate = mp.sqrt(wedge / mp.fsum(a * x * x for a, x in zip(A, q, strict=True)))
+    wedge, rate, speed, q_dot = _start(problem.time, A, q, q_dot, mp.sqrt(mp.mpf(unit.numerator) / unit.denominator))
     columns = [q]
     source = problem.frame if frame is None else frame
     for k in range(1, n):
@@ -88,7 +88,7 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None, most_steps: 
 
     start = [*q, *(y / rate for y in q_dot), *(columns[k][i] for k in range(1, n) for i in range(n)), mp.zero]
     parameters = [*A, *(1 / a for a in A), wedge]
-    integrator = _integrator(n)
+    integrator = _integrator(n, problem.time)
     integrator.pars[:] = [quad(x) for x in parameters]
     results = np.empty((times.size, len(start)))
     for direction in (1, -1):
@@ -105,9 +105,31 @@ def true_motion(problem: Veselova, times: Array, frame: Any = None, most_steps: 
     # The equations list the frame column by column, in the order of the state.
     true_frame[:, :, 1:] = results[:, 2 * n : -1].reshape(-1, n - 1, n).transpose(0, 2, 1)
     velocity = results[:, n : 2 * n]
+    root = float(mp.sqrt(mp.mpf(unit.numerator) / unit.denominator))
+    if problem.time != "t":
+        return true_frame, velocity / root, results[:, -1] * root
     weight = np.sum(results[:, :n] ** 2 * np.array([float(a) for a in A]), axis=1)
     velocity = velocity * (np.sqrt(float(wedge) / weight)[:, None] * float(speed))
-    return true_frame, velocity, results[:, -1] * float(mp.sqrt(mp.mpf(unit.numerator) / unit.denominator))
+    return true_frame, velocity, results[:, -1] * root
+
+
+def _start(time: str, A: Any, q: Any, q_dot: Any, root: Any) -> tuple[Any, Any, Any, Any]:
+    """Return (W, by what the velocity is to be divided, one over the unit of time, the velocity); ``root``: of the unit of A.
+
+    With w the A-orthogonal part of q̇: (dτ₁/dt)² = (w,Aw) = W/(q,Aq), and dτ₁/ds = √J (q,Aq), J = (w,Aw)/((Aw,Aw)(q,Aq)).
+    """
+    mp, n = _CONTEXT, len(A)
+    if time == "tau1":  # in units of root
+        return mp.one, 1 / root, 1 / root, q_dot
+    speed = max(abs(y) for y in q_dot)
+    v = [y / speed for y in q_dot]
+    wedge = mp.fsum(A[i] * A[j] * (q[i] * v[j] - q[j] * v[i]) ** 2 for j in range(n) for i in range(j))
+    qAq, qAv = (mp.fsum(a * x * y for a, x, y in zip(A, q, other, strict=True)) for other in (q, v))
+    rate = mp.sqrt(wedge / qAq)
+    if time == "t":
+        return wedge, rate, speed, v
+    w = [y - qAv / qAq * x for x, y in zip(q, v, strict=True)]
+    return rate / mp.sqrt(qAq * mp.fsum((a * x) ** 2 for a, x in zip(A, w, strict=True))), rate, 1 / root, v
 
 
 @lru_cache(maxsize=16)

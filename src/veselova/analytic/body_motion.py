@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from veselova.analytic.motion import Motion
 from veselova.analytic.panel_integral import integrated
 from veselova.analytic.separable_orbit import SeparableOrbit
-from veselova.analytic.separated_curve import SeparableStart
+from veselova.analytic.separated_curve import SeparableStart, drawn_apart
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import exact_number, exact_vector
 from veselova.mechanics.problem import Series
@@ -27,9 +27,6 @@ from veselova.mechanics.veselova_so3 import VeselovaSO3
 __all__ = ["BodyMotion"]
 
 Array = NDArray[np.float64]
-
-#: Equal moments are drawn apart by this part of themselves, far below any digit.
-_APART = Fraction(1, 10**30)
 
 #: Step of a difference quotient in a phase.
 _STEP = 1e-6
@@ -56,10 +53,7 @@ class BodyMotion(Motion[VeselovaSO3]):
             )
         alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
         alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
-        moments = [problem.moments[i] for i in order]
-        for i in (1, 2):
-            if moments[i] <= moments[i - 1]:
-                moments[i] = moments[i - 1] * (1 + _APART)
+        moments = list(drawn_apart([problem.moments[i] for i in order]))
         gamma, Omega = (self._principal(vector) for vector in (problem.gamma, problem.Omega))
         x, w = ([Fraction(float(v[i])) for i in order] for v in (gamma, Omega))
         handed = 1 if order[1] - order[0] in (1, -2) else -1  # whether the sorted axes keep the sense of rotation

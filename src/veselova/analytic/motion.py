@@ -42,12 +42,17 @@ class Motion(ABC, Generic[P]):
     def along(self, grid: Array) -> Trajectory:
         """Return the trajectory at validated times."""
         began = time.perf_counter()
-        if not self.problem.moves:
+        if self._rests:
             provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
         series, error, method, details = self._evaluated(grid)
         provenance = Provenance.since(began, "analytic", method, details)
         return Trajectory(self.problem, grid, _SAFETY * error, series, provenance, dense=self)
+
+    @property
+    def _rests(self) -> bool:
+        """Return whether nothing moves by as much as the last digit of a double shows."""
+        return not self.problem.moves
 
     @abstractmethod
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:

@@ -92,11 +92,10 @@ class Periods(AngleSeries):
         size = max(1, _BLOCK // (self.genus * (2 * self.genus + 1)))
         return tuple(Interval(self.curve, tuple(lefts[first : first + size])) for first in range(0, len(lefts), size))
 
-    def require_moduli(self) -> None:
-        """Raise Unsolved where k'² of an interval, which has the widths of both its neighbours as factors, is no double."""
-        if any(np.min(block.jacobi.complement) < sys.float_info.min for block in self._blocks):
-            reason = "two of the narrow intervals beside one another have widths whose product leaves the range of a float"
-            raise Unsolved("beyond-floats", reason)
+    @property
+    def has_moduli(self) -> bool:
+        """Return whether k'² of every interval, which has the widths of both its neighbours as factors, is a double."""
+        return all(np.min(block.jacobi.complement) >= sys.float_info.min for block in self._blocks)
 
     @property
     def narrowest_gap(self) -> float:

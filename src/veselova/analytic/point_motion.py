@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.motion import Motion
 from veselova.analytic.separable_orbit import SeparableOrbit
-from veselova.analytic.separated_curve import SeparableStart
+from veselova.analytic.separated_curve import SeparableStart, drawn_apart
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
 
@@ -36,7 +36,7 @@ class PointMotion(Motion[SeparableVeselova]):
         )
         size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableOrbit(SeparableStart(inverse, q, v, self.problem.polynomial, walls, size))
+        return SeparableOrbit(SeparableStart(drawn_apart(inverse), q, v, self.problem.polynomial, walls, size))
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit

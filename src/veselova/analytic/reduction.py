@@ -81,8 +81,10 @@ class Moving:
         return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
 
     def hardly_moves(self, axis: int, share: Fraction) -> bool:
-        """Return whether q_i and q̇_i are both below √share of |q| and |q̇|."""
+        """Return whether q_i and q̇_i are both below √share of |q| and |q̇|, or of |q|√I where q̇ is Neumann's and may vanish."""
         q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
+        if self.time == "tau1":
+            v_total += q_total / self.unit
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
 
     @property

@@ -34,12 +34,16 @@ from veselova.analytic.rational_polynomial import (
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["SeparableStart", "SeparatedCut", "moving_axes", "separated_cuts"]
+__all__ = ["SeparableStart", "SeparatedCut", "drawn_apart", "moving_axes", "separated_cuts"]
 
 Array = NDArray[np.float64]
 
 #: Digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
+
+#: I's nearer than this part of themselves are drawn apart by it: far below any digit, and products of such differences are
+#: floats.
+_APART = Fraction(1, 10**30)
 
 #: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a separatrix.
 _SEPARATRIX = 1e-12
@@ -189,6 +193,14 @@ class SeparatedCut:
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
         return np.asarray(np.sqrt(self._factors(psi)[1]) / (2 * self.points.density))
+
+
+def drawn_apart(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Return increasing numbers, of which those that are equal, or nearly so, are drawn apart by 1e-30 of themselves."""
+    result = list(values)
+    for i in range(1, len(result)):
+        result[i] = max(result[i], result[i - 1] * (1 + _APART))
+    return tuple(result)
 
 
 class _Resting(Exception):

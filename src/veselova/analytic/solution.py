@@ -22,7 +22,7 @@ from veselova.analytic.periods import Periods
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
-from veselova.analytic.spectrum import resolved
+from veselova.analytic.spectrum import COINCIDE, Resolved, resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
 from veselova.analytic.survey import FEW, Survey, drawn_phases
@@ -55,6 +55,10 @@ _NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
 #: By how much dt/dτ₁ may vary for a Fourier clock.
 WIDEST_RATE = 1e10
 
+#: Branch points nearer than 10 to minus this count as one where two narrower intervals are neighbours: their widths then have a
+#: product, as moduli ask for.
+_COINCIDE_BESIDE = 140
+
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
@@ -69,11 +73,9 @@ class Solution:
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
         if not problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found = resolved(moving_part(problem), DOUBLE.digits, distance)
+        found, self.periods = _periods(problem, distance)
+        self.curve = self.periods.curve
         self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
-        self.curve = Curve.of(self.spectrum, DOUBLE)
-        self.periods = Periods(self.curve)
-        self.periods.require_moduli()
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, self.start.signs)
@@ -270,3 +272,14 @@ class Solution:
         """Return the λ's of all directions, from an attitude that has those of the moving ones."""
         frozen = np.tile(1 / to_float(self.moving.frozen), (attitude.q.shape[0], 1))
         return np.sort(np.concatenate([attitude.spheroconic / float(self.moving.unit), frozen], axis=1), axis=1)
+
+
+def _periods(problem: TorusProblem, distance: Fraction | None) -> tuple[Resolved, Periods]:
+    """Return the spectrum of what moves and the periods of its curve, whose moduli are doubles."""
+    moving = moving_part(problem)
+    for coincide in (COINCIDE, _COINCIDE_BESIDE):
+        found = resolved(moving, DOUBLE.digits, distance, coincide=coincide)
+        periods = Periods(Curve.of(found.spectrum, DOUBLE))
+        if periods.has_moduli:
+            break
+    return found, periods

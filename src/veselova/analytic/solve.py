@@ -112,6 +112,17 @@ class _TorusMotion(Motion[TorusProblem]):
         return Solution(self.problem)
 
     @cached_property
+    def _rests(self) -> bool:
+        if not self.problem.moves:
+            return True
+        try:
+            return self._solution is None
+        except Unsolved as refusal:  # beside a stable equilibrium nothing moves by a digit
+            if refusal.outcome == "at-rest":
+                return True
+            raise
+
+    @cached_property
     def _route(self) -> Route:
         return Route(self._solution, self.method)
 

@@ -25,14 +25,14 @@ from veselova.analytic.reduction import Moving
 from veselova.analytic.secular import TooFewDigits, zeros_between_poles
 from veselova.mechanics.errors import InternalContradiction, Unsolved
 
-__all__ = ["Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
+__all__ = ["COINCIDE", "Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
 
 #: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
 _InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
 #: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to hold their differences, and
 #: squares of roots of them.
-_COINCIDE = 290
+COINCIDE = 290
 
 #: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by 1e-16) for the sums themselves.
 _SPARE = 12
@@ -92,23 +92,31 @@ class Resolved:
     separatrices: tuple[int, ...]
 
 
-def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyond: int = 0) -> Resolved:
+def resolved(
+    moving: Moving, digits: int, distance: Fraction | None = None, beyond: int = 0, coincide: int = COINCIDE
+) -> Resolved:
     """Return the spectrum in which every interval is open and known to twice ``digits``.
 
     Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by ``distance`` where that is
-    given. Where I_i = c_k is an end of a closed cut, or of a gap and less than the root of 1e-290 of the rest moves along its
-    direction, or of 10^−20 times the opening squared, the direction is frozen; at a gap that is a separatrix to all digits.
+    given. Where I_i = c_k is an end of a closed cut, or of a gap and less than the root of 10^−``coincide`` of the rest moves
+    along its direction, or of 10^−20 times the opening squared, the direction is frozen; at a gap that is a separatrix to all
+    digits.
 
-    Raises Unsolved (``beyond-floats``) where the least I is no larger than that part of the others.
+    Raises Unsolved: ``beyond-floats`` where the least I is no larger than that part of the others, or |q'|² than their inverse
+    part; ``at-rest`` where one direction alone is left, beside a stable equilibrium of Neumann's system.
     """
     exponent = 2 * digits + 10 + beyond
-    opening, coinciding = Fraction(1, 10**exponent), max(_COINCIDE, 2 * exponent + 20)
+    opening, coinciding = Fraction(1, 10**exponent), max(coincide, 2 * exponent + 20)
     # Between A's nearer than that, a cut that closes would not say that a direction hardly moves.
     moving = moving.opened(opening, Fraction(1, 10 ** (coinciding // 2)))
     separatrices, hidden = set[int](), set[int]()
     while True:
+        if moving.size < 2:
+            raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
         found = spectrum(moving, digits, coinciding)
         threshold = Decimal((0, (1,), -coinciding))
+        if found.widths[0] * threshold > 1:
+            raise Unsolved("beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I")
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | hidden)))
@@ -122,7 +130,9 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
             moving = moving.without(axis)
         elif moving.hardly_moves(axis, Fraction(1, 10**coinciding)):  # across it the motion is not stable
             hidden.add(moving.axes[axis])
-            moving = moving.without(axis) if distance is None else moving.displaced(axis, distance)
+            leaves_one = distance is None and moving.size == 2  # an unstable equilibrium is no rest
+            apart = opening if leaves_one else distance
+            moving = moving.without(axis) if apart is None else moving.displaced(axis, apart)
         elif axis in separatrices:
             raise InternalContradiction("a closed gap did not open")
         else:
@@ -130,7 +140,7 @@ def resolved(moving: Moving, digits: int, distance: Fraction | None = None, beyo
             moving = moving.moved(axis, opening if distance is None else distance)
 
 
-def spectrum(moving: Moving, digits: int, coinciding: int = _COINCIDE) -> Spectrum:
+def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectrum:
     """Return the spectra of what moves with enough digits for all differences of neighbours above 10^−coinciding."""
     wanted = 2 * digits + _SPARE
     most = wanted + coinciding

@@ -1,0 +1,117 @@
+"""Adversarial starts of every system with a closed form: an answer within its error, or a refusal by name."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conftest import Server
+from system_draws import CLASSES_OF, adversarial_system
+from verdict import against_truth, time_unit
+from veselova import InvalidInput, NeumannSystem, Unsolved, compare, solve, torus
+from veselova.mechanics.torus_problem import TorusProblem
+
+#: Starts of each system in every check, and in the slow one.
+FEW, MANY = 15, 150
+
+#: Seconds for one truth by integration.
+PATIENCE_S = 5
+
+
+def held(system: str, i: int) -> str:
+    """Return how one start ended; an error that does not hold, a warning and an exception without a name are failures."""
+    rng = np.random.default_rng([7, i])
+    name, make = adversarial_system(rng, system, 2 + i % 5)
+    try:
+        with warnings.catch_warnings(action="error"):
+            problem = make()
+            times = np.array([-3, -0.9, 0, 0.03, 1, 3]) * time_unit(problem)
+            found = solve(problem, times, "analytic")
+    except (InvalidInput, Unsolved):
+        return "refused"
+    try:
+        off, allowed = against_truth(name, found, PATIENCE_S)
+    except (TimeoutError, Unsolved):
+        return "without truth"
+    assert np.all(off <= allowed), (system, i, name)
+    return "held"
+
+
+@pytest.mark.parametrize("system", CLASSES_OF)
+def test_starts_end_in_a_held_error_or_a_named_refusal(system: str) -> None:
+    ended = [held(system, i) for i in range(FEW)]
+    assert ended.count("held") >= FEW // 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system", CLASSES_OF)
+def test_many_starts_end_so(system: str) -> None:
+    ended = [held(system, i) for i in range(FEW, FEW + MANY)]
+    assert ended.count("held") >= MANY // 2
+
+
+#: Starts of Neumann's system nearer to an equilibrium than squares of floats tell: A, q, q'; whether it is stable.
+BESIDE_EQUILIBRIA: list[tuple[list[str], list[Any], list[Any], bool]] = [
+    (A, q, v, stable)
+    for small in ("1e-145", "1e-150", "1e-200", "1e-300")
+    for A, q, v, stable in (
+        (["1", "1/2"], [1, 0], [0, small], True),
+        (["1", "1/2"], [1, small], [0, 0], True),
+        (["1", "1/2", "1/3"], [1, small, 0], [0, 0, small], True),
+        (["1", "1/2"], [0, 1], [small, 0], False),
+        (["1", "1/2"], [small, 1], [0, 0], False),
+        (["1", "1/2", "1/3"], [0, 1, small], [0, 0, small], True),
+        (["1", "1/2", "1/3"], [small, 1, small], [0, 0, 0], False),
+    )
+]
+
+
+@pytest.mark.parametrize(("A", "q", "v", "stable"), BESIDE_EQUILIBRIA)
+def test_beside_an_equilibrium_the_point_stays(A: list[str], q: list[Any], v: list[Any], stable: bool) -> None:
+    """At q_i of 1e-145 and below there is nothing to see of the motion, by either engine, for as long as e^t·1e-145 is small."""
+    problem = NeumannSystem(A, q, v)
+    found = solve(problem, [-1, 0, 2])
+    assert np.max(np.abs(found.q - problem.q)) <= np.max(found.error)
+    assert np.max(found.error) < (1e-15 if stable else 1e-11)
+    assert compare(problem, [-1, 0, 2]).agrees
+
+
+def test_two_closed_cuts_beside_one_another_are_served() -> None:
+    """Widths of 1e-200 have no product among doubles; half as narrow counts as closed."""
+    problem = NeumannSystem(["1", "1/2", "1/3"], [1, "1e-100", 0], [0, 0, "1e-100"])
+    found = solve(problem, [0, 1, 5])
+    assert np.max(np.abs(found.q - [1, 0, 0])) <= np.max(found.error) < 1e-13
+
+
+@pytest.mark.parametrize("system", CLASSES_OF)
+def test_torus_and_comparison_answer_or_refuse_by_name(system: str) -> None:
+    for i in range(100, 100 + FEW):
+        try:
+            problem = adversarial_system(np.random.default_rng([8, i]), system, 2 + i % 5)[1]()
+            if isinstance(problem, TorusProblem):
+                torus(problem)
+            compare(problem, np.array([0, 0.5]) * time_unit(problem))
+        except (InvalidInput, Unsolved):
+            continue
+
+
+def test_the_server_answers_them_below_500(server: Server) -> None:
+    problems: list[Any] = [
+        {"system": "neumann", "A": A, "q": q, "q_prime": v, "normalize": True} for A, q, v, _ in BESIDE_EQUILIBRIA[:7]
+    ]
+    for system in CLASSES_OF:
+        for i in range(6):
+            rng = np.random.default_rng([9, i])
+            try:
+                problems.append(adversarial_system(rng, system, 2 + i % 5)[1]().as_dict())
+            except InvalidInput:
+                continue
+    for problem in problems:
+        for path, more in (("/v1/trajectories", {"engine": "analytic", "times": [0, 0.1]}), ("/v1/tori", {})):
+            body = json.dumps({"problem": problem, **more})
+            response = server.ask("POST", path, content=body, headers={"content-type": "application/json"})
+            assert response.status_code < 500, (path, problem, response.text[:300])
