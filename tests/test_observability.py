@@ -34,6 +34,7 @@ from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 from veselova.service.worker_process import SIZE, answered
 from veselova.service.workers import Workers
+from veselova.version import __version__
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
 
@@ -185,7 +186,7 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
     assert grown[("http_requests_total", "/v1/trajectories", "POST", "422")] == 1
     assert grown[("http_requests_total", "none", "GET", "404")] == 1  # whatever the path
     assert grown[("http_request_duration_seconds_count", "/v1/tori", "POST")] == 2
-    assert after[("veselova_info", "0.1.0")] == 1
+    assert after[("veselova_info", __version__)] == 1
     assert after[("process_resident_memory_bytes",)] > 1e7
 
 

@@ -83,9 +83,26 @@ __all__ = ["__version__", *sorted(_HOMES)]
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'veselova' has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
+    try:
+        value = getattr(import_module(_HOMES[name]), name)
+    except ModuleNotFoundError as error:
+        raise _missing(name, error) from None
     globals()[name] = value
     return value
+
+
+#: Public names that need more than the core, and the extra that installs it.
+_EXTRAS = {"AsyncClient": "client", "Client": "client", "sweep": "sweeps"}
+
+
+def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
+    """Return what to raise where a public name cannot be loaded for want of a library."""
+    library = (error.name or "").split(".")[0]
+    if name not in _EXTRAS or library in ("", "veselova"):  # a fault of this package, or of the core
+        return error
+    from veselova.mechanics.errors import BackendMissing, install_extra
+
+    return BackendMissing(library, f"veselova.{name}", install_extra(_EXTRAS[name]))
 
 
 def __dir__() -> list[str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+from typing import NoReturn
 
 __all__ = ["main"]
 
@@ -11,10 +13,24 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command line; an interrupt while it is still loading ends it as quietly as one later."""
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
-    from veselova.service import cli
+    try:
+        from veselova.service import cli
+    except ModuleNotFoundError as error:
+        _refuse(error)
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
     cli.main()
+
+
+def _refuse(error: ModuleNotFoundError) -> NoReturn:
+    """End with the command that installs what the command line is made of."""
+    library = (error.name or "").split(".")[0]
+    if library in ("", "veselova"):  # a fault of this package
+        raise error
+    from veselova.mechanics.errors import install_extra
+
+    print(f"veselova: the command line needs {library}; install it with: {install_extra('service')}", file=sys.stderr)
+    raise SystemExit(1)
 
 
 if __name__ == "__main__":

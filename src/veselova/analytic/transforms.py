@@ -173,5 +173,5 @@ def _transform() -> Callable[..., Any]:
     try:
         from finufft import nufft1d3
     except ImportError:
-        raise BackendMissing("finufft", "method='nufft'", "pip install 'veselova[fast]'") from None
+        raise BackendMissing("finufft", "method='nufft'", "pip install finufft") from None
     return nufft1d3  # type: ignore[no-any-return]

@@ -31,6 +31,7 @@ __all__ = [
     "ServiceUnreachable",
     "Unsolved",
     "VeselovaError",
+    "install_extra",
     "shown",
     "summary",
 ]
@@ -210,11 +211,16 @@ class Unsolved(VeselovaError):
 
 
 class BackendMissing(VeselovaError, ImportError):
-    """An optional library that was asked for is not installed."""
+    """An optional library that was asked for is not installed; ``install`` is the command that installs it."""
 
     def __init__(self, library: str, purpose: str, install: str) -> None:
         self.library = library
         super().__init__(f"{purpose} needs {library}, which is not installed; install it with: {install}")
+
+
+def install_extra(name: str) -> str:
+    """Return the command that installs an extra of this project. The project is on no index: only its folder has it."""
+    return f"pip install '.[{name}]' in the folder of this project"
 
 
 class InternalContradiction(VeselovaError):

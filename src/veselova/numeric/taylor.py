@@ -76,7 +76,7 @@ def _compiled(flow: Flow, tolerance: float) -> Any:
     try:
         import heyoka as hy
     except ImportError:
-        raise BackendMissing("heyoka", "method='taylor'", "pip install 'veselova[fast]'") from None
+        raise BackendMissing("heyoka", "method='taylor'", "pip install heyoka") from None
     if flow.structure is None:
         raise InvalidInput(("method",), "dop853 (this field has no symbolic form)", "taylor")
     key = flow.structure, tolerance

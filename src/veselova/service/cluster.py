@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import anyio.to_thread
 
-from veselova.mechanics.errors import BackendMissing, InvalidInput
+from veselova.mechanics.errors import BackendMissing, InvalidInput, install_extra
 from veselova.service.interrupts import children_deaf
 from veselova.service.settings import MEGABYTE, Settings
 
@@ -65,7 +65,7 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
         from distributed import Client, LocalCluster
         from distributed.security import Security
     except ImportError:
-        raise BackendMissing("distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
+        raise BackendMissing("distributed", "A sweep", install_extra("sweeps")) from None
 
     # Every start and stop of a worker would be told; what goes wrong comes back as an exception, or as a lost chunk.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -32,7 +32,7 @@ ANSWERS: dict[str, Any] = {
             "engine": "analytic",
             "method": "theta",
             "digits": 15,
-            "version": "0.1.0",
+            "version": "0.2.0",
             "seconds": 0.013,
             "details": {"clock": "panels", "clock_size": 144, "theta_terms": 445},
         },

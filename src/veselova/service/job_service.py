@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
-from veselova.mechanics.errors import BackendMissing
+from veselova.mechanics.errors import BackendMissing, install_extra
 from veselova.service.database import reason_of
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
@@ -69,7 +69,7 @@ class JobService:
             from veselova.service.sweeps import Sweeps
         except ImportError as error:
             self.failure = f"{error.name} is not installed"
-            raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
+            raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
         try:
             jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
             sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)

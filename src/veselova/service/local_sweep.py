@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import anyio
 from anyio.from_thread import start_blocking_portal
 
-from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
+from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, install_extra, shown
 from veselova.mechanics.problem import Problem
 from veselova.service.schemas import read_request
 from veselova.service.serving import settings_of_environment
@@ -99,7 +99,7 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         from veselova.service.jobs import Jobs
         from veselova.service.sweeps import Sweeps
     except ImportError as error:
-        raise BackendMissing(error.name or "distributed", "A sweep", "pip install 'veselova[sweeps]'") from None
+        raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.

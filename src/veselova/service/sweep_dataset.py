@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.errors import BackendMissing
+from veselova.mechanics.errors import BackendMissing, install_extra
 from veselova.service.parameters import components, tabulated
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.systems import SYSTEMS
@@ -28,7 +28,7 @@ def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path |
         import xarray
         from pyarrow import parquet
     except ImportError as error:
-        raise BackendMissing(error.name or "xarray", "The Dataset of a sweep", "pip install 'veselova[sweeps]'") from None
+        raise BackendMissing(error.name or "xarray", "The Dataset of a sweep", install_extra("sweeps")) from None
     dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
     coordinates, variables, given = _of_axes(sweep)
     columns = parquet.read_table(table if isinstance(table, Path) else io.BytesIO(table))
