@@ -115,7 +115,7 @@ def test_what_has_no_closed_form_is_a_named_outcome(fields: dict[str, Any], outc
 
 
 def test_methods_and_digits_that_it_has_not_are_refused(rng: Generator) -> None:
-    problem = drawn(rng, None)
+    problem = drawn(rng, {"clebsch": 0.3})
     for options, field in (
         ({"method": "theta"}, "method"),
         ({"method": "nufft"}, "method"),

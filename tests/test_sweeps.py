@@ -173,13 +173,22 @@ def test_a_fault_is_named_before_anything_runs(changes: dict[str, Any], field: s
 
 
 def test_a_system_without_a_torus_needs_times() -> None:
-    so3 = {"system": "veselova-so3", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0, 0.1]}
-    stated = {"problem": so3, "vary": {"/Omega/0": [1, 2]}}
+    body = {"system": "euler-poisson", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0, 0.1]}
+    stated = {"problem": body, "vary": {"/Omega/0": [1, 2]}}
     with pytest.raises(InvalidRequest, match="times: required this field"):
         read_request(SweepRequest, stated)
     found = rows(read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2)
     assert [row["outcome"] for row in found] == ["solved", "solved"]
     assert all(row["gamma.max.2"] == 1 and row["error.max"] < 1e-9 for row in found)
+
+
+def test_bodies_have_tori_where_their_motion_has_one() -> None:
+    body = {"system": "veselova-so3", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0.5, 0]}
+    found = rows(read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2)
+    assert [row["outcome"] for row in found] == ["solved", "not-rank-one"]
+    expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 0]))
+    assert np.isclose(found[0]["frequencies_t.0"], expected.frequencies_t[0], rtol=1e-15)
+    assert found[0]["regime"] == expected.regime
 
 
 def test_a_row_says_what_torus_and_solve_say() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_doubl
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import require_truth_value
 from veselova.mechanics.problem import Problem
-from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -42,7 +41,8 @@ def solve(
     """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``; None takes the closed form where
-    the system has one. ``method``: None for the engine's default; analytic: ``theta``, ``products``, ``nufft`` or ``angles``;
+    the problem has one, ``problem.default_engine``. ``method``: None for the engine's default; analytic: ``theta``,
+    ``products``, ``nufft`` or ``angles``;
     numeric: ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``. ``formulation`` (numeric): which of
     ``problem.formulations`` is integrated.
     ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal with that many digits after the
@@ -66,7 +66,9 @@ def _solve(
 ) -> Trajectory:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    engine = next(iter(problem.engines)) if engine is None else engine
+    if engine is None:  # what is asked for beyond double precision is asked of the closed form, which says why it has none
+        engine = "analytic" if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False) else None
+        engine = engine or problem.default_engine
     if not isinstance(engine, str) or engine not in problem.engines:
         raise InvalidInput(("engine",), f"one of {', '.join(problem.engines)} for system {problem.system}", shown(engine))
     _require_precision(engine, digits, certified)
@@ -92,12 +94,12 @@ class Prepared:
     def _solution(self) -> Solution:
         from veselova.analytic.solution import Solution
 
-        return Solution(cast("TorusProblem", self.problem))
+        return Solution(self.problem.on_torus())
 
     @property
     def has_torus(self) -> bool:
         """Return whether the motion runs on a torus that ``torus`` describes."""
-        return isinstance(self.problem, TorusProblem) and self.problem.moves
+        return self.problem.has_torus and self.problem.moves
 
     def torus(self) -> Torus:
         """Return the torus; raises as the function of this name does."""
@@ -141,8 +143,6 @@ def torus(problem: Problem) -> Torus:
 def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    if not isinstance(problem, TorusProblem):
-        raise InvalidInput(("problem",), "a system with a torus: veselova, neumann, ellipsoid-geodesic", problem.system)
     from veselova.analytic.torus import torus as torus_of
 
-    return torus_of(problem, solution)
+    return torus_of(problem.on_torus(), solution)

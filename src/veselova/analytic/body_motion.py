@@ -22,6 +22,7 @@ from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import exact_number, exact_vector
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separation import family_polynomial
+from veselova.mechanics.sphere import exact_cross
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
 __all__ = ["BodyMotion"]
@@ -44,25 +45,26 @@ class BodyMotion(Motion[VeselovaSO3]):
     def _orbit(self) -> SeparableOrbit:
         """Return the orbit of the exact start along these axes."""
         problem, order = self.problem, self._order
-        if problem.linear != 0:
-            raise Unsolved("not-separable", f"the closed form has (Ω,γ) = 0, here {problem.linear:.6g}; integrate numerically")
+        if problem.without_closed_form:
+            raise Unsolved("not-separable", problem.without_closed_form)
         given = problem.potential.given or {}
-        if set(given) - {"clebsch", "family"}:
-            raise Unsolved(
-                "not-separable", "the closed form has the potentials (3.5), no polynomial of a user's; integrate numerically"
-            )
         alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
         alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
         moments = list(drawn_apart([problem.moments[i] for i in order]))
-        gamma, Omega = (self._principal(vector) for vector in (problem.gamma, problem.Omega))
-        x, w = ([Fraction(float(v[i])) for i in order] for v in (gamma, Omega))
-        handed = 1 if order[1] - order[0] in (1, -2) else -1  # whether the sorted axes keep the sense of rotation
-        velocity = [handed * (x[(i + 1) % 3] * w[(i + 2) % 3] - x[(i + 2) % 3] * w[(i + 1) % 3]) for i in range(3)]
+        gamma, Omega = self._exact_start
+        velocity = exact_cross(gamma, Omega)  # scaled as γ is
+        x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
         v, walls = family_polynomial(moments, *alphas[:2]), tuple(alphas[2 + i] for i in order)
-        return SeparableOrbit(SeparableStart(tuple(moments), tuple(x), tuple(velocity), v, walls))
+        return SeparableOrbit(SeparableStart(tuple(moments), x, w, v, walls))
 
-    def _principal(self, vector: Array) -> Array:
-        return vector if self.problem.axes is None else self.problem.axes.T @ vector
+    @property
+    def _exact_start(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+        """Return γ, of any length, and Ω along the principal axes: as given, in doubles where the axes are known in doubles."""
+        problem = self.problem
+        if problem.axes is None:
+            return problem.exact_gamma, problem.exact_Omega
+        gamma, Omega = (tuple(map(Fraction, (problem.axes.T @ v).tolist())) for v in (problem.gamma, problem.Omega))
+        return gamma, Omega
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion

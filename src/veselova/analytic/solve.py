@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from veselova.analytic.body_motion import BodyMotion
 from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
+from veselova.analytic.rank_one_motion import motion_of_body
 from veselova.analytic.route import METHODS, Route
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
@@ -71,6 +72,11 @@ def solve(
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
+    if isinstance(problem, VeselovaSO3) and problem.has_torus:
+        _require_exact_axes(problem, digits, certified)
+        options: Any = {"method": method, "clock": clock, "digits": digits, "certified": certified, "solution": solution}
+        point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
+        return motion_of_body(problem, solve(point, times, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
@@ -89,6 +95,14 @@ def solve(
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(times)
+
+
+def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
+    """Raise InvalidInput where more than doubles are asked for along axes that are known in double precision."""
+    if problem.axes is not None and beyond_double(digits, certified):
+        field = "digits" if digits > FEWEST_DIGITS else "certified"
+        required = "inertia as 3 principal moments (a matrix is diagonalised in double precision)"
+        raise InvalidInput((field,), required, "inertia as a matrix")
 
 
 def _separable_motion(

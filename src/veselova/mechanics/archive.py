@@ -78,5 +78,5 @@ def read_archive(problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
         midpoints, radii = (
             {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
         )
-        decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii)
+        decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii, problem.bounded)
     return Trajectory(problem, archive["times"], archive["error"], series, provenance, decimals=decimals)

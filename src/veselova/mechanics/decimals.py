@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.errors import BackendMissing
 
-__all__ = ["FEWEST_DIGITS", "MOST_DIGITS", "Decimals", "Later", "Pair", "beyond_double", "decimals_of"]
+__all__ = [
+    "FEWEST_DIGITS",
+    "MOST_DIGITS",
+    "Decimals",
+    "Later",
+    "Objects",
+    "Pair",
+    "beyond_double",
+    "decimals_of",
+    "derive_position_pair",
+    "derive_velocity_pair",
+]
 
 Objects = NDArray[np.object_]
 
@@ -74,31 +85,20 @@ class Decimals:
     midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape, which may be made when they
     are first asked for; the exact value lies within midpoint ± radius, proven where ``certified``, and otherwise
     up to truncations that are estimated.
-    error (N,) the largest radius of q and frame at each time
+    bounded: the names of the series whose every component ``error`` (N,) bounds: the largest of their radii at each time
     """
 
     digits: int
     certified: bool
     midpoints: Mapping[str, Objects]
     radii: Mapping[str, Objects]
-
-    @classmethod
-    def with_derived(
-        cls, digits: int, certified: bool, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects]
-    ) -> Decimals:
-        """Return the decimals with what follows from q_dot and frame: q = e_1, and ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊."""
-        q, q_dot = midpoints["frame"][:, :, 0], midpoints["q_dot"]
-        r, r_dot = radii["frame"][:, :, 0], radii["q_dot"]
-        with localcontext(Context(prec=digits + _SPARE_DIGITS)):
-            product = q[:, :, None] * q_dot[:, None, :]
-            spread = np.abs(q)[:, :, None] * r_dot[:, None, :] + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
-            omega, omega_radius = product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
-        return cls(digits, certified, {**midpoints, "q": q, "omega": omega}, {**radii, "q": r, "omega": omega_radius})
+    bounded: tuple[str, ...] = ("frame",)
 
     @cached_property
     def error(self) -> Objects:
-        """Return the largest radius of q and frame at each time, (N,)."""
-        return np.array([max(frame.ravel()) for frame in self.radii["frame"]])  # of which q is the first column
+        """Return the largest radius of the bounded series at each time, (N,)."""
+        radii = [self.radii[name] for name in self.bounded]
+        return np.array([max(max(values.ravel()) for values in at_time) for at_time in zip(*radii, strict=True)])
 
     def strings(self, name: str, radii: bool = False) -> Any:
         """Return a series, or its radii, as nested lists of decimal strings."""
@@ -131,3 +131,32 @@ class Decimals:
     def __repr__(self) -> str:
         kind = "certified" if self.certified else "estimated"
         return f"<Decimals: {self.digits} digits, {kind} error ≤ {max(self.error):.2g}>"
+
+
+def derive_velocity_pair(midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+    """Return ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊, from the decimals of q_dot and frame."""
+    q, q_dot = midpoints["frame"][:, :, 0], midpoints["q_dot"]
+    r, r_dot = radii["frame"][:, :, 0], radii["q_dot"]
+    with localcontext(Context(prec=digits + _SPARE_DIGITS)):
+        product = q[:, :, None] * q_dot[:, None, :]
+        spread = np.abs(q)[:, :, None] * r_dot[:, None, :] + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
+        return product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
+
+
+def derive_position_pair(A: Sequence[Fraction], q: Objects, radii: Objects, digits: int) -> Pair:
+    """Return X = Aq/S, S = √(q,Aq), with radii, from decimals q (N, n).
+
+    Within the radii r of q, S ≥ S₀ with S₀² = Σ A_j max(|q_j|−r_j, 0)². There
+    |∂X_i/∂q_j| ≤ (A_i δ_ij + A_i|q_i| A_j|q_j|/S₀²)/S₀.
+    """
+    with localcontext(Context(prec=digits + _SPARE_DIGITS)):
+        squares = np.array([Decimal(a.numerator) / Decimal(a.denominator) for a in A])
+        root = np.frompyfunc(Decimal.sqrt, 1, 1)
+        most, least = np.abs(q) + radii, np.abs(q) - radii
+        least = least * (least > 0)
+        low = root(np.sum(squares * least * least, axis=1))[:, None]
+        along = np.sum(squares * most * radii, axis=1)[:, None]
+        spread = (squares * radii + squares * most * along / (low * low)) / low
+        position = squares * q / root(np.sum(squares * q * q, axis=1))[:, None]
+        rounding = np.frompyfunc(lambda x: Decimal((0, (1,), x.adjusted() - digits - 10)) if x else Decimal(0), 1, 1)(position)
+        return position, spread + rounding

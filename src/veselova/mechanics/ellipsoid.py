@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
+from veselova.mechanics.decimals import Objects, Pair, derive_position_pair
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_vector, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.flow import Flow
@@ -147,6 +148,12 @@ class EllipsoidGeodesic(TorusProblem):
         """Return X = Aq/√(q,Aq), equation (Gauss), or its tangent γ, the last column of the frame."""
         frame = series["frame"]
         return np.asarray(frame[..., -1]) if name == "X_dot" else position(self.A, frame[..., 0])
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return X or its tangent, with radii."""
+        if name == "X":
+            return derive_position_pair(self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits)
+        return midpoints["frame"][:, :, -1], radii["frame"][:, :, -1]
 
     def completed(self, series: Series) -> Series:
         """Return frame and Neumann time."""

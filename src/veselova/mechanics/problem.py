@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimals import Objects, Pair
+from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import read_only
 from veselova.mechanics.flow import Flow
+
+if TYPE_CHECKING:
+    from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["Problem", "Series"]
 
@@ -39,6 +44,9 @@ class Problem(ABC):
     #: Engines that serve the system, with their methods, and the formulations that the numerical one integrates; defaults first.
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
     formulations: ClassVar[tuple[str, ...]]
+
+    #: Whether motions of the system run on tori that ``torus`` describes: all of them, or some.
+    has_tori: ClassVar[bool] = False
 
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
@@ -87,12 +95,32 @@ class Problem(ABC):
         return True
 
     @property
+    def default_engine(self) -> str:
+        """Return the engine that serves this problem where none is asked for: the closed form where the problem has one."""
+        return next(iter(self.engines))
+
+    @property
+    def has_torus(self) -> bool:
+        """Return whether the motion runs on a torus that ``torus`` describes, or rests."""
+        return self.has_tori
+
+    def on_torus(self) -> TorusProblem:
+        """Return the problem on whose torus the motion runs. Raises InvalidInput for a system without tori."""
+        raise InvalidInput(
+            ("problem",), "a system with a torus: veselova, veselova-so3, neumann, ellipsoid-geodesic", self.system
+        )
+
+    @property
     def semiaxes(self) -> Array | None:
         """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to show one; None for a sphere."""
         return None
 
     def derive(self, name: str, series: Series) -> Array:
         """Return one of the ``derived`` series."""
+        raise KeyError(name)
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return one of the ``derived`` series as decimals with radii, from the decimals of the stored ones."""
         raise KeyError(name)
 
     def completed(self, series: Series) -> Series:

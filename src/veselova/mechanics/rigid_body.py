@@ -37,6 +37,7 @@ class RigidBody(Problem):
     moments, axes  principal moments (3,), exact where given so, and the principal axes as columns where a matrix was given
     inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0 · potential  V(γ)
     linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
+    exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the frame None for the natural one
     """
 
     moments: tuple[Fraction, ...]
@@ -48,6 +49,9 @@ class RigidBody(Problem):
     frame: Array
     potential: Potential
     linear: float
+    exact_gamma: tuple[Fraction, ...]
+    exact_Omega: tuple[Fraction, ...]
+    exact_frame: tuple[tuple[Fraction, ...], ...] | None
     given: Mapping[str, Any]
 
     #: Whether a multiplier keeps (Ω,γ) constant.
@@ -60,8 +64,9 @@ class RigidBody(Problem):
     ) -> None:
         require_truth_value(normalize, "normalize")
         moments, axes, tensor, inverse = _inertia(inertia)
-        direction = _direction(gamma, normalize)
-        velocity = to_float(exact_vector(Omega, ("Omega",), 3))
+        exact_gamma, exact_Omega = exact_vector(gamma, ("gamma",), 3), exact_vector(Omega, ("Omega",), 3)
+        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), 3)
+        direction, velocity = _direction(exact_gamma, normalize), to_float(exact_Omega)
         V = Potential.of(potential, tensor, inverse, dual=not self.constrained)
         V.require_finite(direction)
         across = direction if self.constrained else tensor @ direction
@@ -74,14 +79,15 @@ class RigidBody(Problem):
             required = "an angular velocity whose energy and squared momentum are within the range of a float"
             raise InvalidInput(("Omega",), required, f"squares of {', '.join(f'{x:.3g}' for x in squares)}")
         principal = axes.T if axes is not None else np.eye(3)
-        if frame is None:
+        if exact_frame is None:
             rate = principal @ np.cross(direction, velocity)
             start = natural_frame(1 / to_float(moments), principal @ direction, rate)
             start = principal.T @ start
         else:
-            start = admissible_frame(to_float(exact_matrix(frame, ("frame",), 3)), direction, "gamma")
+            start = admissible_frame(to_float(exact_frame), direction, "gamma")
         self._set(moments=moments, axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
+        self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
         given = stated(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
         self._set(given=given)
 
@@ -154,9 +160,8 @@ def _inertia(given: Any) -> tuple[tuple[Fraction, ...], Array | None, Array, Arr
     return moments, axes, (tensor + tensor.T) / 2, axes @ (reciprocals[:, None] * axes.T)
 
 
-def _direction(given: Any, normalize: bool) -> Array:
+def _direction(exact: tuple[Fraction, ...], normalize: bool) -> Array:
     """Return the unit vector γ."""
-    exact = exact_vector(given, ("gamma",), 3)
     if not any(exact):
         raise InvalidInput(("gamma",), "a vector of unit length", "the zero vector")
     gamma = to_float(over_largest(exact) if normalize else exact)

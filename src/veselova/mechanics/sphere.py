@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_vector, over_common_denominator, to_float
 
-__all__ = ["INPUT_TOLERANCE", "ExactState", "over_largest", "point_on_sphere", "unit"]
+__all__ = ["INPUT_TOLERANCE", "ExactState", "exact_cross", "inverse_length", "over_largest", "point_on_sphere", "unit"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,21 @@ def unit(vector: Array) -> Array:
     """Return the vector scaled to unit length."""
     scaled = vector / np.max(np.abs(vector))  # squares of very large or small entries would leave the float range
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
+
+
+def exact_cross(a: tuple[Fraction, ...], b: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+    """Return the vector product a×b, exactly."""
+    return tuple(a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3))
+
+
+def inverse_length(vector: tuple[Fraction, ...], bits: int) -> Fraction:
+    """Return 1/|x|, exactly where it is rational, and otherwise to a part 2^−bits of itself."""
+    square = sum((x * x for x in vector), Fraction())
+    above, below = math.isqrt(square.numerator), math.isqrt(square.denominator)
+    if (above * above, below * below) == square.as_integer_ratio():
+        return Fraction(below, above)
+    bits += max(0, square.numerator.bit_length() - square.denominator.bit_length())
+    return Fraction(math.isqrt((square.denominator << 2 * bits) // square.numerator), 1 << bits)
 
 
 def over_largest(vector: tuple[Fraction, ...]) -> tuple[Fraction, ...]:

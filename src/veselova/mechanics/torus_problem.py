@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimals import Objects, Pair
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.sphere import ExactState
 
@@ -31,6 +33,7 @@ class TorusProblem(Problem):
     exact: ExactState
     axes: Array | None = None
 
+    has_tori: ClassVar[bool] = True
     engines: ClassVar = {"analytic": ("theta", "products", "nufft", "angles"), "numeric": ("dop853", "taylor")}
 
     @property
@@ -42,6 +45,16 @@ class TorusProblem(Problem):
     @abstractmethod
     def energy(self) -> float:
         """Return the energy that the motion conserves."""
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return q, the first column of the frame, with its radii."""
+        if name != "q":
+            raise KeyError(name)
+        return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
+
+    def on_torus(self) -> TorusProblem:
+        """Return the problem itself."""
+        return self
 
     @property
     def n(self) -> int:

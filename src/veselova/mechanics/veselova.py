@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics import integrals
+from veselova.mechanics.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.errors import InvalidInput
 from veselova.mechanics.exact import exact_matrix, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.natural_frame import moser_frame, orthonormalized, refined
@@ -181,6 +182,12 @@ class Veselova(TorusProblem):
             return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
         product = q[..., :, None] * q_dot[..., None, :]
         return np.asarray(product - np.swapaxes(product, -1, -2))
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return q or ω with its radii."""
+        if name == "omega":
+            return derive_velocity_pair(midpoints, radii, digits)
+        return super().derive_decimals(name, midpoints, radii, digits)
 
     def completed(self, series: Series) -> Series:
         """Return series along the principal axes of A in the body axes; spheroconic coordinates only where they were found."""

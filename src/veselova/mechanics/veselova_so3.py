@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.decimal_balls import DecimalBalls, cross
+from veselova.mechanics.decimals import Objects, Pair
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Series
 from veselova.mechanics.rigid_body import RigidBody
 from veselova.mechanics.rigid_body_flow import momentum
-from veselova.mechanics.sphere import INPUT_TOLERANCE
+from veselova.mechanics.sphere import INPUT_TOLERANCE, exact_cross, inverse_length
+from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.veselova import Veselova
 
 __all__ = ["VeselovaSO3", "multiplier"]
 
 Array = NDArray[np.float64]
+
+
+#: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles, and beyond all digits that can be
+#: asked for. Each costs: exact rationals of 4096 bits make a solution in doubles half as long again.
+_DOUBLE_BITS, _ALL_BITS = 320, 4096
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -34,8 +43,11 @@ class VeselovaSO3(RigidBody):
 
     γ must have unit length to 1e-9; with ``normalize=True`` it is scaled first. Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations: ``multiplier``, (3.1) with
-    (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a). Where (Ω,γ) = 0 and V is of (3.5) (``clebsch``,
-    ``family``), engine ``analytic`` has the motion by quadratures.
+    (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a).
+
+    Where (Ω,γ) = 0 engine ``analytic`` has the motion, and is the default: without a potential by theta functions, that of the
+    rank-one problem; with one of (3.5) (``clebsch``, ``family``) by quadratures, method ``angles``. ``without_closed_form`` is
+    the reason for every other problem.
     """
 
     system: ClassVar[str] = "veselova-so3"
@@ -47,9 +59,45 @@ class VeselovaSO3(RigidBody):
         "multiplier": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "momentum", "multiplier")
-    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor"), "analytic": ("angles",)}
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
+    has_tori: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
     constrained: ClassVar[bool] = True
+
+    def __init__(
+        self, inertia: Any, gamma: Any, Omega: Any, potential: Any = None, frame: Any = None, *, normalize: bool = False
+    ) -> None:
+        super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
+        if frame is None and self.has_torus:  # one start for both engines, and all digits of it
+            on_torus = self.on_torus()
+            self._set(frame=on_torus.to_body_axes(on_torus.frame[None])[0])
+
+    @property
+    def without_closed_form(self) -> str | None:
+        """Return why the motion has no closed form; None where it has one."""
+        if self.linear != 0:
+            return f"the closed form has (Ω,γ) = 0, here {self.linear:.6g}; integrate numerically"
+        if self.potential.terms and set(self.potential.given or ()) - {"clebsch", "family"}:
+            return "the closed form has the potentials (3.5), no polynomial of a user's; integrate numerically"
+        return None
+
+    @property
+    def default_engine(self) -> str:
+        """Return ``analytic`` where the motion has a closed form, else ``numeric``."""
+        return "numeric" if self.without_closed_form else "analytic"
+
+    @property
+    def has_torus(self) -> bool:
+        """Return whether V = 0 and (Ω,γ) = 0: the motion is then that of the rank-one problem."""
+        return not self.potential.terms and self.linear == 0
+
+    def on_torus(self) -> Veselova:
+        """Return ``rank_one()``, the same object every time; an irrational |γ| to the digits that doubles need."""
+        return self._near_rank_one
+
+    @cached_property
+    def _near_rank_one(self) -> Veselova:
+        return self._rank_one(_DOUBLE_BITS)
 
     @property
     def _linear_name(self) -> str:
@@ -65,6 +113,18 @@ class VeselovaSO3(RigidBody):
         if name == "multiplier":
             return multiplier(self, series["Omega"], series["frame"][..., 0])
         return super().derive(name, series)
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return gamma, momentum or multiplier with their radii, where V = 0 and (Ω,γ) = 0 and the moments are exact."""
+        if name == "gamma":
+            return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
+        balls = DecimalBalls(digits)
+        Omega, frame = (balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame"))
+        gamma, moments = frame[:, :, 0], balls.of(self.moments)
+        M, across = Omega * moments, gamma / moments
+        if name == "momentum":
+            return balls.pair(M - np.sum(M * gamma, axis=1)[:, None] * gamma)
+        return balls.pair(-np.sum(cross(M, Omega) * across, axis=1) / np.sum(gamma * across, axis=1))
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
@@ -90,13 +150,18 @@ class VeselovaSO3(RigidBody):
         return found
 
     def rank_one(self) -> Veselova:
-        """Return the same motion as the rank-one problem with A = 𝓘⁻¹, q = γ, which has a closed form.
+        """Return the same motion as the rank-one problem with A = 𝓘⁻¹, q = γ, q̇ = γ×Ω, exact where the data are.
 
         Raises Unsolved (``not-rank-one``) unless V = 0 and (Ω,γ) = 0 to 1e-9 of |Ω|.
         """
+        return self._rank_one(_ALL_BITS)
+
+    def _rank_one(self, bits: int) -> Veselova:
         self._require_geodesic()
         A: Any = [1 / moment for moment in self.moments] if self.axes is None else self.inverse
-        return Veselova(A, self.gamma, np.cross(self.gamma, self.Omega), self.frame, normalize=True)
+        gamma, length = self.exact_gamma, inverse_length(self.exact_gamma, bits)
+        velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
+        return Veselova(A, gamma, velocity, self.exact_frame, normalize=True)
 
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that γ is in time τ₁, dτ₁ = √(2h det𝓘⁻¹/(𝓘⁻¹γ,γ)) dt (Theorem LR→N3), in principal axes.

@@ -69,7 +69,9 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     midpoints, radii = ({name: decimals_of(document[kind][name]) for name in problem.stored} for kind in ("series", "radii"))
     provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
-    decimals = Decimals.with_derived(provenance.digits, certified, midpoints, radii)
+    for name in problem.derived:
+        midpoints[name], radii[name] = problem.derive_decimals(name, midpoints, radii, provenance.digits)
+    decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
     return Trajectory.of_decimals(problem, np.array(document["times"], dtype=np.float64), decimals, provenance)
 
 

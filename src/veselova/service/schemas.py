@@ -6,14 +6,16 @@ problem is built, so that Python, command line and HTTP refuse the same input wi
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.errors import InvalidInput, InvalidRequest, shown
+from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
 from veselova.mechanics.exact import exact_number, to_float
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.times import uniform_times, validated_times
 from veselova.service.examples import BODY4, BODY4_PROBLEM
 from veselova.service.json_text import layers
@@ -114,17 +116,23 @@ class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
     engine: Annotated[
-        Literal["analytic", "numeric"] | None, Field(description="analytic where the system has a closed form, when left out")
+        Literal["analytic", "numeric"] | None, Field(description="analytic where the problem has a closed form, when left out")
     ] = None
     digits: Annotated[
         int, Field(ge=FEWEST_DIGITS, le=MOST_DIGITS, description=f"beyond {FEWEST_DIGITS}, answers are decimal strings")
     ] = FEWEST_DIGITS
     certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
 
-    @property
+    @cached_property
     def chosen_engine(self) -> str:
-        """Return the engine asked for, or the one that serves the system when none is."""
-        return self.engine or next(name for name in SYSTEMS[self.problem.system].problem_class.engines)
+        """Return the engine asked for, or the one that serves the problem when none is."""
+        kind = SYSTEMS[self.problem.system].problem_class
+        if self.engine or kind.default_engine is Problem.default_engine:  # then it is the same for all problems of the system
+            return self.engine or next(iter(kind.engines))
+        try:
+            return self.problem.problem().default_engine
+        except VeselovaError:  # a fault that is named where the problem is solved
+            return next(iter(kind.engines))
 
     @property
     def _exact(self) -> bool:

@@ -15,7 +15,6 @@ import orjson
 from veselova.engines import Prepared
 from veselova.mechanics.errors import Unsolved, VeselovaError
 from veselova.mechanics.problem import Problem
-from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
 from veselova.service.parameters import Path, components
 from veselova.service.problem_details import problem_code
@@ -126,8 +125,10 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
     prepared = Prepared(problem)
     if prepared.has_torus:
         yield from columns_of_torus(prepared.torus())
-    elif isinstance(problem, TorusProblem):
+    elif problem.has_torus:
         yield "regime", "rest"
+    elif not isinstance(request, TrajectoryRequest):
+        prepared.torus()  # raises the reason
     if isinstance(request, TrajectoryRequest):
         trajectory = requested_trajectory(request, prepared)
         names = request.outputs or list(problem.outputs)

@@ -16,7 +16,6 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 from veselova.mechanics.errors import InvalidInput, VeselovaError, shown
 from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
-from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.veselova import Veselova
 from veselova.service.examples import BODY4_PROBLEM
 from veselova.service.parameters import Axis, Draw, Parameter, Path, components, is_double, parameters, replaced, tabulated
@@ -107,7 +106,7 @@ class SweepRequest(TorusRequest):
             if self.total > _MOST_PROBLEMS:
                 raise InvalidInput(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
             kind = SYSTEMS[self.problem.system].problem_class
-            if self.times is None and not issubclass(kind, TorusProblem):
+            if self.times is None and not kind.has_tori:
                 raise InvalidInput(("times",), f"this field, for system {kind.system} has no torus to summarise", "nothing")
             if self.times is None:
                 for name in ("engine", "method", "formulation", "outputs", "trajectories"):

@@ -1,0 +1,155 @@
+"""The closed form of the Veselova system on T SO(3) without potential: the default, exact data, many digits, tori, every door."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import orjson
+import pytest
+
+import veselova as vs
+from conftest import Server
+from veselova import InvalidInput, Unsolved, VeselovaSO3
+from veselova.mechanics.decimals import Decimals
+from veselova.service.documents import encoded, trajectory_document, trajectory_of
+
+#: A body stated in decimals, and the same in doubles.
+TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])
+DOUBLES = ([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6])
+DOCUMENT = {"system": "veselova-so3", "inertia": TEXTS[0], "gamma": TEXTS[1], "Omega": TEXTS[2]}
+
+#: Nothing to add to it, (3.5) with (Ω,γ) = 0; and what has no closed form.
+SERVED: list[dict[str, Any]] = [{}, {"clebsch": 0.3}, {"family": [0.1, 0.2, 0, 0, 0]}]
+USERS = {"polynomial": [{"coefficient": 0.1, "powers": [1, 0, 0]}]}
+
+
+@pytest.mark.parametrize("potential", SERVED)
+def test_the_closed_form_is_the_default_where_there_is_one(potential: dict[str, Any]) -> None:
+    problem = VeselovaSO3(*DOUBLES, potential or None)
+    found = vs.solve(problem, [1.0, 20.0])
+    assert (problem.default_engine, found.provenance.engine) == ("analytic", "analytic")
+    assert found.provenance.method == ("angles" if potential else "theta")
+    assert vs.compare(problem, [1.0, 20.0]).agrees
+
+
+@pytest.mark.parametrize(
+    ("Omega", "potential", "reason"), [([0.8, 1, -0.5], None, r"\(Ω,γ\) = 0, here 0.08"), (DOUBLES[2], USERS, "3.5")]
+)
+def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_name(
+    Omega: Any, potential: Any, reason: str
+) -> None:
+    problem = VeselovaSO3(DOUBLES[0], DOUBLES[1], Omega, potential)
+    assert vs.solve(problem, [1.0]).provenance.engine == problem.default_engine == "numeric"
+    for asked in ({"engine": "analytic"}, {"digits": 30}, {"certified": True}):
+        with pytest.raises((Unsolved, InvalidInput), match=f"not-separable: .*{reason}|digits: required 15"):
+            vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
+    with pytest.raises(Unsolved, match="not-rank-one"):
+        vs.torus(problem)
+
+
+def test_the_rank_one_problem_of_texts_is_exact() -> None:
+    exact = VeselovaSO3(*TEXTS).rank_one().exact
+    assert (1, Fraction(1, 2), Fraction(1, 3)) == exact.A
+    assert exact.q == (Fraction(3, 5), 0, Fraction(4, 5))
+    assert exact.q_dot == (Fraction(-4, 5), 1, Fraction(3, 5))
+    assert exact.frame is None
+
+
+def decimals_of(problem: Any, times: Any, digits: int, certified: bool = False) -> Decimals:
+    found = vs.solve(problem, times, digits=digits, certified=certified).decimals
+    assert found is not None
+    return found
+
+
+def widest(problem: Any, decimals: Decimals, finer: Decimals) -> float:
+    """Return the largest difference to finer decimals over the radius that was reported, over all outputs."""
+    ratios = [
+        np.abs(decimals.midpoints[name] - finer.midpoints[name]) / (decimals.radii[name] + finer.radii[name])
+        for name in problem.outputs
+    ]
+    return max(float(np.max(ratio)) for ratio in ratios)
+
+
+@pytest.mark.parametrize("certified", [False, True])
+def test_every_output_has_the_digits_asked_for_and_radii_that_hold(certified: bool) -> None:
+    problem = VeselovaSO3(*TEXTS, frame=[["0.6", "0.8", "0"], ["0", "0", "1"], ["0.8", "-0.6", "0"]])
+    few, more = (decimals_of(problem, ["-70", 0.5], digits, certified) for digits in (30, 60))
+    assert float(max(few.error)) < 1e-30
+    assert widest(problem, few, more) <= 1
+    double = vs.solve(problem, [-70.0, 0.5])
+    for name in problem.outputs:
+        assert np.max(np.abs(double.series(name) - few.midpoints[name].astype(float))) < 1e-12
+    assert np.all(np.max(np.abs(double.frame - few.midpoints["frame"].astype(float)), axis=(1, 2)) <= double.error)
+
+
+def test_decimals_obey_the_equations_that_define_them() -> None:
+    """Ω = γ̇×γ, 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ of constant length, and λ of (la), in exact rationals of the midpoints."""
+    problem, to_rational = VeselovaSO3(*TEXTS), np.vectorize(Fraction, otypes=[object])
+    decimals = decimals_of(problem, [3.0], 50)
+    found = {name: to_rational(decimals.midpoints[name])[0] for name in problem.outputs}
+    Omega, gamma, moments = found["Omega"], found["gamma"], np.array([Fraction(i) for i in (1, 2, 3)])
+    M = moments * Omega
+    small = Fraction(1, 10**49)
+    assert abs(Omega @ gamma) < small
+    assert np.max(np.abs(M - (M @ gamma) * gamma - found["momentum"])) < small
+    force = np.array([M[i - 2] * Omega[i - 1] - M[i - 1] * Omega[i - 2] for i in range(3)])
+    assert abs(found["multiplier"] * (gamma @ (gamma / moments)) + force @ (gamma / moments)) < small
+    assert abs(found["momentum"] @ found["momentum"] - Fraction("6.9584")) < 10 * small
+
+
+def test_data_that_are_of_no_rational_length_keep_all_digits() -> None:
+    problem = VeselovaSO3([1, 2, 3], [1, 2, 3], [5, -1, -1], normalize=True)
+    few, more = (decimals_of(problem, [2.0], digits) for digits in (20, 120))
+    assert widest(problem, few, more) <= 1
+    assert float(max(more.error)) < 1e-120
+
+
+def test_digits_of_a_full_tensor_are_refused_for_its_axes_are_doubles() -> None:
+    problem = VeselovaSO3([["1", "0.5", "0"], ["0.5", "1", "0"], ["0", "0", "2"]], *TEXTS[1:])
+    for asked, field in (({"digits": 30}, "digits"), ({"certified": True}, "certified")):
+        with pytest.raises(InvalidInput, match=f"{field}: required inertia as 3 principal moments"):
+            vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
+
+
+def test_its_torus_is_that_of_the_rank_one_problem() -> None:
+    problem = VeselovaSO3(*DOUBLES)
+    found, expected = vs.torus(problem), vs.torus(problem.rank_one())
+    assert np.array_equal(found.frequencies_t, expected.frequencies_t)
+    assert np.isclose(found.energy, vs.solve(problem, [0.0]).integrals["energy"][0], rtol=1e-14)
+
+
+def test_documents_give_every_decimal_back() -> None:
+    problem = VeselovaSO3(*TEXTS)
+    found = vs.solve(problem, [1.0, 2.5], digits=40)
+    back = trajectory_of(problem, orjson.loads(encoded(trajectory_document(found))))
+    assert found.decimals is not None
+    assert back.decimals is not None
+    for name in problem.outputs:
+        for mine, theirs in ((found.decimals.midpoints, back.decimals.midpoints), (found.decimals.radii, back.decimals.radii)):
+            assert np.array_equal(mine[name], theirs[name])
+
+
+def test_a_motion_goes_on_from_where_it_was_solved() -> None:
+    found = vs.solve(VeselovaSO3(*DOUBLES), [1.0])
+    assert np.max(np.abs(found.at([4.0]).frame - vs.solve(found.problem, [4.0]).frame)) < 1e-15
+    rest = vs.solve(VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0, 0, 0]), [5.0])
+    assert rest.provenance.method == "rest"
+    assert np.array_equal(rest.frame[0], rest.problem.start["frame"][0])
+
+
+def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
+    ask = {"problem": DOCUMENT, "times": [1.0, 2.0]}
+    motion = server.ask("POST", "/v1/trajectories", json=ask).json()
+    assert (motion["engine"], motion["provenance"]["method"]) == ("analytic", "theta")
+    many = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30}).json()
+    assert set(many["radii"]) == set(VeselovaSO3.outputs)
+    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
+    torus = server.ask("POST", "/v1/tori", json={"problem": DOCUMENT}).json()
+    assert torus["frequencies_t"] == vs.torus(VeselovaSO3(*TEXTS)).frequencies_t.tolist()
+    off = {**ask, "problem": {**DOCUMENT, "Omega": [0.8, 1, -0.5]}}
+    assert server.ask("POST", "/v1/trajectories", json=off).json()["engine"] == "numeric"
+    refused = server.ask("POST", "/v1/trajectories", json={**off, "engine": "analytic"})
+    assert (refused.status_code, "(Ω,γ) = 0" in refused.text) == (422, True)
+    assert server.ask("POST", "/v1/tori", json={"problem": off["problem"]}).status_code == 422
