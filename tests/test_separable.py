@@ -344,3 +344,28 @@ def test_the_point_and_the_body_run_into_a_plane_at_the_same_time() -> None:
         for method in ("dop853", "taylor"):
             with pytest.raises(Unsolved, match=r"collision: .*\[0\] = 0 at about t = 1\.394818,"):
                 solve(problem, [20.0], "numeric", method)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(n: int, rng: Generator) -> None:
+    """Without potential the same motion has digits that theta functions know: the error of far times holds against them."""
+    A, q, v = np.linspace(0.7, 2.1, n) ** 1.1, rng.uniform(0.4, 1.0, n), rng.normal(size=n)
+    times = [1e5, 1e7, 1e9]
+    found = solve(SeparableVeselova(A, q, v, normalize=True), times)
+    known = solve(Veselova(A, q, v, normalize=True), times)
+    assert found.provenance.details["clock"] == "fourier"
+    assert np.all(np.max(np.abs(found.q - known.q), axis=1) <= found.error + known.error)
+    assert np.all(found.error < 1e-12 * np.array(times))
+
+
+def test_only_panels_limit_the_times_of_a_separable_motion() -> None:
+    start = ([0.665, 2.143, 0.992], [0.48, 0.6, 0.64], [0.8, -0.64, 0])
+    problem = SeparableVeselova(*start, {"quadratic": 0.4, "quartic": 0.1})
+    found = solve(problem, [-1e8, 1e5])
+    assert np.all(found.error < [1e-4, 1e-7])
+    assert found.drift["energy"] < 1e-13
+    with pytest.raises(Unsolved, match="no-digit-left"):
+        solve(problem, [1e15])
+    body = VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6], {"clebsch": 0.4})  # whose frame turns by an integral in panels
+    with pytest.raises(Unsolved, match=r"too-far: .* panels along the orbit"):
+        solve(body, [1e7])

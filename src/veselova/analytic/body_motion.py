@@ -68,6 +68,7 @@ class BodyMotion(Motion[VeselovaSO3]):
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
+        orbit.require_panels(grid)  # e_2 and e_3 turn by an integral along the orbit
         clock = orbit.clock(grid)
         tau, z = clock.tau1(grid)
         largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
@@ -78,6 +79,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         frame = self._frame(gamma, lines, -panels.at(tau))
         error, along = orbit.error(tau, clock, self._turning_steepness)
         error = error + panels.error(tau) + panels.mean_size * along
+        error = orbit.require_digit(error, grid)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(clock)
 

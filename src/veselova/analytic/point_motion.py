@@ -45,4 +45,5 @@ class PointMotion(Motion[SeparableVeselova]):
         at, velocity = orbit.states(z)
         series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
-        return series, orbit.error(tau, clock)[0], "angles", orbit.details(clock)
+        error = orbit.require_digit(orbit.error(tau, clock)[0], grid)
+        return series, error, "angles", orbit.details(clock)

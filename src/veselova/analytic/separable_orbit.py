@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 _FOURIER_FROM, _FOURIER_GENUS = 10.0, 3
 _MOST_CYCLES = 5e4
 
+#: An error above this leaves no digit.
+_NO_DIGIT = 0.1
+
 #: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
 _EVALUATION, _PHASE, _RATE = 32.0, 16.0, 8.0
 
@@ -50,15 +53,30 @@ class SeparableOrbit:
         return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
     def clock(self, grid: Array) -> Clock:
-        """Return a clock for the given times, by cost; raises Unsolved (``too-far``)."""
-        cycles = float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
+        """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes too many panels."""
+        if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
+            return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
+        self.require_panels(grid)
+        return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+
+    def require_panels(self, grid: Array) -> None:
+        """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are made."""
+        cycles = self._cycles(grid)
         if not cycles <= _MOST_CYCLES:
             raise Unsolved(
                 "too-far", f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to {_MOST_CYCLES:.0e}"
             )
-        if cycles > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
-            return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
-        return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+
+    def _cycles(self, grid: Array) -> float:
+        return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
+
+    def require_digit(self, error: Array, grid: Array) -> Array:
+        """Return the error; raises Unsolved (``no-digit-left``) where it leaves no digit."""
+        lost = grid[~(error <= _NO_DIGIT)]
+        if lost.size:
+            first = lost[np.argmin(np.abs(lost))]
+            raise Unsolved("no-digit-left", f"at t = {first:.6g} the error of phases in double precision reaches {_NO_DIGIT}")
+        return error
 
     def states(self, z: Array) -> tuple[Attitude, Array]:
         """Return positions and coordinate lines at phases (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
