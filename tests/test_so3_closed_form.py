@@ -49,6 +49,14 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
         vs.torus(problem)
 
 
+def test_before_a_collision_the_default_answers() -> None:
+    attracting = {"family": [0, 0.1, -1, 0, 0]}
+    problem = VeselovaSO3([1, 1.7, 2.6], [0.6, 0.48, 0.64], [0.3, -0.7, 0.24375], attracting)
+    assert vs.solve(problem, [-0.2, 0.7]).provenance.engine == problem.default_engine == "numeric"
+    with pytest.raises(Unsolved, match=r"collision: .* integrate numerically"):
+        vs.solve(problem, [0.5], "analytic")
+
+
 def test_the_rank_one_problem_of_texts_is_exact() -> None:
     exact = VeselovaSO3(*TEXTS).rank_one().exact
     assert (1, Fraction(1, 2), Fraction(1, 3)) == exact.A

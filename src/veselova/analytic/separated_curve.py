@@ -268,7 +268,9 @@ def _cut(
             raise Unsolved("clustered-roots", "R has a double root: a coordinate rests there; integrate numerically")
     if lower is None or upper is None:
         wall = float(low if lower is None else high)
-        raise Unsolved("collision", f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞")
+        raise Unsolved(
+            "collision", f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞; integrate numerically"
+        )
     width = upper - lower
     others = list(real)
     others.remove(lower)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.decimals import Objects, Pair
 from veselova.mechanics.errors import Unsolved
+from veselova.mechanics.exact import exact_vector
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.problem import Series
 from veselova.mechanics.rigid_body import RigidBody
@@ -83,8 +84,12 @@ class VeselovaSO3(RigidBody):
 
     @property
     def default_engine(self) -> str:
-        """Return ``analytic`` where the motion has a closed form, else ``numeric``."""
-        return "numeric" if self.without_closed_form else "analytic"
+        """Return ``analytic`` where the motion has a closed form, else ``numeric``.
+
+        ``numeric`` too where V is −∞ in a plane: before a collision times are answered by integration alone.
+        """
+        family = exact_vector((self.potential.given or {}).get("family", [0] * 5), ("potential", "family"), 5)
+        return "numeric" if self.without_closed_form or min(family[2:]) < 0 else "analytic"
 
     @property
     def has_torus(self) -> bool:
