@@ -11,7 +11,6 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
-import stamina
 
 from conftest import Server
 from hostile import BUDGET_S, GOOD
@@ -41,10 +40,10 @@ TIMES = np.linspace(-1, 2, 7)
 
 
 @pytest.fixture(autouse=True)
-def fast_retries() -> Any:
-    """Retries without pauses: stamina's own test mode, with the number of attempts left as asked."""
-    with stamina.set_testing(True, attempts=4, cap=True):
-        yield
+def fast_retries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Retries without pauses, as many as asked for."""
+    for name in ("_FIRST_WAIT_S", "_JITTER_S", "_LONGEST_PAUSE_S"):
+        monkeypatch.setattr(f"veselova.service.client.{name}", 0.0)
 
 
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
@@ -157,6 +156,16 @@ def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
+def test_retries_are_logged_and_print_nothing(
+    asynchronous: bool, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with caplog.at_level("INFO", "veselova.client"), pytest.raises(ServiceUnreachable):
+        ask(Script(*[httpx2.ConnectError] * 3), asynchronous, attempts=3)
+    assert [record.name for record in caplog.records if "is asked again" in record.message] == ["veselova.client"] * 2
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
     "failure", [429, 503, httpx2.ConnectError, httpx2.ReadError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout]
 )
@@ -197,18 +206,13 @@ def test_a_late_answer_or_a_wrong_address_is_not_asked_for_again(failure: Any) -
     assert script.calls == 1
 
 
-def test_the_pause_that_a_server_asks_for_is_kept() -> None:
-    from veselova.service.client import _pause_before_retry, _Retry
-
-    assert _pause_before_retry(_Retry(ValueError(), 7.0)) == 7.0
-    assert _pause_before_retry(_Retry(ValueError())) is True
-    assert _pause_before_retry(ValueError()) is False
-    core = Client("http://server")
-    for header, pause in (("3", 3.0), ("999", 30.0), ("Wed, 21 Oct 2026 07:28:00 GMT", None)):
-        response = httpx2.Response(503, json={}, headers={"retry-after": header})
-        with pytest.raises(_Retry) as raised:
-            core._result(None, response)  # type: ignore[arg-type]
-        assert raised.value.pause == pause
+def test_the_pause_that_a_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("veselova.service.client._LONGEST_PAUSE_S", 30.0)
+    pauses: list[float] = []
+    monkeypatch.setattr("veselova.service.client.time.sleep", pauses.append)
+    for header in ("3", "999", "Wed, 21 Oct 2026 07:28:00 GMT"):
+        assert ask(Script(503, 200, retry_after=header), False).n == 3
+    assert pauses == [3.0, 30.0, 0.0]
 
 
 def test_timeouts_follow_the_budget() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import veselova
 from problems import tagged
 from test_engines import METHODS
 from veselova import BackendMissing, Comparison, InvalidInput, StiefelFlow, Trajectory, Unsolved, compare, solve, torus
@@ -137,6 +138,28 @@ def test_missing_transforms_are_named(monkeypatch: Any) -> None:
     monkeypatch.setitem(__import__("sys").modules, "finufft", None)
     with pytest.raises(BackendMissing, match="finufft"):
         solve(tagged("generic")[1].problem(), [1.0], method="nufft")
+
+
+@pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable", "lr", "stiefel"])
+def test_a_dataset_is_written_to_netcdf_and_read_again(case: str, tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    start = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
+    problem: Any = veselova.Veselova([3, 2, 1], *start)
+    if case == "separable":
+        problem = veselova.SeparableVeselova([3, 2, 1], *start, {"quadratic": 0.5})
+    elif case == "lr":
+        problem = veselova.LRSystem(3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]])
+    elif case == "stiefel":
+        problem = veselova.StiefelFlow({"special": [1, 2, 3]}, [[1], [0], [0]], [[0], [1], [0.5]])
+    options: dict[str, Any] = {"engine": "numeric"} if case == "numeric" else {"certified": True} if case == "certified" else {}
+    dataset = veselova.solve(problem, [0, 0.5, 1], **options).to_xarray()
+    dataset.to_netcdf(tmp_path / "motion.nc", engine="scipy")
+    again = xarray.load_dataset(tmp_path / "motion.nc", engine="scipy")
+    assert set(again.variables) == set(dataset.variables)
+    for name in dataset.variables:
+        assert np.array_equal(again[name], dataset[name])
+    assert json.loads(again.attrs["details"]) == json.loads(dataset.attrs["details"])
+    assert again.attrs["engine"] == dataset.attrs["engine"]
 
 
 def test_parquet_arrow_and_xarray_hold_the_series(trajectory: Trajectory, tmp_path: Path) -> None:

@@ -409,6 +409,7 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
             raise Interrupted
 
     monkeypatch.setattr("veselova.service.local_sweep._FEW", 0)
+    monkeypatch.setattr("veselova.service.local_sweep._SOON_S", 0.0)
     settings = local_settings(tmp_path / "two", 2)
     with pytest.raises(Interrupted):
         run_sweep(sweep, settings, interrupt)
@@ -837,3 +838,50 @@ def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert errors == "What is done is kept; the same command goes on from there.\n"
+
+
+PLAIN_SCRIPT = """
+import veselova as vs
+problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])
+{before}
+dataset = vs.sweep(problem, {{"/A/0": {{"start": 2.5, "stop": 5, "count": {count}}}}}, folder={folder!r})
+print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
+"""
+
+
+@pytest.mark.parametrize(("before", "warns"), [("", False), ("import veselova.service.local_sweep as l; l._SOON_S = 0.0", True)])
+def test_a_sweep_in_a_plain_script_is_computed_in_its_process(before: str, warns: bool, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(PLAIN_SCRIPT.format(before=before, count=60, folder=str(tmp_path / "kept")))
+    answer = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.strip() == "{'A.0': 60} {'solved'}"
+    assert ("computed in this process alone" in answer.stderr) is warns
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("print(unguarded())", "True"),
+        ("def f():\n    print(unguarded())\nf()", "True"),
+        ("if __name__ == '__main__':\n    print(unguarded())", "False"),
+        ("def f():\n    print(unguarded())\nif '__main__' == __name__:\n    f()", "False"),
+        ("import threading\nt = threading.Thread(target=lambda: print(unguarded()))\nt.start()\nt.join()", "True"),
+    ],
+)
+def test_a_script_knows_whether_it_is_guarded(text: str, expected: str, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(f"from veselova.service.script_guard import unguarded\n{text}\n")
+    command = [[sys.executable, str(script)], [sys.executable, "-c", script.read_text()]]
+    answers = [subprocess.run(one, capture_output=True, text=True, check=True).stdout.strip() for one in command]
+    assert answers == [expected, "False"]
+
+
+def test_tori_of_a_second_start_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr("veselova.service.cluster._machine", refuse)
+    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
+    job, _ = run_sweep(sweep, local_settings(tmp_path, None), lambda done, total: None)
+    assert (job.state, job.done) == ("finished", 601)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -180,14 +181,18 @@ class Trajectory:
         Table(self.columns(outputs), self.provenance.as_dict()).to_arrow(target)
 
     def to_xarray(self) -> Any:
-        """Return an xarray Dataset of doubles with the time as its coordinate; raises BackendMissing without xarray."""
+        """Return an xarray Dataset of doubles with the time as its coordinate; raises BackendMissing without xarray.
+
+        Its attributes are the provenance. Texts and numbers stand as they are, anything else as JSON, as NetCDF asks:
+        ``to_netcdf(path)`` writes it.
+        """
         try:
             from xarray import Dataset
         except ImportError:
             raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
         variables: dict[str, Any] = {name: (("time", *axes), self.series(name)) for name, axes in self.problem.outputs.items()}
         variables["error"] = (("time",), self.error)
-        return Dataset(variables, coords={"time": self.times}, attrs=self.provenance.as_dict())
+        return Dataset(variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict()))
 
     def plot(self) -> Figure:
         """Return a matplotlib figure of the motion; raises BackendMissing without matplotlib."""
@@ -211,6 +216,15 @@ class Trajectory:
         }
         body = "".join(f"<tr><th style='text-align:left'>{key}</th><td>{value}</td></tr>" for key, value in rows.items())
         return f"<table>{body}</table>"
+
+
+def _attributes(facts: Mapping[str, Any]) -> dict[str, str | int | float]:
+    """Return facts as attributes that a file can hold; a truth value is JSON too, though Python counts it as a number."""
+    plain_kinds = (str, int, float)
+    return {
+        name: value if isinstance(value, plain_kinds) and not isinstance(value, bool) else json.dumps(value)
+        for name, value in facts.items()
+    }
 
 
 def _drift(values: Array, vanishes: bool) -> float:

@@ -6,16 +6,18 @@ with veselova.Client("http://127.0.0.1:8000") as client:
 
 from __future__ import annotations
 
+import logging
 import os
+import random
 import re
 import time
 from collections.abc import Awaitable, Callable, Mapping
+from itertools import count
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import anyio
 import httpx2 as httpx
 import orjson
-import stamina
 from anyio import to_thread
 
 from veselova.mechanics.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
@@ -35,6 +37,10 @@ _RETRIED_STATUSES = frozenset({429, 503})
 _TRANSFER_S = 10.0
 
 
+#: Seconds before the second attempt and, at most, before a further one; a random part comes on top.
+_FIRST_WAIT_S, _LONGEST_WAIT_S, _JITTER_S = 0.2, 5.0, 0.2
+_LOG = logging.getLogger("veselova.client")
+
 #: Longest pause that a server can ask for.
 _LONGEST_PAUSE_S = 30.0
 
@@ -48,11 +54,6 @@ class _Retry(Exception):
     def __init__(self, cause: Exception, pause: float | None = None) -> None:
         self.cause = cause
         self.pause = pause
-
-
-def _pause_before_retry(error: Exception) -> bool | float:
-    """Return whether to try again, or after how many seconds: the hook of stamina's retries."""
-    return isinstance(error, _Retry) and (error.pause or True)
 
 
 def _credentials(api_key: str) -> dict[str, str]:
@@ -74,9 +75,14 @@ class _Core:
         """Return a job of the server by its id."""
         return RemoteJob(self, job_id)  # type: ignore[arg-type]
 
-    def _retries(self) -> Any:
-        """Return a fresh retry context; one belongs to one call."""
-        return stamina.retry_context(on=_pause_before_retry, attempts=self._attempts, timeout=None, wait_initial=0.2)
+    def _pause(self, call: Call[Any], retry: _Retry, attempt: int) -> float:
+        """Return the seconds after a failed attempt, doubled each time, and log them; raises the cause after the last."""
+        if attempt >= self._attempts:
+            raise retry.cause from None
+        pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(0.0, _JITTER_S)
+        pause = pause if retry.pause is None else retry.pause
+        _LOG.info("%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause)
+        return pause
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
         headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
@@ -134,20 +140,23 @@ class Client(_Core):
         self._http = httpx.Client(base_url=base_url, transport=transport)
 
     def _send(self, call: Call[T]) -> T:
+        for attempt in count(1):
+            try:
+                return self._attempt(call)
+            except _Retry as retry:
+                pause = self._pause(call, retry, attempt)
+            time.sleep(pause)
+        raise AssertionError("attempts have no end but these")
+
+    def _attempt(self, call: Call[T]) -> T:
         try:
-            for attempt in self._retries():
-                with attempt:
-                    try:
-                        with self._http.stream(**self._request(call)) as response:
-                            self._receive(call, response)
-                    except httpx.TransportError as error:
-                        raise self._unreachable(call, error) from None
-                    except RuntimeError as error:
-                        raise ServiceError(f"the client is closed ({error})") from None
-                    return self._result(call, response)
-        except _Retry as retry:
-            raise retry.cause from None
-        raise AssertionError("a retry context gives at least one attempt")
+            with self._http.stream(**self._request(call)) as response:
+                self._receive(call, response)
+        except httpx.TransportError as error:
+            raise self._unreachable(call, error) from None
+        except RuntimeError as error:
+            raise ServiceError(f"the client is closed ({error})") from None
+        return self._result(call, response)
 
     @staticmethod
     def _receive(call: Call[Any], response: httpx.Response) -> None:
@@ -189,7 +198,7 @@ class Client(_Core):
     ) -> RemoteJob:
         """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
 
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end.
         """
         job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
         return job
@@ -220,20 +229,23 @@ class AsyncClient(_Core):
         self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
 
     async def _send(self, call: Call[T]) -> T:
+        for attempt in count(1):
+            try:
+                return await self._attempt(call)
+            except _Retry as retry:
+                pause = self._pause(call, retry, attempt)
+            await anyio.sleep(pause)
+        raise AssertionError("attempts have no end but these")
+
+    async def _attempt(self, call: Call[T]) -> T:
         try:
-            async for attempt in self._retries():
-                with attempt:
-                    try:
-                        async with self._http.stream(**self._request(call)) as response:
-                            await self._receive(call, response)
-                    except httpx.TransportError as error:
-                        raise self._unreachable(call, error) from None
-                    except RuntimeError as error:
-                        raise ServiceError(f"the client is closed ({error})") from None
-                    return self._result(call, response)
-        except _Retry as retry:
-            raise retry.cause from None
-        raise AssertionError("a retry context gives at least one attempt")
+            async with self._http.stream(**self._request(call)) as response:
+                await self._receive(call, response)
+        except httpx.TransportError as error:
+            raise self._unreachable(call, error) from None
+        except RuntimeError as error:
+            raise ServiceError(f"the client is closed ({error})") from None
+        return self._result(call, response)
 
     @staticmethod
     async def _receive(call: Call[Any], response: httpx.Response) -> None:
@@ -273,10 +285,7 @@ class AsyncClient(_Core):
     async def sweep(
         self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
     ) -> RemoteJob:
-        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
-
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
-        """
+        """Begin a sweep and return its job, whose methods are awaited; arguments as for ``Client.sweep``."""
         job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
         return job
 

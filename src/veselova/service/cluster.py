@@ -6,7 +6,7 @@ import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, nullcontext
+from contextlib import asynccontextmanager
 from importlib import import_module
 from typing import Any
 from urllib.parse import urlsplit
@@ -16,6 +16,7 @@ import anyio.to_thread
 from veselova.mechanics.errors import BackendMissing, InvalidInput, install_extra
 from veselova.service.interrupts import children_deaf
 from veselova.service.settings import MEGABYTE, Settings
+from veselova.service.this_process import ThisProcess
 
 __all__ = ["open_cluster", "require_scheduler"]
 
@@ -52,12 +53,15 @@ def require_scheduler(settings: Settings) -> None:
 
 @asynccontextmanager
 async def open_cluster(settings: Settings, processes: bool = True, niceness: int = 0) -> AsyncIterator[Any]:
-    """Give a Dask client in the running event loop; ``processes=False`` computes in threads of this process.
+    """Give a Dask client in the running event loop; ``processes=False`` and no scheduler, a thread of this process.
 
     ``niceness``: how far the processes of this machine stand back behind others.
     Raises InvalidInput for an address that is refused, OSError where the scheduler cannot be reached.
     """
     require_scheduler(settings)
+    if not processes and not settings.dask_scheduler:
+        yield ThisProcess()
+        return
     try:
         # It takes half a second to load, for which the server goes on answering.
         await anyio.to_thread.run_sync(import_module, "distributed")
@@ -77,10 +81,10 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
         async with Client(settings.dask_scheduler, **options) as client:
             yield client
         return
-    with dask.config.set(_configuration(_preload(niceness) if processes else [])):
-        starting = asyncio.ensure_future(LocalCluster(**_machine(settings, processes)))
+    with dask.config.set(_configuration(_preload(niceness))):
+        starting = asyncio.ensure_future(LocalCluster(**_machine(settings)))
         try:
-            with children_deaf() if processes else nullcontext():
+            with children_deaf():
                 cluster = await asyncio.shield(starting)
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error
@@ -141,14 +145,14 @@ def _configuration(preload: list[str]) -> dict[str, Any]:
     }
 
 
-def _machine(settings: Settings, processes: bool) -> dict[str, Any]:
+def _machine(settings: Settings) -> dict[str, Any]:
     """Return the cluster of this machine, as LocalCluster takes it."""
     return {
-        "n_workers": settings.sweep_workers if processes else 1,
+        "n_workers": settings.sweep_workers,
         "threads_per_worker": 1,
-        "processes": processes,
-        "memory_limit": settings.sweep_worker_memory_mb * MEGABYTE if processes else 0,
-        "host": "127.0.0.1" if processes else None,
+        "processes": True,
+        "memory_limit": settings.sweep_worker_memory_mb * MEGABYTE,
+        "host": "127.0.0.1",
         # Dask serves pages of its own; they stay on this machine, at any free port.
         "scheduler_kwargs": {"dashboard": False, "dashboard_address": "127.0.0.1:0"},
         "worker_dashboard_address": "127.0.0.1:0",

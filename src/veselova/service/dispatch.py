@@ -12,6 +12,7 @@ from uuid import uuid4
 from veselova.service.database import reason_of
 from veselova.service.jobs import Job
 from veselova.service.summaries import Chunk, computed_chunk, lost_chunk
+from veselova.service.this_process import ThisProcess
 from veselova.version import __version__
 
 __all__ = ["ChunkFailed", "answers"]
@@ -36,6 +37,8 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
     ``closing`` says, when the wait is cancelled, whether the workers end with their cluster anyway. Raises OSError where the
     cluster is lost, ChunkFailed where its worker met with one, OtherVersion where it is not of the same version.
     """
+    if isinstance(client, ThisProcess):
+        return await client.computed(job, start, stop)
     from distributed.scheduler import KilledWorker
 
     key = f"computed_chunk-{job.id}-{uuid4().hex}"
@@ -62,8 +65,6 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
 
 async def _stop(client: Any, job: Job, future: Any) -> None:
     """End work that nobody waits for: a worker that is in the midst of it is ended, for a thread cannot be stopped."""
-    if client.scheduler_info(n_workers=1)["address"].startswith("inproc"):
-        return
     processing = {worker: [str(key) for key in keys] for worker, keys in (await client.processing()).items()}
     held = [worker for worker, keys in processing.items() if future.key in keys]
     await future.cancel(force=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -15,6 +16,7 @@ from anyio.from_thread import start_blocking_portal
 from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, install_extra, shown
 from veselova.mechanics.problem import Problem
 from veselova.service.schemas import read_request
+from veselova.service.script_guard import unguarded
 from veselova.service.serving import settings_of_environment
 from veselova.service.settings import Settings
 from veselova.service.sweep_request import SweepRequest, sweep_document
@@ -27,8 +29,12 @@ __all__ = ["local_settings", "run_sweep", "sweep"]
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], None]
 
-#: Fewer problems than this are computed in this process: starting others takes seconds.
+#: So many problems are computed in this process, and more where they take less than so many seconds: starting others takes some.
 _FEW = 50
+_SOON_S = 3.0
+
+#: A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.
+_UNGUARDED = 'a script uses several processors where veselova.sweep is called below `if __name__ == "__main__":`'
 
 #: How often workers are asked for. A server goes on asking; here somebody waits.
 _TRIES = 3
@@ -102,12 +108,11 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):
-        # A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.
-        raise RuntimeError('in a script, call veselova.sweep below `if __name__ == "__main__":`')
+        raise RuntimeError(f"{_UNGUARDED}; it ran into the sweep of the process that started it")
     jobs = Jobs(settings)
 
     async def run() -> None:
-        sweeps = Sweeps(settings, jobs, request.total > _FEW or bool(settings.dask_scheduler), tries=_TRIES)
+        sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
         sweeps.begin(job.id)
         ending = asyncio.ensure_future(sweeps.ended(job.id))
         try:
@@ -122,12 +127,27 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
     with closing(jobs):
         job = jobs.submit(request)
         if not job.ended:
+            processes = _needs_processes(request, settings)
             _in_a_loop_of_its_own(run)
         job = jobs.get(job.id)
         if job.state != "finished":
             raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
         report(job.total, job.total)
     return job, jobs
+
+
+def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
+    """Return whether others than this process are to compute: only where they save more than it takes to start them."""
+    from veselova.service.this_process import seconds_of
+
+    if settings.dask_scheduler:
+        return True
+    if request.total <= _FEW or seconds_of(request, _SOON_S) < _SOON_S:
+        return False
+    if unguarded():
+        warnings.warn(f"{_UNGUARDED}; the sweep is computed in this process alone", stacklevel=4)
+        return False
+    return True
 
 
 def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
