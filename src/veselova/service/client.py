@@ -43,7 +43,6 @@ _LOG = logging.getLogger("veselova.client")
 
 #: Longest pause that a server can ask for.
 _LONGEST_PAUSE_S = 30.0
-
 #: Failures of the connection. An answer that did not come in time is not among them: asking again would double the load.
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 
@@ -198,7 +197,7 @@ class Client(_Core):
     ) -> RemoteJob:
         """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
 
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end.
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
         """
         job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
         return job
@@ -285,9 +284,10 @@ class AsyncClient(_Core):
     async def sweep(
         self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
     ) -> RemoteJob:
-        """Begin a sweep and return its job, whose methods are awaited; arguments as for ``Client.sweep``."""
         job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
         return job
+
+    sweep.__doc__ = Client.sweep.__doc__
 
     async def close(self) -> None:
         """Close the connections."""
