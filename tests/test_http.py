@@ -147,7 +147,7 @@ def test_headers_without_end_are_not_read(server: Server) -> None:
     address = urlsplit(server.url)
     with socket.create_connection((address.hostname, address.port), timeout=PATIENCE) as connection:
         sent, answer = 0, b""
-        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Long: ")
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Long: ")
         with suppress(ConnectionError):  # the server has closed its end
             while sent < 50_000_000 and not select.select([connection], [], [], 0)[0]:
                 connection.sendall(b"a" * 10_000)
@@ -264,8 +264,8 @@ def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
         before = set(own.workers())
         with socket.create_connection((urlsplit(own.url).hostname, urlsplit(own.url).port)) as connection:
             body = json.dumps({**ENDLESS, "budget_s": 2 * PATIENCE}).encode()
-            head = f"POST /v1/trajectories HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: {len(body)}"
-            connection.sendall(head.encode() + b"\r\n\r\n" + body)
+            head = b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            connection.sendall(head + b"Content-Length: %d\r\n\r\n" % len(body) + body)
             wait_until(lambda: own.at_work() == (1, 0))
         wait_until(lambda: own.at_work() == (0, 0))
         assert post(own, "/v1/trajectories", GOOD).status_code == 200

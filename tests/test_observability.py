@@ -360,7 +360,7 @@ def fail_with_what_cannot_be_made() -> None:
 
 
 def test_a_worker_says_what_happened_whatever_the_exception_is() -> None:
-    succeeded, error = pickle.loads(answered(pickle.dumps((fail_with_what_cannot_be_made, ())))[SIZE.size :])
+    succeeded, error = pickle.loads(answered(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :])
     assert not succeeded
     assert isinstance(error, RuntimeError)
     assert str(error) == "Unmakeable: what happened"

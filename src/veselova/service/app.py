@@ -20,6 +20,8 @@ from starlette.routing import BaseRoute, Match, Route
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
 from veselova.service.access import UNLIMITED, Access, Policy
 from veselova.service.answers import Answers
+from veselova.service.connections import report_exhaustion
+from veselova.service.hosts import Hosts, allowed_hosts
 from veselova.service.job_routes import job_router
 from veselova.service.job_service import JobService
 from veselova.service.keys import open_keys
@@ -63,6 +65,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        report_exhaustion()
         async with answers.serving(), jobs.running(), workers.running():
             yield
         if keys is not None:
@@ -74,6 +77,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,  # its address would be made of the request's Host
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
     routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(reader, jobs))
@@ -83,11 +87,11 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
         app.add_exception_handler(kind, partial(_answer_problem, metrics, [route for part in routers for route in part.routes]))
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
-    _surround(app, limits, Policy.of(limits, loopback, keys), metrics)
+    _surround(app, limits, Policy.of(limits, loopback, keys), allowed_hosts(limits, loopback), metrics)
     return app
 
 
-def _surround(app: FastAPI, settings: Settings, policy: Policy, metrics: Metrics) -> None:
+def _surround(app: FastAPI, settings: Settings, policy: Policy, hosts: frozenset[str] | None, metrics: Metrics) -> None:
     """Put what looks at every request around an application: each of these stands around those before it."""
     metrics.serve(app)
     app.add_middleware(Access, policy=policy, refused=metrics.refused)
@@ -100,6 +104,8 @@ def _surround(app: FastAPI, settings: Settings, policy: Policy, metrics: Metrics
             allow_headers=_CORS_SENT,
             expose_headers=_CORS_SEEN,
         )
+    if hosts is not None:
+        app.add_middleware(Hosts, allowed=hosts)
     app.add_middleware(RequestLog, quiet=UNLIMITED | {"/metrics"})
     app.add_middleware(SecurityHeaders)
     app.add_middleware(CorrelationIdMiddleware, validator=_is_request_id)

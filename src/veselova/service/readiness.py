@@ -16,13 +16,14 @@ __all__ = ["missing_parts"]
 async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -> list[str]:
     """Return what keeps a server from answering, in words: a warm worker, the store of its jobs, its keys where it asks for them.
 
+    Anyone may read it, so it names no address, file or role: the log has those.
     A server without the libraries of jobs is complete without their store.
     """
     missing = [] if workers.ready() else ["No worker is warm yet."]
     try:
         await jobs.require()
-    except Refused as error:
-        missing.append(error.detail)
+    except Refused:
+        missing.append("Jobs cannot be stored or read at present.")
     except BackendMissing:
         pass
     if keys is not None:

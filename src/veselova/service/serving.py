@@ -8,7 +8,8 @@ import os
 import signal
 import socket
 import sys
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
 from pydantic import ValidationError
 
@@ -20,6 +21,9 @@ from veselova.service.settings import Settings
 __all__ = ["serve", "settings_of_environment"]
 
 _LOG = logging.getLogger("veselova.service")
+
+#: Connections that the system keeps until they are accepted; asyncio tries as many at a time.
+_BACKLOG = 256
 
 #: The key that a client of this environment shows; no setting of the server.
 _OF_THE_CLIENT = {"VESELOVA_API_KEY"}
@@ -33,6 +37,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
     """
     # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    _drain_when_hung_up()
     # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     limits = settings_of_environment(**stated)
@@ -46,10 +51,12 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
 
     from veselova.service.access import Policy
     from veselova.service.app import create_app
+    from veselova.service.connections import Connections, use_all_descriptors
     from veselova.service.http_protocol import Http
     from veselova.service.logs import configure_logging
 
     configure_logging(limits)
+    use_all_descriptors()
     keep_from_children()  # work in flight gets its grace after SIGINT as after SIGTERM
     app = create_app(limits, loopback=loopback)
     if not loopback and not Policy.requires_keys(limits, loopback):
@@ -62,11 +69,19 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
         access_log=False,
         server_header=False,
         loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
-        http=Http,
+        http=cast(Any, partial(Http, limits, Connections(limits))),
+        timeout_keep_alive=limits.keep_alive_s,
+        backlog=_BACKLOG,
         proxy_headers=forwarded_allow_ips is not None,
         forwarded_allow_ips=forwarded_allow_ips,
         timeout_graceful_shutdown=limits.shutdown_grace_s,
     )
+
+
+def _drain_when_hung_up() -> None:
+    """Take the end of the terminal (SIGHUP) for SIGTERM, unless it is to be ignored (nohup)."""
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
 
 
 def settings_of_environment(**stated: Any) -> Settings:

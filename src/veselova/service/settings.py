@@ -49,6 +49,25 @@ class Settings(BaseSettings):
     max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")
     max_values: int = Field(default=16_000_000, ge=1, description="most frame entries in one answer, times × n²")
 
+    max_connections: int = Field(
+        default=500, ge=1, description="connections at a time; fewer where the system allows fewer files"
+    )
+    max_connections_per_address: int = Field(
+        default=100, ge=0, description="of them from one address (IPv6: /64 network); 0: any number, as behind a proxy"
+    )
+    head_timeout_s: float = Field(default=10.0, gt=0, description="seconds for the head of a request")
+    body_timeout_s: float = Field(default=120.0, gt=0, description="seconds for the whole body of a request")
+    body_bytes_per_s: int = Field(default=1000, ge=0, description="slowest body, on average; looked at after 5 seconds")
+    send_timeout_s: float = Field(
+        default=30.0, gt=0, description="seconds in which a client must take some of an answer that waits"
+    )
+    keep_alive_s: int = Field(default=5, ge=1, description="seconds that a connection may wait for its next request")
+    allowed_hosts: str = Field(
+        default="auto",
+        description="names and addresses by which requests may call the server (Host), with commas between them, or *; "
+        "auto: those of loopback where it is bound to loopback, else any",
+    )
+
     data_dir: Path = Field(default_factory=_state_folder, description="folder of the database, the results of jobs and the cache")
     database_url: SecretStr = Field(
         default=SecretStr(""), description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir when empty"
@@ -96,6 +115,16 @@ class Settings(BaseSettings):
         for origin in filter(None, map(str.strip, text.split(","))):
             if origin != "*" and not re.fullmatch(r"https?://[^/\s?#@*]+", origin):
                 raise ValueError("required origins such as https://example.org, with commas between them, or *")
+        return text
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _are_hosts(cls, text: str) -> str:
+        for name in filter(None, map(str.strip, text.split(","))):
+            if name != "*" and not re.fullmatch(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?", name):
+                raise ValueError(
+                    "required names such as veselova.example or 10.0.0.5, without ports, with commas between them, or *"
+                )
         return text
 
     @property

@@ -84,7 +84,7 @@ class Worker(asyncio.SubprocessProtocol):
         return not self._closed and not self._ended.is_set()
 
     async def ask(self, call: bytes) -> Any:
-        """Return what a call gives (the ``message`` of a task and its arguments), and raise what it raises.
+        """Return what a call gives (the ``message`` of a task, its arguments and its budget), and raise what it raises.
 
         Raises WorkerLost where the process ends before it has answered. Who stops waiting for the answer ends the process.
         """

@@ -8,6 +8,7 @@ the server's path of imports.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -17,19 +18,27 @@ from typing import Any, BinaryIO
 
 __all__ = ["SIZE", "answered", "message", "serve"]
 
+#: Seconds after its budget before a worker ends without having been ended.
+_SERVERS_TURN_S = 1.0
+
 #: What stands before a pickle: its size in bytes.
 SIZE = struct.Struct("<Q")
 
 
 def message(content: Any) -> bytes:
-    """Return something as it is sent from a process to the other: a call (task, arguments) or an answer (succeeded, value)."""
+    """Return something as it is sent from a process to the other.
+
+    A call is (task, arguments, seconds that it may take), an answer (succeeded, value).
+    """
     pickled = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
     return SIZE.pack(len(pickled)) + pickled
 
 
 def serve(most_bytes: int) -> None:
     """Answer the calls of a server, within so much memory, until it closes its end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the interrupt of a terminal is for the server, which ends its workers
+    for name in ("SIGINT", "SIGHUP"):  # what a terminal sends is for the server, which ends its workers
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     calls, answers = _withdrawn(0, "rb"), _withdrawn(1, "wb")
     sys.path[:] = pickle.loads(_received(calls) or pickle.dumps(sys.path))
     _limit_memory(most_bytes)
@@ -54,9 +63,10 @@ def _received(calls: BinaryIO) -> bytes:
 
 
 def answered(call: bytes) -> bytes:
-    """Return the message that answers a call, the pickle of a task and its arguments."""
+    """Return the message that answers a call, the pickle of a task, its arguments and the seconds that it may take."""
     try:
-        task, arguments = pickle.loads(call)
+        task, arguments, seconds = pickle.loads(call)
+        _end_after(seconds)
         return message((True, task(*arguments)))
     except Exception as error:
         try:
@@ -64,6 +74,14 @@ def answered(call: bytes) -> bytes:
             return message((False, error))
         except Exception:  # it holds what cannot be sent, or made again
             return message((False, RuntimeError(f"{type(error).__name__}: {error}")))
+    finally:
+        _end_after(math.inf)
+
+
+def _end_after(seconds: float) -> None:
+    """Let the system end this process after so many seconds, as its server would have done, had it not been killed itself."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, seconds + _SERVERS_TURN_S if math.isfinite(seconds) else 0)
 
 
 def _limit_memory(most_bytes: int) -> None:

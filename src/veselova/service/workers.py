@@ -112,7 +112,7 @@ class Workers:
             raise
 
     async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
-        call = message((task, arguments))
+        call = message((task, arguments, budget_s))
         try:
             with anyio.fail_after(budget_s):
                 await self._acquire()
