@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from veselova.analytic.motion import Motion
 from veselova.analytic.point_motion import PointMotion
 from veselova.analytic.rank_one_motion import motion_of_body
 from veselova.analytic.route import METHODS, Route
+from veselova.analytic.separatrix import DepartureBound
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
@@ -141,26 +142,35 @@ class _TorusMotion(Motion[TorusProblem]):
         return Route(self._solution, self.method)
 
     @cached_property
-    def _neighbours(self) -> tuple[Route, ...]:
-        """Return the same from starts a rounding away, where the start is on a separatrix."""
+    def _departure(self) -> DepartureBound | None:
+        """Return how far starts a rounding away part from the motion, where it is on a separatrix."""
         if not self._solution.separatrices:
-            return ()
-        return tuple(Route(Solution(self.problem, sign * _DATA_ROUNDING), self._route.method) for sign in (1, -1))
+            return None
+        neighbours = (Route(Solution(self.problem, sign * _DATA_ROUNDING), self._route.method) for sign in (1, -1))
+        routes = (self._route, *neighbours)
+        return DepartureBound(partial(_frames, routes, self.clock), self.problem.turning, _NO_DIGIT)
+
+    @property
+    def _cause(self) -> str:
+        """Return why no digit is left, and what answers."""
+        if self._departure is None:
+            return "the data determine no digit there"
+        served = isinstance(self.problem, Veselova) and self.problem.axes is None
+        further = "; ask for more digits, which come from the exact data" if served else ""
+        return f"on a separatrix the data determine the motion, and doubles do not{further}"
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
         route = self._route
         horizon = route.to(grid)
         clock = horizon.clock(self.clock)
         along, error = route.along(horizon, clock)
-        for other in self._neighbours:
-            there = other.to(grid)
-            moved = other.along(there, there.clock(self.clock))[0]
-            error = np.maximum(error, np.max(np.abs(moved.series[1] - along.series[1]), axis=(1, 2)))
+        if self._departure is not None:
+            error = np.maximum(error, self._departure.at(grid))
         if not error.max() <= _NO_DIGIT:  # or it is no number
             lost = grid[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
-            cause = "the data determine no digit there" + _OR_CANCELLATION * (route.method == "nufft")
-            raise Unsolved("no-digit-left", f"at t = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
+            cause = self._cause + _OR_CANCELLATION * (route.method == "nufft")
+            raise Unsolved("no-digit-left", f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
         solution = route.solution
         details = {
             "regime": solution.regime,
@@ -175,3 +185,9 @@ class _TorusMotion(Motion[TorusProblem]):
         states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
         series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
         return series, self.problem.bound(series, error), route.method, details
+
+
+def _frames(routes: Sequence[Route], clock: str | None, instants: Array) -> list[Array]:
+    """Return the frames of several motions at increasing times."""
+    horizons = [route.to(instants) for route in routes]
+    return [route.along(horizon, horizon.clock(clock))[0].series[1] for route, horizon in zip(routes, horizons, strict=True)]

@@ -121,6 +121,22 @@ class Trajectory:
         ]
         return blocks[0] if len(blocks) == 1 else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
+    @cached_property
+    def conditioning(self) -> Array:
+        """Return how far a bounded component moves at each time when the data move by one rounding, (N,).
+
+        One rounding: 2^−53 of a number, or one unit of the last digit of a text with more digits than a double; whole numbers and
+        ratios are exact. It is measured by motions from moved data, so it takes some solves when it is first asked for. ``error``
+        is that of the motion of exactly these data; this says how much of the motion is that of others that read the same.
+        """
+        from veselova.conditioning import conditioning
+        from veselova.engines import solve
+
+        engine = self.provenance.engine
+        found = conditioning(self.problem, self.times, lambda problem, times: solve(problem, times, engine))
+        found.setflags(write=False)
+        return found
+
     @property
     def drift(self) -> dict[str, float]:
         """Return, per integral of motion, its largest change against the first time, relative to its size there (or to 1)."""
