@@ -25,7 +25,7 @@ from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.precision import Values
 from veselova.analytic.waves import waves_at
 
-__all__ = ["ColumnsForModes", "FourierClock"]
+__all__ = ["ColumnsForModes", "FourierClock", "significant_modes"]
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class FourierClock(Clock):
     name: ClassVar[str] = "fourier"
 
     def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        modes, coefficients, edge, self._off = _significant_modes(rate)
+        modes, coefficients, edge, self._off = significant_modes(rate)
         order = np.argsort(-np.abs(coefficients))
         modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
@@ -217,7 +217,7 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
-def _significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
+def significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
     """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0 and above its rounding, F_m, the modes
     next to them, and by what part of F_0 each is off.
 

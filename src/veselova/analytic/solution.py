@@ -99,7 +99,7 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions."""
         if in_angles:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return np.asarray(self._of_stretch * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
+        return np.asarray(self.rate_constant * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
 
     def takes_rate_from_angles(self, method: str | None = None, cycles: float = np.inf) -> bool:
         """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix, always on uneven tori and where
@@ -114,7 +114,7 @@ class Solution:
         return genus > _RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
 
     @cached_property
-    def _of_stretch(self) -> float:
+    def rate_constant(self) -> float:
         """Return dt/dτ₁ over that power of the stretch; its largest value, at a half period, is the scale of the rate."""
         return float(self.rate.scale) * self.quotients.peak_inverted(STRETCH_POWERS[self.problem.time])
 
@@ -252,7 +252,7 @@ class Solution:
         return np.asarray(along @ self.problem.frame[:, 1:])
 
     @cached_property
-    def _frozen_part(self) -> Array:
+    def frozen_part(self) -> Array:
         """Return what stays of e_2 … e_n: their components along the directions that do not move."""
         directions, normals = self.moving.directions, self.problem.frame[:, 1:]
         return np.asarray(normals - directions @ (directions.T @ normals))
@@ -265,7 +265,7 @@ class Solution:
         frame[:, :, 0] = attitude.q @ moving.directions.T
         frame[:, :, 1:] = moving.directions @ turned.reshape(count, along, -1)
         if moving.frozen:
-            frame[:, :, 1:] += self._frozen_part
+            frame[:, :, 1:] += self.frozen_part
         return rate, (attitude.q_prime @ moving.directions.T) * rate[:, None], frame
 
     def spheroconic(self, attitude: Attitude) -> Array:

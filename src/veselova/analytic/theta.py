@@ -68,6 +68,11 @@ class Theta:
     def _coordinates(self) -> Coordinates:
         return self._chosen[0]
 
+    @property
+    def summation(self) -> tuple[NDArray[np.int64], tuple[int, ...]]:
+        """Return the basis U, as rows, and the set F of its coordinates with waves, in which the sum is formed."""
+        return self._coordinates.U, self._coordinates.waves
+
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
         return list(self._coordinates.waves), self._coordinates.gaussians

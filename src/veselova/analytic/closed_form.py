@@ -1,0 +1,147 @@
+"""The closed form of a motion as a document: the numbers of its solution, and of its time map, by their names."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.clock import STRETCH_POWERS
+from veselova.analytic.fourier_clock import significant_modes
+from veselova.analytic.route import Route
+from veselova.analytic.solution import Solution
+from veselova.mechanics.closed_form import ClosedForm
+from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.torus_problem import TorusProblem
+from veselova.version import __version__
+
+__all__ = ["closed_form"]
+
+Array = NDArray[np.float64]
+
+#: Accuracies that may be asked for: below the first, coefficients are rounding; above the last, nothing is left of the motion.
+_FINEST, _COARSEST = 1e-15, 1e-2
+
+#: Modes from which a document is refused: some ten megabytes.
+_MOST_MODES = 400_000
+
+#: Least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above exp(−π/(4·0.2)) = 0.02 of θ(0).
+_LEAST_EIGENVALUE = 0.2
+
+#: Cycles of the fastest phase over which the growth of the error is taken: fewer than those from which the engine carries
+#: frequencies with more digits than a document has.
+_CYCLES = 100.0
+
+#: By how much the document's own arithmetic may be off more than the engine's: products of times and rates are rounded once more.
+_OWN_ROUNDING = 2.0
+
+
+def closed_form(problem: TorusProblem, accuracy: float = 1e-12) -> ClosedForm:
+    """Return the motion of a problem as a document in double precision.
+
+    ``accuracy``: the error that modes left out of the time map may make in q and the frame. Raises InvalidInput for another
+    number, Unsolved at rest, on a separatrix (``no-closed-form``) and where theta functions or modes are too many.
+    """
+    if isinstance(accuracy, bool) or not isinstance(accuracy, (int, float)) or not _FINEST <= accuracy <= _COARSEST:
+        raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", shown(accuracy))
+    solution = Solution(problem)
+    if solution.separatrices:
+        reason = "the start lies on a separatrix, which no torus describes for long; solve at times instead"
+        raise Unsolved("no-closed-form", reason)
+    quotients, unit = solution.quotients, solution.tau1_unit
+    modes, coefficients = _modes(solution, accuracy)
+    g, places, constants = solution.curve.genus, quotients.places.tolist(), quotients.constants.tolist()
+    pairs = [[place, constant] for place, constant in zip(places, constants, strict=True)]
+    m = solution.moving.size
+    columns = [pairs[m + g + k :: g] for k in range(g)]
+    axes = problem.axes
+    power = STRETCH_POWERS[problem.time]
+    T = solution.periods.riemann_matrix
+    start_error, growth = _errors(solution)
+    return ClosedForm(
+        {
+            "format": ClosedForm.format,
+            "version": __version__,
+            "time": problem.time,
+            "digits": 15,
+            "genus": g,
+            "A": problem.A.tolist(),
+            "axes": None if axes is None else axes.tolist(),
+            "riemann_matrix": np.asarray(T).tolist(),
+            "reduction": _reduction(solution),
+            "characteristics": [[[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions],
+            "q": pairs[:m],
+            "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
+            "normals": columns[:-1],
+            "gamma": columns[-1],
+            "phases": solution.in_tau1.start.tolist(),
+            "frequencies": (solution.in_tau1.rates / unit).tolist(),
+            "rotation": solution.rotation.tolist(),
+            "directions": solution.moving.directions.tolist(),
+            "frozen": (solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part).tolist(),
+            "mean_rate": solution.mean_rate / unit,
+            "modes": modes.tolist(),
+            "coefficients": coefficients,
+            "rate": {
+                "characteristic": places[m + g - 1],
+                "constant": solution.rate_constant / unit,
+                "power": power,
+            },
+            "units": {"time": problem.time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
+            "error": {
+                "at_start": _OWN_ROUNDING * start_error + accuracy,
+                "per_unit_time": _OWN_ROUNDING * growth,
+                "per_cycle": _OWN_ROUNDING * growth / solution.fastest,
+            },
+            "problem": problem.as_dict(),
+        }
+    )
+
+
+def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
+    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the problem's τ₁.
+
+    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow times that. The smallest are left
+    out as long as their sum is below the accuracy. Coefficients are rounded to what the accuracy asks for as well.
+    """
+    g = solution.curve.genus
+    if solution.problem.time == "tau1":
+        return np.empty((0, g), dtype=np.int64), []
+    solution.fourier_clock(False)  # raises where the rate varies too much, or modes are too many
+    modes, coefficients, *_ = significant_modes(solution.rate)
+    pace = np.abs(modes @ solution.in_tau1.rates)
+    reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate) * solution.steepness.along_flow
+    effects = np.abs(coefficients) * reach
+    order = np.argsort(-effects)
+    left_out = np.cumsum(effects[order][::-1])[::-1]
+    kept = order[left_out > accuracy / 2]
+    if len(kept) > _MOST_MODES:
+        raise Unsolved("too-many-modes", f"the time map has {len(kept)} modes above {accuracy:g}, and {_MOST_MODES} can be kept")
+    # Each may be off by its part of what is left of the accuracy.
+    finest = accuracy / (4 * max(1, len(kept)) * np.maximum(reach[kept], np.finfo(float).tiny)) / solution.tau1_unit
+    values = coefficients[kept] / solution.tau1_unit
+    places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
+    return modes[kept], [round(float(value), place) for value, place in zip(values, places, strict=True)]
+
+
+def _reduction(solution: Solution) -> dict[str, Any] | None:
+    """Return the basis and the waves in which theta sums do not cancel, where the plain sum would; None elsewhere."""
+    T = np.asarray(solution.periods.riemann_matrix)
+    if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
+        return None
+    basis, waves = solution.quotients.theta.summation
+    return {"basis": basis.tolist(), "waves": list(waves)}
+
+
+def _errors(solution: Solution) -> tuple[float, float]:
+    """Return the engine's error at t = 0, and by how much it grows in a unit of time."""
+    route = Route(solution, "theta")
+    far = _CYCLES / solution.fastest
+    errors = []
+    for time in (0.0, far):
+        horizon = route.to(np.array([time]))
+        name = None if solution.problem.time == "tau1" else "fourier"
+        errors.append(float(route.along(horizon, horizon.clock(name))[1][0]))
+    return errors[0], max(0.0, errors[1] - errors[0]) / far

@@ -1,0 +1,172 @@
+"""The evaluator of closed-form documents: inverse time map, phases, theta quotients, attitude. It uses NumPy alone."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["evaluate", "lattice_sum", "lattice_within", "neumann_time"]
+
+Array = NDArray[np.float64]
+
+#: Terms below e^(−39) = 1e-17 of the largest are left out: π|x|² ≤ 39.
+_RADIUS = np.sqrt(39.0 / np.pi)
+
+#: Entries of one block of (times × modes) or (times × lattice).
+_BLOCK = 400_000
+
+#: Newton's steps of the inverse time map, each kept inside a bracket that it halves where it must.
+_MOST_STEPS = 200
+
+
+def evaluate(document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array) -> dict[str, Array]:
+    """Return the series of a document at times (N,), by name."""
+    tau1, z = neumann_time(document, arrays, times)
+    values = np.concatenate([lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)])
+    quotients = values / values[:, :1]
+
+    def entries(pairs: Any) -> Array:
+        places = np.array([place for place, _ in pairs])
+        return np.asarray(quotients[:, places] * np.array([float(constant) for _, constant in pairs]))
+
+    normals = np.stack([entries(column) for column in [*document["normals"], document["gamma"]]], axis=2)
+    directions = arrays["directions"]
+    frame = np.empty((len(times), len(directions), len(directions)))
+    frame[:, :, 0] = entries(document["q"]) @ directions.T
+    frame[:, :, 1:] = directions @ normals @ arrays["rotation"] + arrays["frozen"]
+    q_prime = np.einsum("tik,tk->ti", normals, entries(document["q_prime"])) @ directions.T
+    rate = document["rate"]
+    place = int(rate["characteristic"])
+    slope = float(rate["constant"]) * np.abs(quotients[:, place]) ** int(rate["power"])
+    return _series(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
+
+
+def _series(document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array) -> dict[str, Array]:
+    """Return the series under the names of the system; ``velocity`` is that of q in the system's own time."""
+    axes = document.get("axes")
+    q = frame[:, :, 0]
+    if document["problem"]["system"] == "ellipsoid-geodesic":
+        X = A * q / np.sqrt(np.sum(A * q * q, axis=1))[:, None]
+        return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
+    if axes is not None:
+        matrix = np.array(axes, dtype=np.float64)
+        frame, velocity = matrix @ frame, velocity @ matrix.T
+        q = frame[:, :, 0]
+    if document["problem"]["system"] == "neumann":
+        return {"q": q, "q_prime": velocity, "frame": frame}
+    if document["problem"]["system"] == "veselova-so3":
+        return {"gamma": q, "Omega": np.cross(velocity, q), "frame": frame}
+    return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
+
+
+def _rows(count: int, block: int) -> list[slice]:
+    return [slice(first, first + max(1, block)) for first in range(0, count, max(1, block))]
+
+
+def neumann_time(document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array) -> tuple[Array, Array]:
+    """Return τ₁ (N,) and the phases z modulo 2, (N, g).
+
+    With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰ + (f/F_0)t + fδ. The left
+    side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals where the document has more digits than a double.
+    """
+    f, modes, mean = arrays["frequencies"], arrays["modes"], float(document["mean_rate"])
+    advance = _uniform_advance(document, f / mean, times)
+    delta = np.zeros(len(times))
+    if len(modes):
+        for rows in _rows(len(times), _BLOCK // len(modes)):
+            delta[rows] = _solve_delta(arrays, mean, advance[rows])
+    return times / mean + delta, np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0)
+
+
+def _uniform_advance(document: Mapping[str, Any], rates: Array, times: Array) -> Array:
+    """Return (f/F_0)t modulo 2, (N, g)."""
+    if int(document["digits"]) <= 15:
+        return np.asarray(np.fmod(times[:, None] * rates, 2.0))
+    mean = Fraction(document["mean_rate"])
+    exact = [Fraction(rate) / mean for rate in document["frequencies"]]
+    return np.array([[float(rate * Fraction(time) % 2) for rate in exact] for time in times.tolist()])
+
+
+def _solve_delta(arrays: Mapping[str, Array], mean: float, advance: Array) -> Array:
+    """Return δ for each row of the uniform advance, by Newton's method inside a bracket."""
+    f, modes, coefficients = arrays["frequencies"], arrays["modes"], arrays["coefficients"]
+    pace = np.pi * (modes @ f)
+    offset = 2 * np.pi * np.mod(modes @ arrays["phases"], 1.0)
+    uniform = np.pi * (advance @ modes.T)
+
+    def excess(delta: Array) -> tuple[Array, Array]:
+        # sin 2πm·z − sin 2πm·z⁰ = 2 cos(2πm·z⁰ + h) sin h, h = πm·(z−z⁰): nothing cancels where the advance is small.
+        h = uniform + delta[:, None] * pace
+        cosine, sine = np.cos(offset + h), np.sin(h)
+        value = mean * delta + (cosine * sine) @ (2 * coefficients / pace)
+        slope = mean + np.cos(offset + 2 * h) @ (2 * coefficients)
+        return value, slope
+
+    low = np.full(len(advance), -2 * float(np.sum(np.abs(coefficients / pace))) / mean)
+    high, delta = -low, np.zeros(len(advance))
+    smallest = 4 * np.finfo(float).eps * max(float(high.max(initial=0.0)), 1.0 / float(np.max(np.abs(f))))
+    for _ in range(_MOST_STEPS):
+        value, slope = excess(delta)
+        low, high = np.where(value <= 0, delta, low), np.where(value >= 0, delta, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = delta - value / slope
+        inside = (step >= low) & (step <= high) & (slope > 0)
+        following = np.where(inside, step, (low + high) / 2)
+        moved = np.max(np.abs(following - delta), initial=0.0)
+        delta = following
+        if moved <= smallest:
+            break
+    return delta
+
+
+def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Array) -> Array:
+    """Return the theta functions of a document at phases (N, g), up to a factor that all have in common, (N, K).
+
+    θ[ε;δ](z) = Σ_{m∈Z^g} exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ). Where T has a small eigenvalue the document names a ``basis``
+    and its ``waves`` F: Poisson summation over the other coordinates G turns their waves into Gaussians. With y = U(z+δ),
+    C = T_FG T_GG⁻¹ and S = T_FF − C T_GF, all in that basis, the sum is, but for a factor,
+
+        Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} exp(−π xᵀSx − π dᵀT_GG⁻¹d) cos 2π[x·(y_F + Cd) + k·ε_G],   d = k − y_G.
+    """
+    T, genus = arrays["riemann_matrix"], int(document["genus"])
+    reduction = document.get("reduction") or {"basis": np.eye(genus).tolist(), "waves": list(range(genus))}
+    U, F = np.array(reduction["basis"], dtype=np.float64), list(reduction["waves"])
+    G = [i for i in range(genus) if i not in F]
+    form = U @ T @ U.T
+    inverse = np.linalg.inv(form[np.ix_(G, G)])
+    C = form[np.ix_(F, G)] @ inverse
+    S = form[np.ix_(F, F)] - C @ form[np.ix_(G, F)]
+    to_basis = np.rint(np.linalg.inv(U)).T
+    cell = lattice_within(inverse, np.zeros(len(G)), 0.5)
+    found = np.empty((len(z), len(arrays["characteristics"])))
+    for j, (epsilon, delta) in enumerate(arrays["characteristics"]):
+        half, y = to_basis @ epsilon, (z + delta) @ U.T
+        x = lattice_within(S, half[F], 0.0)
+        weights = np.exp(-np.pi * np.einsum("xi,ij,xj->x", x, S, x))
+        k = np.rint(y[:, None, G]) + cell  # (N, K, G)
+        d = k - y[:, None, G]
+        gaussians = np.exp(-np.pi * np.einsum("nki,ij,nkj->nk", d, inverse, d))
+        turns = (y[:, None, F] + d @ C.T) @ x.T + (k @ half[G])[:, :, None]
+        found[:, j] = np.einsum("nk,nkx,x->n", gaussians, np.cos(2 * np.pi * turns), weights)
+    return found
+
+
+def lattice_within(form: Array, shift: Array, margin: float) -> Array:
+    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ 39, (X, d), and those within it of some point of |r_i| ≤ margin."""
+    if not len(form):
+        return np.zeros((1, 0))
+    shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
+    widths = np.sqrt(_RADIUS**2 + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
+    ranges = [np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s for w, s in zip(widths, shift, strict=True)]
+    points = np.array(list(itertools.product(*ranges)))
+    # A point of the cell is at most as far as its corner of largest norm.
+    corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
+    margins = np.sqrt(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
+    norms = np.einsum("xi,ij,xj->x", points, form, points)
+    # The largest term of a characteristic is that of its shortest vector, which is long where a cut is nearly closed.
+    return np.asarray(points[np.sqrt(norms) <= np.sqrt(_RADIUS**2 + norms.min()) + margins])
