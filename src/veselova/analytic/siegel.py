@@ -1,0 +1,140 @@
+"""Siegel reduction: a symplectic change of variables after which theta series of any τ are short and do not cancel.
+
+Each step is exact for theta functions with any real characteristics,
+
+    θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ)),
+
+and none has a root whose branch is in doubt:
+
+    basis        m = Uᵀm':       θ[ε;δ](z|τ) = θ[U⁻ᵀε; Uδ](Uz | UτUᵀ)
+    translation  τ = τ' + B:     θ[ε;δ](z|τ) = e^{−πi ε·(Bε + diag B)} θ[ε; δ+Bε+½diag B](z|τ')
+    inversion    of m_1 alone (Poisson summation), a = τ_11, b = (τ_21 …), D the rest:
+                 θ[ε;δ](z|τ) = (−ia)^{−½} e^{2πi δ_1ε_1 − πi z_1²/a} θ[δ_1,ε'; −ε_1,δ'](−z_1/a, z'−bz_1/a | −1/a, −b/a, D−bbᵀ/a)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["SiegelReduction", "reduce_lattice"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Wide = NDArray[np.clongdouble]
+WideReal = NDArray[np.longdouble]
+Integers = NDArray[np.int64]
+
+#: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that rounding does not go to and fro.
+_LOVASZ, _INSIDE = 0.99, 1 - 1e-9
+
+#: Each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by matrices of doubles.
+_MOST_STEPS = 2000
+
+
+def reduce_lattice(form: Array) -> Integers:
+    """Return U ∈ GL(g, Z), rows a basis reduced by Lenstra, Lenstra and Lovász for the quadratic form, shortest direction first."""
+    size = len(form)
+    U = np.eye(size, dtype=np.int64)
+    vectors = np.linalg.cholesky(form)  # row i is basis vector i
+    k = 1
+    while k < size:
+        for j in range(k - 1, -1, -1):
+            _, triangle = np.linalg.qr(vectors[: k + 1].T)
+            multiple = round(triangle[j, k] / triangle[j, j])
+            if multiple:
+                vectors[k] -= multiple * vectors[j]
+                U[k] -= multiple * U[j]
+        _, triangle = np.linalg.qr(vectors[: k + 1].T)
+        above, own = triangle[k - 1, k], triangle[k, k]
+        if own * own + above * above >= _LOVASZ * triangle[k - 1, k - 1] ** 2:
+            k += 1
+        else:
+            vectors[[k - 1, k]], U[[k - 1, k]] = vectors[[k, k - 1]], U[[k, k - 1]]
+            k = max(k - 1, 1)
+    return U
+
+
+@dataclass
+class SiegelReduction:
+    """A reduced matrix τ' and the way there: θ[ε;δ](z|τ) = e^{c} e^{πi zᵀQz} θ[ε';δ'](Lz|τ').
+
+    tau (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1 · linear L (g, g) · quadratic Q (g, g)
+    symplectic (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
+
+    Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11 bits more where the processor has
+    them. Integers are chosen in doubles.
+    """
+
+    tau: Wide
+    linear: Wide = field(init=False)
+    quadratic: Wide = field(init=False)
+    symplectic: Integers = field(init=False)
+    _steps: list[tuple[str, Array]] = field(default_factory=list, init=False)
+    _log_root: complex = field(default=0j, init=False)
+
+    def __post_init__(self) -> None:
+        g = len(self.tau)
+        self.tau = np.array(self.tau, dtype=np.clongdouble)
+        self.linear, self.quadratic = np.eye(g, dtype=np.clongdouble), np.zeros((g, g), dtype=np.clongdouble)
+        self.symplectic = np.eye(2 * g, dtype=np.int64)
+        for _ in range(_MOST_STEPS):
+            self._change_basis()
+            self._translate()
+            if abs(self.tau[0, 0]) >= _INSIDE:
+                return
+            self._invert()
+
+    def _change_basis(self) -> None:
+        U = reduce_lattice(self.tau.imag.astype(float))
+        self.tau = U @ self.tau @ U.T
+        self.tau = (self.tau + self.tau.T) / 2
+        self.linear = U @ self.linear
+        self._compose(U, 0 * U, 0 * U, np.rint(np.linalg.inv(U)).T.astype(np.int64))
+        self._steps.append(("basis", U.astype(float)))
+
+    def _translate(self) -> None:
+        B = np.rint(self.tau.real.astype(float)).astype(np.int64)
+        if B.any():
+            self.tau = self.tau - B
+            one = np.eye(len(B), dtype=np.int64)
+            self._compose(one, -B, 0 * B, one)
+            self._steps.append(("translation", B.astype(float)))
+
+    def _invert(self) -> None:
+        a, b = self.tau[0, 0], self.tau[0, 1:]
+        row = self.linear[0].copy()
+        self.quadratic = self.quadratic - np.outer(row, row) / a
+        self.linear[1:] -= np.outer(b, row) / a
+        self.linear[0] = -row / a
+        tau = self.tau.copy()
+        tau[0, 0], tau[0, 1:], tau[1:, 0] = -1 / a, -b / a, -b / a
+        tau[1:, 1:] -= np.outer(b, b) / a
+        self.tau = tau
+        self._log_root -= complex(np.log(-1j * a)) / 2  # Re(−ia) = Im a > 0: the principal branch
+        one = np.eye(len(tau), dtype=np.int64)
+        first = np.zeros_like(one)
+        first[0, 0] = 1
+        self._compose(one - first, -first, first, one - first)
+        self._steps.append(("inversion", np.empty(0)))
+
+    def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
+        self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
+
+    def characteristic(self, epsilon: Array, delta: Array) -> tuple[WideReal, WideReal, np.longdouble, complex]:
+        """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}."""
+        epsilon, delta = epsilon.astype(np.longdouble), delta.astype(np.longdouble)
+        turns = np.longdouble(0)
+        for kind, matrix in self._steps:
+            if kind == "basis":
+                epsilon, delta = np.rint(np.linalg.inv(matrix)).T @ epsilon, matrix @ delta
+            elif kind == "translation":
+                moved = matrix @ epsilon
+                turns -= epsilon @ (moved + np.diag(matrix)) / 2
+                delta = delta + moved + np.diag(matrix) / 2
+            else:
+                turns += delta[0] * epsilon[0]
+                epsilon[0], delta[0] = delta[0], -epsilon[0]
+        return epsilon, delta, turns, self._log_root
