@@ -25,7 +25,17 @@ ALLOWED = {
 #: What may be imported inside a function, because the library is optional or slow to load.
 ALLOWED_LATER = {
     # Veselova.from_torus asks the table of engines; decimals turn into numbers of the two libraries on request.
-    "mechanics": {"matplotlib", "orjson", "pyarrow", "xarray", "mpmath", "flint", "veselova.conditioning", "veselova.engines"},
+    "mechanics": {
+        "matplotlib",
+        "orjson",
+        "pyarrow",
+        "sympy",
+        "xarray",
+        "mpmath",
+        "flint",
+        "veselova.conditioning",
+        "veselova.engines",
+    },
     "analytic": {"finufft"},
     "numeric": {"heyoka"},
 }

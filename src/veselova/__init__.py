@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING, Any
 from veselova.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
+    from veselova.mechanics.closed_form import ClosedForm as ClosedForm
     from veselova.mechanics.comparison import Comparison as Comparison
     from veselova.mechanics.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.errors import BackendMissing as BackendMissing
@@ -50,6 +52,7 @@ _HOMES = {
     "AsyncClient": "veselova.service.client",
     "BackendMissing": "veselova.mechanics.errors",
     "Client": "veselova.service.client",
+    "ClosedForm": "veselova.mechanics.closed_form",
     "Comparison": "veselova.mechanics.comparison",
     "EllipsoidGeodesic": "veselova.mechanics.ellipsoid",
     "EulerPoisson": "veselova.mechanics.euler_poisson",
@@ -71,6 +74,7 @@ _HOMES = {
     "Veselova": "veselova.mechanics.veselova",
     "VeselovaError": "veselova.mechanics.errors",
     "VeselovaSO3": "veselova.mechanics.veselova_so3",
+    "closed_form": "veselova.engines",
     "compare": "veselova.engines",
     "solve": "veselova.engines",
     "sweep": "veselova.service.local_sweep",

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from veselova.analytic.solution import Solution
+    from veselova.mechanics.closed_form import ClosedForm
     from veselova.mechanics.torus import Torus
 
-__all__ = ["ENGINES", "Prepared", "compare", "solve", "start_on_torus", "torus"]
+__all__ = ["ENGINES", "Prepared", "closed_form", "compare", "solve", "start_on_torus", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
@@ -133,6 +134,19 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
 def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the start (q, q̇) with given constants of motion and phases, for ``Veselova.from_torus``."""
     return import_module("veselova.analytic.from_torus").start_on_torus(A, energy, constants, phases, signs)  # type: ignore[no-any-return]
+
+
+def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
+    """Return the motion of a problem as data: a document of a few kilobytes that any language can evaluate at any time.
+
+    ``accuracy``: the error that modes left out of the time map may make. Raises InvalidInput for a system without a torus and for
+    bad arguments, Unsolved where theta functions do not serve (rest, a separatrix, too many modes).
+    """
+    if not isinstance(problem, Problem):
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+    from veselova.analytic.closed_form import closed_form as closed_form_of
+
+    return closed_form_of(problem, accuracy)
 
 
 def torus(problem: Problem) -> Torus:

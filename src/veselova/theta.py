@@ -1,9 +1,9 @@
 """Riemann theta functions of any matrix of the Siegel half space, with characteristics and derivatives.
 
-    θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ))
+θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ))
 
-    from veselova import theta
-    theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
+from veselova import theta
+theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def riemann_theta(z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None
     derivatives      0 for values, 1 for gradients, 2 for matrices of second derivatives
 
     The shape is that of the points, then (C,) for several characteristics, then (g,) or (g, g) for derivatives. Raises
-    InvalidInput for bad input, Unsolved where a value overflows (``beyond-floats``; take ``scaled_riemann_theta``) or a sum has too
-    many terms (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against python-flint.
+    InvalidInput for bad input, Unsolved where a value overflows (``beyond-floats``; take ``scaled_riemann_theta``) or a sum
+    has too many terms (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against python-flint.
     """
     found = scaled_riemann_theta(z, tau, characteristic, derivatives)
     exponent = found.exponent.reshape(found.exponent.shape + (1,) * (found.mantissa.ndim - found.exponent.ndim))
@@ -78,7 +78,8 @@ def scaled_riemann_theta(
     if not function.is_small:
         raise Unsolved("too-many-terms", f"the sum has about {function.terms:.1e} terms")
     take = (0 if single else slice(None), 0 if alone else slice(None))
-    return ScaledTheta(*(np.asarray(array[take]) for array in function.values(points, halves, derivatives)))
+    mantissas, exponents, errors = function.values(points, halves, derivatives)
+    return ScaledTheta(np.asarray(mantissas[take]), np.asarray(exponents[take]), np.asarray(errors[take]))
 
 
 def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float, ...]], complex]:
@@ -114,7 +115,7 @@ def _siegel(tau: Any) -> Complex:
     defect = float(np.max(np.abs(matrix - matrix.T)))
     if defect > _SYMMETRY * float(np.max(np.abs(matrix))):
         raise InvalidInput(("tau",), "a symmetric matrix", f"one that differs from its transpose by {defect:.3g}")
-    matrix = (matrix + matrix.T) / 2
+    matrix = np.asarray((matrix + matrix.T) / 2)
     least = float(np.linalg.eigvalsh(matrix.imag)[0])
     if not least > 0:
         raise InvalidInput(("tau",), "a positive definite imaginary part", f"one with least eigenvalue {least:.6g}")

@@ -12,6 +12,7 @@ from veselova.analytic.clock import STRETCH_POWERS
 from veselova.analytic.fourier_clock import significant_modes
 from veselova.analytic.route import Route
 from veselova.analytic.solution import Solution
+from veselova.analytic.theta import Theta
 from veselova.mechanics.closed_form import ClosedForm
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.torus_problem import TorusProblem
@@ -103,8 +104,8 @@ def closed_form(problem: TorusProblem, accuracy: float = 1e-12) -> ClosedForm:
 def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
     """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the problem's τ₁.
 
-    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow times that. The smallest are left
-    out as long as their sum is below the accuracy. Coefficients are rounded to what the accuracy asks for as well.
+    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow times that. The smallest
+    are left out as long as their sum is below the accuracy. Coefficients are rounded to what it asks for as well.
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
@@ -131,8 +132,8 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
     T = np.asarray(solution.periods.riemann_matrix)
     if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
         return None
-    basis, waves = solution.quotients.theta.summation
-    return {"basis": basis.tolist(), "waves": list(waves)}
+    coordinates = Theta(T).coordinates
+    return {"basis": coordinates.U.tolist(), "waves": list(coordinates.waves)}
 
 
 def _errors(solution: Solution) -> tuple[float, float]:

@@ -15,6 +15,7 @@ and none has a root whose branch is in doubt:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ _MOST_STEPS = 2000
 
 
 def reduce_lattice(form: Array) -> Integers:
-    """Return U ∈ GL(g, Z), rows a basis reduced by Lenstra, Lenstra and Lovász for the quadratic form, shortest direction first."""
+    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in the quadratic form (Lenstra, Lenstra, Lovász)."""
     size = len(form)
     U = np.eye(size, dtype=np.int64)
     vectors = np.linalg.cholesky(form)  # row i is basis vector i
@@ -68,7 +69,7 @@ class SiegelReduction:
     them. Integers are chosen in doubles.
     """
 
-    tau: Wide
+    tau: Any
     linear: Wide = field(init=False)
     quadratic: Wide = field(init=False)
     symplectic: Integers = field(init=False)
@@ -123,10 +124,11 @@ class SiegelReduction:
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
         self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
 
-    def characteristic(self, epsilon: Array, delta: Array) -> tuple[WideReal, WideReal, np.longdouble, complex]:
+    def characteristic(self, given_epsilon: Array, given_delta: Array) -> tuple[WideReal, WideReal, Any, complex]:
         """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}."""
-        epsilon, delta = epsilon.astype(np.longdouble), delta.astype(np.longdouble)
-        turns = np.longdouble(0)
+        epsilon: Any = given_epsilon.astype(np.longdouble)
+        delta: Any = given_delta.astype(np.longdouble)
+        turns: Any = np.longdouble(0)
         for kind, matrix in self._steps:
             if kind == "basis":
                 epsilon, delta = np.rint(np.linalg.inv(matrix)).T @ epsilon, matrix @ delta

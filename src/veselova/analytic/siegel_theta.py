@@ -4,8 +4,8 @@ After Siegel reduction, with m = n + k and n the lattice point next to the large
 
     θ[ε;δ](z|τ) = e^{…} Σ_k W_k Π_j u_j^{k_j},   W_k = exp(πi kᵀτk),   u = exp 2πi(z + δ + τ(n+ε)).
 
-W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W is a sparse matrix between the
-products of powers of the two halves.
+W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W is a sparse matrix
+between the products of powers of the two halves.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class _Sums:
 
 
 def _transform(found: _Sums, slope: Complex, L: Complex, Q: Complex) -> tuple[Complex, Array | float]:
-    """Return the derivative of e^{πi zᵀQz + …}Θ(Lz) of the highest order found, and what a rounding of a term is multiplied with."""
+    """Return the highest derivative of e^{πi zᵀQz + …}Θ(Lz), and what a rounding of a term is multiplied with."""
     value, *higher = found.derivatives
     if not higher:
         return value, 1.0

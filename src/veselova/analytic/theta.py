@@ -65,28 +65,24 @@ class Theta:
         return Coordinates.cheapest(self.T) if self.waves is None else Coordinates.given(self.T, self.waves)
 
     @property
-    def _coordinates(self) -> Coordinates:
+    def coordinates(self) -> Coordinates:
+        """Return the basis and the set F in which the sums are formed."""
         return self._chosen[0]
-
-    @property
-    def summation(self) -> tuple[NDArray[np.int64], tuple[int, ...]]:
-        """Return the basis U, as rows, and the set F of its coordinates with waves, in which the sum is formed."""
-        return self._coordinates.U, self._coordinates.waves
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        return list(self._coordinates.waves), self._coordinates.gaussians
+        return list(self.coordinates.waves), self.coordinates.gaussians
 
     @cached_property
     def _to_coordinates(self) -> Array:
         """Return the matrix from z to y, (g, g): first the coordinates with Gaussians, then those of the waves."""
         F, G = self._split
-        return np.asarray(self._coordinates.U[[*G, *F]].T, dtype=np.float64)
+        return np.asarray(self.coordinates.U[[*G, *F]].T, dtype=np.float64)
 
     @cached_property
     def _parts(self) -> tuple[Array, Array, Array, float]:
         """Return (S, C, T_GG⁻¹, det T_GG^{−1/2})."""
-        S, C, inverse = schur(self._coordinates.form(self.T), *self._split)
+        S, C, inverse = schur(self.coordinates.form(self.T), *self._split)
         return S, C, inverse, float(np.sqrt(np.linalg.det(inverse))) if len(inverse) else 1.0
 
     @cached_property
@@ -173,7 +169,7 @@ class Theta:
         return {}
 
     def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
-        local, signs = zip(*self._coordinates.characteristics(characteristics), strict=True)
+        local, signs = zip(*self.coordinates.characteristics(characteristics), strict=True)
         deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
         shifts, (of, doubled, turned) = list(dict.fromkeys(deltas)), self._turned(local)
         blocks = np.array([shifts.index(delta) for delta in deltas])
@@ -195,7 +191,7 @@ class Theta:
         return {}
 
     def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
-        families = self._coordinates.families(characteristics).items()
+        families = self.coordinates.families(characteristics).items()
         members = [c for _, of in families for given in of.values() for _, c, _ in given]
         self._crossings(frozenset(self._codes(members)))  # at once
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]

@@ -28,9 +28,9 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
     number = _Numbers(digits)
     theta = [_function(halves) for halves in document["characteristics"]]
     lines = [
-        r"\theta\!\left[{\varepsilon\atop\delta}\right]\!(z) &= \sum_{m\in\mathbb{Z}^{%d}}"
+        r"\theta\!\left[{\varepsilon\atop\delta}\right]\!(z) &= \sum_{m\in\mathbb{Z}^g}"
         r" e^{-\pi(m+\varepsilon)^{T}T(m+\varepsilon)}\cos 2\pi(m+\varepsilon)\cdot(z+\delta),"
-        r"\qquad T = %s" % (g, number.matrix(document["riemann_matrix"]))
+        rf"\qquad T = {number.matrix(document['riemann_matrix'])}"
     ]
     phases = zip(document["phases"], document["frequencies"], strict=True)
     lines += [rf"z_{s} &= {number(z0)} {number.signed(f)}\,\tau_1" for s, (z0, f) in enumerate(phases, 1)]
@@ -42,7 +42,9 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
     lines.append(rf"q &= D x,\qquad D = {number.matrix(document['directions'])}")
     normals = "".join(f"n_{k}," for k in range(2, g + 1))
     frozen = f" + {number.matrix(document['frozen'])}" if np.any(arrays["frozen"]) else ""
-    lines.append(rf"(e_2,\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = {number.matrix(document['rotation'])}")
+    lines.append(
+        rf"(e_2,\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = {number.matrix(document['rotation'])}"
+    )
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from veselova.mechanics.errors import InvalidInput, shown
 
 __all__ = ["FORMAT", "SCHEMA", "require_document"]
@@ -12,11 +14,18 @@ __all__ = ["FORMAT", "SCHEMA", "require_document"]
 #: The name and version of the format; another number is another set of fields.
 FORMAT = "veselova.closed-form/1"
 
-_NUMBER: dict[str, Any] = {"oneOf": [{"type": "number"}, {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"}]}
+_NUMBER: dict[str, Any] = {
+    "oneOf": [{"type": "number"}, {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"}]
+}
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
 _HALVES: dict[str, Any] = {"type": "array", "items": {"enum": [0, 0.5]}}
-_PAIR: dict[str, Any] = {"type": "array", "prefixItems": [{"type": "integer", "minimum": 0}, _NUMBER], "minItems": 2, "maxItems": 2}
+_PAIR: dict[str, Any] = {
+    "type": "array",
+    "prefixItems": [{"type": "integer", "minimum": 0}, _NUMBER],
+    "minItems": 2,
+    "maxItems": 2,
+}
 _PAIRS: dict[str, Any] = {"type": "array", "items": _PAIR}
 _INTEGERS: dict[str, Any] = {"type": "array", "items": {"type": "integer"}}
 
@@ -114,8 +123,14 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     }  # fmt: skip
     for name, shape in shapes.items():
         _require_numbers((name,), document[name], shape)
-    for name in ("mean_rate",):
-        _require_numbers((name,), document[name], ())
+    _require_numbers(("mean_rate",), document["mean_rate"], ())
+    if document["axes"] is not None:
+        _require_numbers(("axes",), document["axes"], (n, n))
+    least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
+    if not least > 0:
+        raise InvalidInput(("document", "riemann_matrix"), "a positive definite matrix", f"least eigenvalue {least:.3g}")
+    if document["reduction"] is not None:
+        _require_reduction(document["reduction"], g)
     for name, length in (("q", g + 1), ("q_prime", g), ("gamma", g + 1)):
         _require_pairs((name,), document[name], length, functions)
     if _length(document, "normals", g - 1):
@@ -128,6 +143,18 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     place = document["rate"]["characteristic"]
     if not isinstance(place, int) or not 0 <= place < functions:
         raise InvalidInput(("document", "rate", "characteristic"), f"an index below {functions}", shown(place))
+
+
+def _require_reduction(reduction: Any, g: int) -> None:
+    """Raise InvalidInput unless the basis is a matrix of whole numbers of determinant ±1 and the waves are some of its rows."""
+    basis = reduction.get("basis") if isinstance(reduction, Mapping) else None
+    _require_numbers(("reduction", "basis"), basis, (g, g))
+    matrix = np.array(basis, dtype=float)
+    if np.any(matrix != np.rint(matrix)) or abs(abs(np.linalg.det(matrix)) - 1) > 1e-6:
+        raise InvalidInput(("document", "reduction", "basis"), "whole numbers with determinant 1 or −1", shown(basis))
+    waves = reduction.get("waves")
+    if not isinstance(waves, list) or not all(isinstance(i, int) and 0 <= i < g for i in waves) or len(set(waves)) < len(waves):
+        raise InvalidInput(("document", "reduction", "waves"), f"different whole numbers from 0 to {g - 1}", shown(waves))
 
 
 def _length(document: Mapping[str, Any], name: str, wanted: int | None) -> int:

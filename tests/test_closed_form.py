@@ -1,0 +1,166 @@
+"""A closed-form document is the motion: states made from it alone are those of the engine."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from veselova.mechanics.closed_form_schema import SCHEMA
+
+EXAMPLES = Path(__file__).parent.parent / "examples" / "closed_form"
+
+BODY3 = vs.Veselova(["3", "2", "1.5"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225"])
+
+TIMES = [-1000.0, -2.5, 0.0, 0.125, 37.0, 10_000.0]
+
+
+def problems() -> list[tuple[str, vs.Problem]]:
+    """Return problems of every system and regime that theta functions serve."""
+    found: list[tuple[str, Any]] = []
+    for n in (2, 3, 4, 5):
+        random = np.random.default_rng([34, n])
+        A, q, v = np.linspace(3, 1, n).tolist(), random.normal(size=n).tolist(), random.normal(size=n).tolist()
+        found.append((f"veselova-{n}", vs.Veselova(A, q, v, normalize=True)))
+        found.append((f"neumann-{n}", vs.NeumannSystem(A, q, v, normalize=True)))
+        found.append((f"geodesic-{n}", vs.EllipsoidGeodesic(A, q, v, normalize=True)))
+    found.append(("symmetric body", vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0.3, 1, -0.225])))
+    found.append(("two equal of four", vs.Veselova([3, 2, 1, 1], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4])))
+    found.append(("frozen direction", vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0])))
+    found.append(("matrix A", vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6])))
+    found.append(("beside a separatrix", vs.Veselova([3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True)))
+    return found
+
+
+@pytest.mark.parametrize(("name", "problem"), problems())
+def test_states_from_the_document_alone_are_those_of_the_engine(name: str, problem: Any) -> None:
+    text = vs.closed_form(problem).to_json()
+    found, wanted = vs.ClosedForm.from_json(text).at(TIMES), vs.solve(problem, TIMES)
+    difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
+    assert (difference <= found.error + wanted.error).all()
+    assert (difference <= 1e-12 * np.maximum(1, np.abs(found.times) / 100)).all()
+    for series in found.series:
+        other = wanted.series(series)
+        scale = max(1.0, float(np.max(np.abs(other))))
+        assert np.max(np.abs(getattr(found, series) - other)) <= 1e-10 * scale, series
+
+
+@pytest.mark.parametrize(("n", "most"), [(3, 8_000), (4, 100_000), (5, 1_000_000)])
+def test_documents_are_small(n: int, most: int) -> None:
+    random = np.random.default_rng([35, n])
+    for _ in range(3):
+        q, v = random.normal(size=n).tolist(), random.normal(size=n).tolist()
+        assert len(vs.closed_form(vs.Veselova(np.linspace(3, 1, n).tolist(), q, v, normalize=True)).to_json()) < most
+
+
+def test_a_coarser_document_is_smaller_and_says_how_far_it_is_off() -> None:
+    fine, coarse = vs.closed_form(BODY3), vs.closed_form(BODY3, accuracy=1e-5)
+    assert len(coarse.document["modes"]) < len(fine.document["modes"]) / 2
+    difference = np.max(np.abs(fine.at(TIMES).frame - coarse.at(TIMES).frame), axis=(1, 2))
+    assert (difference <= coarse.at(TIMES).error).all()
+    assert difference.max() > 1e-9
+
+
+def test_the_document_obeys_its_schema() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    for _, problem in problems()[:6]:
+        jsonschema.validate(json.loads(vs.closed_form(problem).to_json()), SCHEMA)
+
+
+def test_the_explicit_formulas_are_the_motion() -> None:
+    sympy = pytest.importorskip("sympy")
+    solution = vs.closed_form(BODY3)
+    states, formulas = solution.at([2.0]), solution.to_sympy()
+    tau = {sympy.Symbol("tau_1", real=True): float(states.tau1[0])}
+    phases = {sympy.Symbol(f"z_{s}", real=True): float(formulas[f"z_{s}"].subs(tau)) for s in (1, 2)}
+    assert float(formulas["time"].subs(tau)) == pytest.approx(2.0, abs=1e-12)
+    q = [float(formulas[f"q_{i}"].subs(phases)) for i in (1, 2, 3)]
+    assert q == pytest.approx(states.q[0].tolist(), abs=1e-13)
+
+
+def test_latex_has_every_entry_of_the_frame() -> None:
+    text = vs.closed_form(BODY3).to_latex(digits=4)
+    assert text.startswith("\\begin{aligned}")
+    for name in ("x_1", "(n_2)_3", "\\gamma_2", "z_2", "\\mathfrak R"):
+        assert name in text
+    assert text.count("{") == text.count("}")
+
+
+@pytest.mark.parametrize("name", ["body3", "body4"])
+@pytest.mark.parametrize("language", ["python", "node", "cc"])
+def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path: Path) -> None:
+    files = [str(EXAMPLES / f"{name}.json"), str(EXAMPLES / f"{name}.values.json")]
+    command = {"python": [sys.executable, str(EXAMPLES / "evaluate.py")], "node": ["node", str(EXAMPLES / "evaluate.mjs")]}
+    if language != "python" and shutil.which(language) is None:
+        pytest.skip(f"{language} is not installed")
+    if language == "cc":
+        program = tmp_path / "evaluate"
+        subprocess.run(["cc", "-O2", "-o", str(program), str(EXAMPLES / "evaluate.c"), "-lm"], check=True)
+        command["cc"] = [str(program)]
+    answer = subprocess.run([*command[language], *files], capture_output=True, text=True, check=True).stdout
+    assert answer.startswith("largest deviation ")
+    assert float(answer.split()[-1]) < 5e-12
+
+
+def test_the_evaluators_are_short() -> None:
+    for path in EXAMPLES.glob("evaluate.*"):
+        assert path.read_text().count("\n") <= 60, path.name
+
+
+def test_the_stored_documents_are_those_of_this_version() -> None:
+    stored = vs.ClosedForm.from_json((EXAMPLES / "body3.json").read_text())
+    made = vs.closed_form(BODY3)
+    assert set(stored.document) == set(made.document)
+    assert np.max(np.abs(stored.at(TIMES).frame - made.at(TIMES).frame)) < 1e-11
+
+
+def broken(**changes: Any) -> str:
+    document = json.loads(vs.closed_form(BODY3).to_json()) | changes
+    return json.dumps({name: value for name, value in document.items() if value != "missing"})
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("{", "document"),
+        ("[" * 100_000, "document"),
+        ("[1]", "document"),
+        (broken(format="veselova.closed-form/9"), "document.format"),
+        (broken(phases="missing"), "phases"),
+        (broken(genus=True), "document.genus"),
+        (broken(genus=3), "document."),
+        (broken(modes=[[1]]), "document."),
+        (broken(frequencies=[1, "__import__('os')"]), "document.frequencies[1]"),
+        (broken(frequencies=[1, 1e400]), "document.frequencies[1]"),
+        (broken(q=[[99, 1.0]] * 3), "document.q[0]"),
+        (broken(problem=3), "document.problem"),
+        (broken(rate={}), "document.rate"),
+        (broken(error=None), "document.error"),
+        (broken(reduction={"basis": [[1, 0], [0, "x"]], "waves": [0, 1]}), "document.reduction"),
+        (broken(reduction={"basis": [[1, 0], [1, 0]], "waves": [0, 1]}), "document.reduction"),
+        (broken(riemann_matrix=[[-1, 0], [0, 1]]), "document.riemann_matrix"),
+        (broken(axes=[[1]]), "document.axes"),
+    ],
+)
+def test_what_is_no_document_is_refused_in_one_sentence(text: str, named: str) -> None:
+    with pytest.raises(vs.InvalidInput) as caught:
+        vs.ClosedForm.from_json(text)
+    assert named in str(caught.value)
+
+
+def test_what_has_no_closed_form_is_refused_by_name() -> None:
+    with pytest.raises(vs.Unsolved, match="at-rest"):
+        vs.closed_form(vs.Veselova([3, 2, 1], [1, 0, 0], [0, 0, 0]))
+    with pytest.raises(vs.Unsolved, match="no-closed-form"):
+        vs.closed_form(vs.NeumannSystem(["1", "1/2"], [1, 0], [0, 1]))
+    with pytest.raises(vs.InvalidInput, match="problem"):
+        vs.closed_form(vs.EulerPoisson([1, 2, 3], [0, 0, 1], [1, 0, 0]))
+    with pytest.raises(vs.InvalidInput, match="accuracy"):
+        vs.closed_form(BODY3, accuracy=1)
