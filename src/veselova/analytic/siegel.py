@@ -118,7 +118,7 @@ class SiegelReduction:
         one = np.eye(len(tau), dtype=np.int64)
         first = np.zeros_like(one)
         first[0, 0] = 1
-        self._compose(one - first, -first, first, one - first)
+        self._compose(one - first, first, -first, one - first)
         self._steps.append(("inversion", np.empty(0)))
 
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:

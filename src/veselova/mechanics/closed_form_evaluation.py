@@ -146,7 +146,7 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
     found = np.empty((len(z), len(arrays["characteristics"])))
     for j, (epsilon, delta) in enumerate(arrays["characteristics"]):
         half, y = to_basis @ epsilon, (z + delta) @ U.T
-        x = lattice_within(S, np.asarray(half[F], dtype=np.float64), 0.0)
+        x = lattice_within(S, np.asarray(half[F]).astype(np.float64), 0.0)
         weights = np.exp(-np.pi * np.einsum("xi,ij,xj->x", x, S, x))
         k = np.rint(y[:, None, G]) + cell  # (N, K, G)
         d = k - y[:, None, G]

@@ -1,0 +1,178 @@
+"""Theta functions of any matrix: against ball arithmetic, identities, and differential equations."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import acb, acb_mat, ctx
+
+from conftest import slow
+from veselova import InvalidInput, Unsolved, theta
+from veselova.analytic.siegel import reduce_lattice
+
+
+def random_tau(random: np.random.Generator, genus: int) -> Any:
+    """Return a matrix of the half space, unreduced, sometimes nearly degenerate."""
+    X, M = random.normal(size=(genus, genus)) * 3, random.normal(size=(genus, genus))
+    Y = M @ M.T * random.choice([1, 0.1]) + random.choice([1e-3, 0.02, 0.3]) * np.eye(genus)
+    return (X + X.T) / 2 + 1j * Y
+
+
+def all_halves(genus: int) -> list[Any]:
+    rows = list(itertools.product((0, 0.5), repeat=genus))
+    return [[list(e), list(d)] for e in rows for d in rows]
+
+
+def in_balls(z: Any, tau: Any) -> Any:
+    """Return θ of all half-integer characteristics by python-flint, in the order of ``all_halves``."""
+    ctx.prec = 120
+    columns = acb_mat([[acb(x.real, x.imag)] for x in np.asarray(z, dtype=complex).tolist()])
+    values = acb_mat([[acb(x.real, x.imag) for x in row] for row in tau.tolist()]).theta(columns)
+    return np.array([complex(values[0, i]) for i in range(values.ncols())])
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, pytest.param(4, marks=pytest.mark.slow)])
+def test_values_are_those_of_ball_arithmetic(genus: int) -> None:
+    random = np.random.default_rng([1, genus])
+    for _ in range(12 if genus < 4 else 3):
+        tau, z = random_tau(random, genus), random.normal(size=genus) + 0.2j * random.normal(size=genus)
+        exact = in_balls(z, tau)
+        found = theta.scaled_riemann_theta(z, tau, all_halves(genus))
+        ours = found.mantissa * np.exp(found.exponent)
+        assert np.max(np.abs(ours - exact)) <= 1e-13 * np.max(np.abs(exact))
+        assert (np.abs(ours - exact) <= found.error * np.exp(found.exponent)).all()
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3])
+def test_derivatives_are_those_of_a_contour(genus: int) -> None:
+    """Cauchy's integral over a small circle in each coordinate."""
+    random = np.random.default_rng([2, genus])
+    turns = np.exp(2j * np.pi * np.arange(16) / 16)
+    for _ in range(4):
+        tau, halves = random_tau(random, genus).real + 1j * np.eye(genus), random.uniform(-1, 1, (2, genus))
+        z = random.normal(size=genus) + 0.2j * random.normal(size=genus)
+        gradient, second = (theta.riemann_theta(z, tau, halves, order) for order in (1, 2))
+        for i in range(genus):
+            around = z + 0.05 * turns[:, None] * np.eye(genus)[i]
+            values, slopes = (theta.riemann_theta(around, tau, halves, order) for order in (0, 1))
+            scale = np.max(np.abs(values))
+            assert abs(np.mean(values / turns) / 0.05 - gradient[i]) < 1e-11 * scale / 0.05
+            assert (
+                np.max(np.abs(np.mean(slopes / turns[:, None], axis=0) / 0.05 - second[i]))
+                < 1e-10 * np.max(np.abs(slopes)) / 0.05
+            )
+
+
+def test_the_heat_equation_ties_second_derivatives_to_tau() -> None:
+    """∂θ/∂τ_jj = (1/4πi) ∂²θ/∂z_j², and twice that off the diagonal."""
+    tau, z = np.array([[0.3 + 0.9j, 0.2 + 0.1j], [0.2 + 0.1j, -0.4 + 0.8j]]), np.array([0.3 + 0.2j, -0.1])
+    second, h = theta.riemann_theta(z, tau, derivatives=2), 1e-4
+    for i, j in ((0, 0), (1, 1), (0, 1)):
+        step = np.zeros((2, 2))
+        step[i, j] = step[j, i] = h
+        rise = (theta.riemann_theta(z, tau + step) - theta.riemann_theta(z, tau - step)) / (2 * h)
+        assert rise == pytest.approx(second[i, j] / (4j * np.pi) * (1 if i == j else 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("genus", [1, 2, 4, 6])
+def test_translations_by_the_lattice(genus: int) -> None:
+    random = np.random.default_rng([3, genus])
+    tau = random_tau(random, genus).real + 1j * (0.4 * np.eye(genus) + 0.1)
+    z, halves = random.normal(size=genus) + 0.1j * random.normal(size=genus), random.uniform(-1, 1, (2, genus))
+    n, m = random.integers(-5, 6, genus), random.integers(-2, 3, genus)
+    epsilon, delta = halves
+    there, here = (theta.scaled_riemann_theta(point, tau, halves) for point in (z + n + tau @ m, z))
+    logarithm = 2j * np.pi * (epsilon @ n) - 1j * np.pi * (m @ tau @ m) - 2j * np.pi * m @ (z + delta)
+    ratio = there.mantissa / here.mantissa * np.exp(there.exponent - here.exponent - logarithm)
+    assert ratio == pytest.approx(1, abs=1e-10)
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, 5, 8])
+def test_reduction_is_symplectic_and_reduces(genus: int) -> None:
+    random = np.random.default_rng([4, genus])
+    for _ in range(5):
+        tau = random_tau(random, genus)
+        reduced, matrix = theta.siegel_reduce(tau)
+        A, B, C, D = matrix[:genus, :genus], matrix[:genus, genus:], matrix[genus:, :genus], matrix[genus:, genus:]
+        J = np.block([[np.zeros((genus, genus)), np.eye(genus)], [-np.eye(genus), np.zeros((genus, genus))]])
+        assert (matrix @ J @ matrix.T == J).all()
+        assert np.max(np.abs((A @ tau + B) @ np.linalg.inv(C @ tau + D) - reduced)) < 1e-6 * np.max(np.abs(reduced))
+        assert abs(reduced[0, 0]) >= 1 - 1e-9
+        assert np.max(np.abs(reduced.real)) <= 0.5 + 1e-12
+        assert (reduce_lattice(reduced.imag) == np.eye(genus)).all()
+
+
+def test_jacobis_identities_of_theta_constants() -> None:
+    constants = theta.theta_constants([[0.2 + 0.7j]])
+    third, fourth, second = (constants[(e,), (d,)] for e, d in ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0)))
+    assert third**4 == pytest.approx(second**4 + fourth**4, abs=1e-14)
+    assert constants[(0.5,), (0.5,)] == 0
+    gradient = theta.riemann_theta([0.0], [[0.2 + 0.7j]], [[0.5], [0.5]], 1)[0]
+    assert gradient == pytest.approx(-np.pi * second * third * fourth, abs=1e-13)
+    assert sum(value == 0 for value in theta.theta_constants(np.eye(3) * 1j + 0.1).values()) == 28
+
+
+def test_large_arguments_and_large_values() -> None:
+    scaled = theta.scaled_riemann_theta([1000j], [[1j]])
+    assert scaled.exponent == pytest.approx(np.pi * 1e6, rel=1e-15)
+    assert scaled.mantissa == pytest.approx(theta.riemann_theta([0.0], [[1j]]), rel=1e-8)
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        theta.riemann_theta([1000j], [[1j]])
+    far = theta.riemann_theta([1e6 + 0.25], [[0.5 + 1j]])
+    assert far == pytest.approx(theta.riemann_theta([0.25], [[0.5 + 1j]]), abs=1e-14)
+
+
+def test_shapes_follow_points_characteristics_and_derivatives() -> None:
+    tau, pair = np.eye(2) * 1j, [[0.5, 0], [0, 0.5]]
+    z = np.zeros((5, 2))
+    assert theta.riemann_theta(z[0], tau).shape == ()
+    assert theta.riemann_theta(z, tau).shape == (5,)
+    assert theta.riemann_theta(z, tau, [pair] * 3).shape == (5, 3)
+    assert theta.riemann_theta(z, tau, [pair] * 3, 1).shape == (5, 3, 2)
+    assert theta.riemann_theta(z, tau, pair, 2).shape == (5, 2, 2)
+    assert theta.riemann_theta(np.zeros((0, 2)), tau).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        (([1, 2], [[1j]]), "z"),
+        ((["a"], [[1j]]), "z"),
+        (([float("nan")], [[1j]]), "z"),
+        (([1], [[1]]), "tau"),
+        (([1, 1], [[1j, 1], [0, 1j]]), "tau"),
+        (([1], [[float("inf")]]), "tau"),
+        (([1] * 9, np.eye(9) * 1j), "tau"),
+        (([1], "tau"), "tau"),
+        (([1], [[1j]], [0]), "characteristic"),
+        (([1], [[1j]], [[0, 0], [0, 0]]), "characteristic"),
+        (([1], [[1j]], [["x"], [0]]), "characteristic"),
+        (([1], [[1j]], None, 3), "derivatives"),
+        (([1], [[1j]], None, True), "derivatives"),
+    ],
+)
+def test_bad_arguments_are_named(arguments: Any, field: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        theta.riemann_theta(*arguments)
+    assert caught.value.path == (field,)
+
+
+def test_a_form_that_is_not_positive_is_refused_with_its_least_eigenvalue() -> None:
+    with pytest.raises(InvalidInput, match=r"least eigenvalue -0\.5"):
+        theta.riemann_theta([0, 0], [[1j, 1.5j], [1.5j, 1j]])
+
+
+@slow
+def test_a_kdv_solution_of_two_phases_solves_its_equation() -> None:
+    """Kept in the fast tests of the curve; here genus 1, the cnoidal wave: u = −2 (log θ)'' + c solves u''' − 6uu' = const·u'."""
+    tau, x = [[0.9j]], np.linspace(0, 1, 64, endpoint=False)
+    values, first, second = (theta.riemann_theta(x[:, None], tau, derivatives=k).reshape(64) for k in range(3))
+    u = -2 * (second / values - (first / values) ** 2).real
+    k = 2j * np.pi * np.fft.fftfreq(64, 1 / 64)
+    du, d3u = (np.fft.ifft(k**order * np.fft.fft(u)).real for order in (1, 3))
+    rest = d3u - 6 * u * du
+    slope = (rest @ du) / (du @ du)
+    assert np.max(np.abs(rest - slope * du)) < 1e-7 * np.max(np.abs(rest))
