@@ -138,15 +138,16 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
     U, F = np.array(reduction["basis"], dtype=np.float64), list(reduction["waves"])
     G = [i for i in range(genus) if i not in F]
     form = U @ T @ U.T
-    inverse = np.linalg.inv(form[np.ix_(G, G)])
+    inverse: Array = np.asarray(np.linalg.inv(form[np.ix_(G, G)]), dtype=np.float64)
     C = form[np.ix_(F, G)] @ inverse
     S = form[np.ix_(F, F)] - C @ form[np.ix_(G, F)]
     to_basis = np.rint(np.linalg.inv(U)).T
     cell = lattice_within(inverse, np.zeros(len(G)), 0.5)
     found = np.empty((len(z), len(arrays["characteristics"])))
     for j, (epsilon, delta) in enumerate(arrays["characteristics"]):
-        half, y = to_basis @ epsilon, (z + delta) @ U.T
-        x = lattice_within(S, np.asarray(half[F]).astype(np.float64), 0.0)
+        half: Array = np.asarray(to_basis @ epsilon, dtype=np.float64)
+        y = (z + delta) @ U.T
+        x = lattice_within(S, half[F], 0.0)
         weights = np.exp(-np.pi * np.einsum("xi,ij,xj->x", x, S, x))
         k = np.rint(y[:, None, G]) + cell  # (N, K, G)
         d = k - y[:, None, G]

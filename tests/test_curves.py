@@ -1,0 +1,205 @@
+"""Hyperelliptic curves with real branch points: periods, Abel–Jacobi map, Thomae's formula, finite-gap waves."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from conftest import slow
+from veselova import InvalidInput, curves, theta
+
+
+def branch_points(random: np.random.Generator, count: int) -> list[float]:
+    return [float(b) for b in np.cumsum(random.uniform(0.1, 2, count)) - 3]
+
+
+def off_lattice(z: Any, tau: Any) -> float:
+    """Return how far a point is from the lattice Z^g + τZ^g."""
+    rest = z - tau @ np.rint(np.linalg.solve(tau.imag, z.imag))
+    return float(np.max(np.abs(rest - np.rint(rest.real))))
+
+
+def quadrature(points: list[Any], low: Any, high: Any, power: int) -> Any:
+    """Return 2∫ λ^power dλ/|w| between neighbouring branch points with 30 digits."""
+    with mpmath.workdps(40):
+        exact = [mpmath.mpf(Fraction(b).numerator) / Fraction(b).denominator for b in points]
+        l, h = (exact[points.index(b)] for b in (low, high))
+        others = [b for b in exact if b not in (l, h)]
+
+        def density(angle: Any) -> Any:
+            x = (l + h) / 2 - (h - l) / 2 * mpmath.cos(angle)
+            return x**power / mpmath.sqrt(abs(mpmath.fprod(x - b for b in others)))
+
+        return 2 * mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 5))
+
+
+CASES = [(count, sign) for count in range(3, 10) for sign in (-1, 1)]
+
+
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_periods_and_the_riemann_matrix_are_those_of_quadrature(count: int, sign: int) -> None:
+    points = branch_points(np.random.default_rng([1, count, sign + 1]), count)
+    curve = curves.RealHyperelliptic(points, sign)
+    g = curve.genus
+    assert g == (count - 1) // 2
+    by_quadrature = [
+        [quadrature(points, *cut, k) for cut in curve.cuts.tolist()] for k in range(g)
+    ]  # fmt: skip
+    for k in range(g):
+        for s in range(g):
+            assert abs(curve.periods.a[k, s]) == pytest.approx(abs(float(by_quadrature[k][s])), rel=1e-13)
+    T = np.linalg.solve(curve.periods.a, curve.periods.b)
+    assert np.max(np.abs(T - curve.riemann_matrix)) <= 1e-12
+    assert curve.riemann_matrix_error < 1e-13 * max(1, np.max(np.abs(curve.riemann_matrix)))
+    assert np.linalg.eigvalsh(curve.riemann_matrix.imag)[0] > 0
+    assert np.max(np.abs(curve.normalized_differentials @ curve.periods.a - np.eye(g))) < 1e-12
+
+
+@pytest.mark.parametrize("gap", ["1e-3", "1e-8", "1e-12", "1e-30"])
+def test_near_coincident_branch_points_keep_their_digits(gap: str) -> None:
+    """τ of genus 1 is iK'/K, known from the gap alone."""
+    narrow = curves.RealHyperelliptic(["0", gap, "1"])
+    with mpmath.workdps(60):
+        m = mpmath.mpf(gap)
+        ratio = mpmath.ellipk(m) / mpmath.ellipk(1 - m)
+    assert narrow.riemann_matrix[0, 0].imag == pytest.approx(float(ratio), rel=1e-14)
+    other = curves.RealHyperelliptic(["0", "1", str(1 + Fraction(gap)), "2", "3"])
+    assert other.riemann_matrix_error < 1e-13
+    assert np.max(np.abs(other.riemann_matrix - other.riemann_matrix.T)) == 0
+
+
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_the_divisor_of_a_function_maps_to_zero(count: int, sign: int) -> None:
+    """Abel's theorem for w − p(λ): real and complex points, on every interval and sheet."""
+    random = np.random.default_rng([2, count, sign + 1])
+    points = branch_points(random, count)
+    curve = curves.RealHyperelliptic(points, sign)
+    g, tau = curve.genus, curve.riemann_matrix
+    for trial in range(6):
+        p = np.poly1d(random.normal(size=g + 1 + (count + 1) % 2) * (1 if trial < 3 else 1j))
+        roots = (p * p - sign * np.poly1d(points, r=True)).roots
+        roots = [complex(x.real) if abs(x.imag) < 1e-9 * abs(x) else x for x in roots]
+        image = curve.abel(roots, [p(x) for x in roots]).sum(axis=0)
+        assert off_lattice(image, tau) < 1e-9
+
+
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_branch_points_map_to_their_half_periods(count: int, sign: int) -> None:
+    points = branch_points(np.random.default_rng([3, count]), count)
+    curve = curves.RealHyperelliptic(points, sign)
+    images = curve.abel(points, np.zeros(count))
+    for image, (epsilon, delta) in zip(images, curve.characteristics, strict=True):
+        assert off_lattice(image - curve.riemann_matrix @ np.array(epsilon) - np.array(delta), curve.riemann_matrix) < 1e-14
+
+
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_inversion_undoes_the_map(count: int, sign: int) -> None:
+    random = np.random.default_rng([4, count, sign + 1])
+    points = branch_points(random, count)
+    curve = curves.RealHyperelliptic(points, sign)
+    z = random.uniform(size=(20, curve.genus))
+    found, signs = curve.invert(z)
+    assert (found >= curve.cuts[:, 0] - 1e-12).all()
+    assert (found <= curve.cuts[:, 1] + 1e-12).all()
+    assert np.max(np.abs((curve.torus(found, signs) - z + 0.5) % 1 - 0.5)) < 1e-7  # a point near an end says little of its angle
+    inner = np.abs(signs).all(axis=1) & (np.min(np.abs(np.sin(np.pi * z)), axis=1) > 0.2)
+    assert np.max(np.abs((curve.torus(found[inner], signs[inner]) - z[inner] + 0.5) % 1 - 0.5)) < 1e-12
+    # the same point by the general map
+    lower = [points.index(min(points, key=lambda b, c=cut: abs(b - c[1 if curve._curve.reverses else 0]))) for cut in curve.cuts]
+    base = curve.abel([points[j] for j in lower], np.zeros(curve.genus)).sum(axis=0)
+    image = curve.abel(found[0], signs[0]).sum(axis=0) - base
+    assert off_lattice(image - z[0], curve.riemann_matrix) < 1e-7
+
+
+@pytest.mark.parametrize(("count", "sign"), CASES[:-2])
+def test_thomaes_formula_gives_the_theta_constants(count: int, sign: int) -> None:
+    curve = curves.RealHyperelliptic(branch_points(np.random.default_rng([5, count]), count), sign)
+    constants = theta.theta_constants(curve.riemann_matrix)
+    predicted = curve.thomae()
+    for constant in predicted:
+        assert abs(constants[constant.characteristic]) ** 4 == pytest.approx(constant.fourth_power, rel=1e-11, abs=1e-13)
+    # The others vanish, for a hyperelliptic curve of genus 3 one even constant among them.
+    named = {constant.characteristic for constant in predicted}
+    assert max((abs(value) for c, value in constants.items() if c not in named), default=0) < 1e-12
+    assert len(named) == len(predicted)
+
+
+def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
+    """u = −2 ∂_x² log θ(z), z = c_g x + W t, obeys u''' − 6uu' = A u' + B ∂u/∂(c_{g−1}) on the whole torus."""
+    curve = curves.RealHyperelliptic([0, 1, "1.7", 3, "4.5"])
+    size = 48
+    axis = np.arange(size) / size
+    grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    values, first, second = (theta.riemann_theta(grid, curve.riemann_matrix, derivatives=k) for k in range(3))
+    along, across = curve.normalized_differentials[:, 1], curve.normalized_differentials[:, 0]
+    slope = (first @ along) / values
+    u = (-2 * (np.einsum("nij,i,j->n", second, along, along) / values - slope**2)).real.reshape(size, size)
+    k = 2j * np.pi * np.fft.fftfreq(size, 1 / size)
+
+    def derivative(direction: Any, order: int) -> Any:
+        rates = direction[0] * k[:, None] + direction[1] * k[None, :]
+        return np.fft.ifft2(rates**order * np.fft.fft2(u)).real
+
+    wave = derivative(along, 3) - 6 * u * derivative(along, 1)
+    basis = np.stack([derivative(along, 1).ravel(), derivative(across, 1).ravel()], axis=1)
+    (_, B), *_ = np.linalg.lstsq(basis, wave.ravel(), rcond=None)
+    rest = wave.ravel() - basis @ np.linalg.lstsq(basis, wave.ravel(), rcond=None)[0]
+    assert np.max(np.abs(rest)) < 1e-9 * np.max(np.abs(wave))
+    assert abs(B) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([0, 1, 1, 2, 3], "distinct numbers"),
+        (["0.5", "1/2", 1], "distinct numbers"),
+        ([0, 1], "3 to 34 real numbers"),
+        ([0, 1j, 2], "branch_points"),
+        (np.array([0, 1j, 2]), "real numbers"),
+        ([0, float("nan"), 2], "branch_points"),
+        ("012", "branch_points"),
+        (list(range(60)), "3 to 34"),
+    ],
+)
+def test_bad_branch_points_are_named(given: Any, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        curves.RealHyperelliptic(given)
+
+
+def test_other_bad_arguments_are_named() -> None:
+    curve = curves.RealHyperelliptic([0, 1, 2, 3, 4])
+    for call, field in (
+        (lambda: curves.RealHyperelliptic([0, 1, 2], 0), "sign"),
+        (lambda: curve.invert([0.5]), "z"),
+        (lambda: curve.invert([0.5, float("inf")]), "z"),
+        (lambda: curve.abel([1.5, 2], [1]), "w"),
+        (lambda: curve.abel([float("nan")], [1]), "points"),
+        (lambda: curve.torus([0.5, 3.5], [1, 1]), "points"),
+        (lambda: curve.torus([1.5], [1]), "points"),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            call()
+        assert caught.value.path[0] == field
+
+
+@slow
+@pytest.mark.parametrize("genus", [6, 8, 10])
+def test_high_genera_agree_with_quadrature(genus: int) -> None:
+    points = branch_points(np.random.default_rng([6, genus]), 2 * genus + 1)
+    curve = curves.RealHyperelliptic(points)
+    with mpmath.workdps(40):
+        a = mpmath.matrix(genus, genus)
+        b = mpmath.matrix(genus, genus)
+        for k in range(genus):
+            total = mpmath.mpf(0)
+            for s in range(genus):
+                a[k, s] = (-1) ** (genus - s - 1) * quadrature(points, points[2 * s + 1], points[2 * s + 2], k)
+                total += (-1) ** (genus - s + 1) * quadrature(points, points[2 * s], points[2 * s + 1], k)
+                b[k, s] = total
+        T = mpmath.inverse(a) * b
+    found = curve.riemann_matrix.imag
+    assert max(abs(found[i, j] - float(T[i, j])) for i in range(genus) for j in range(genus)) < 1e-13 * np.max(found)
