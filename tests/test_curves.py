@@ -9,7 +9,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from conftest import slow
 from veselova import InvalidInput, curves, theta
 
 
@@ -186,7 +185,7 @@ def test_other_bad_arguments_are_named() -> None:
         assert caught.value.path[0] == field
 
 
-@slow
+@pytest.mark.slow
 @pytest.mark.parametrize("genus", [6, 8, 10])
 def test_high_genera_agree_with_quadrature(genus: int) -> None:
     points = branch_points(np.random.default_rng([6, genus]), 2 * genus + 1)

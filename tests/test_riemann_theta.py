@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from flint import acb, acb_mat, ctx
 
-from conftest import slow
 from veselova import InvalidInput, Unsolved, theta
 from veselova.analytic.siegel import reduce_lattice
 
@@ -165,7 +164,7 @@ def test_a_form_that_is_not_positive_is_refused_with_its_least_eigenvalue() -> N
         theta.riemann_theta([0, 0], [[1j, 1.5j], [1.5j, 1j]])
 
 
-@slow
+@pytest.mark.slow
 def test_a_kdv_solution_of_two_phases_solves_its_equation() -> None:
     """Kept in the fast tests of the curve; here genus 1, the cnoidal wave: u = −2 (log θ)'' + c solves u''' − 6uu' = const·u'."""
     tau, x = [[0.9j]], np.linspace(0, 1, 64, endpoint=False)
