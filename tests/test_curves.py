@@ -127,6 +127,14 @@ def test_thomaes_formula_gives_the_theta_constants(count: int, sign: int) -> Non
     assert len(named) == len(predicted)
 
 
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_legendres_relation_holds(count: int, sign: int) -> None:
+    curve = curves.RealHyperelliptic(branch_points(np.random.default_rng([7, count]), count), sign)
+    assert curve.legendre_residual < 1e-9
+    omega, omega_prime, *_ = curve.quasi_periods
+    assert np.max(np.abs(np.linalg.solve(omega, omega_prime) - curve.riemann_matrix)) < 1e-12
+
+
 def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
     """u = −2 ∂_x² log θ(z), z = c_g x + W t, obeys u''' − 6uu' = A u' + B ∂u/∂(c_{g−1}) on the whole torus."""
     curve = curves.RealHyperelliptic([0, 1, "1.7", 3, "4.5"])

@@ -124,6 +124,22 @@ class RealHyperelliptic:
         cancelling = max(1.0, float(np.max(periods.cancellation)))
         return largest * max(_ENTRY_ROUNDING * cancelling, 2 * periods.riemann_matrix_residual)
 
+    @property
+    def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
+        """Return ω, ω', η, η' (g, g): half the periods over a_s and b_s (columns) of du_k, and of −dr_k, rows k = 1 … g.
+
+        du_k = μ^{k−1}dμ/y and dr_k = Σ_j (j+1−k) m_{j+1+k} μ^j dμ/4y on y² = 4Π(μ−β) = Σ m_i μ^i, in the coordinate μ in which
+        one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are 2g+2.
+        """
+        return self._curve.quasi_periods
+
+    @property
+    def legendre_residual(self) -> float:
+        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over ½π: Legendre's relation between periods of the first and second kind, a check."""
+        omega, omega_prime, eta, eta_prime = self._curve.quasi_periods
+        found = (omega @ eta_prime.T - omega_prime @ eta.T) / (np.pi / 2)
+        return float(np.max(np.abs(np.abs(found) - np.eye(self.genus))))
+
     @cached_property
     def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
         """Return (ε, δ) of each branch point: τε + δ is its image under ``abel``; zero for the last of 2g+2."""
@@ -218,7 +234,7 @@ class RealHyperelliptic:
         curve = self._curve
         betas = [float(b) for b in curve.betas]
         differences = np.abs(curve.periods.curve.differences)
-        sizes = [2 * curve.monomial_integrals(2 * s - 1) for s in range(1, self.genus + 1)]
+        sizes = [2 * curve.monomial_integrals(2 * s - 1, self.genus - 1) for s in range(1, self.genus + 1)]
         determinant = abs(float(np.linalg.det(np.stack(sizes, axis=1)))) / (2 * np.pi) ** self.genus
         numbers = range(len(betas))
         odd = [Characteristic.of_branch_point(j, self.genus) for j in numbers]

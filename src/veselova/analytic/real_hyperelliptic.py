@@ -117,15 +117,34 @@ class RealCurve:
         mu = np.where(near_left, beta[number] + below, beta[number + 1] - above)
         return np.asarray(2 * np.pi * np.mean(self.weights(mu, highest) * density, axis=-1))
 
-    def monomial_integrals(self, number: int) -> Array:
-        """Return ∫ μ^{k−1} dμ/√|R| over the interval [β_number, β_{number+1}], k = 1 … g."""
+    def monomial_integrals(self, number: int, highest: int) -> Array:
+        """Return ∫ μ^k dμ/√|R| over the interval [β_number, β_{number+1}], k = 0 … highest."""
         interval = Interval(self.periods.curve, number)
-        nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * self.genus + 4)
+        nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
         mu = self.periods.curve.branch_points[number] + below
-        powers = mu ** np.arange(self.genus)[:, None]
+        powers = mu ** np.arange(highest + 1)[:, None]
         return np.asarray(2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1))
+
+    @cached_property
+    def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
+        """Return ω, ω', η, η', half the periods of du_k = μ^{k−1}dμ/y and −dr_k over a_s and b_s, (g, g), y² = 4Π(μ−β).
+
+        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} μ^j dμ/4y for y² = Σ m_i μ^i (Baker): differentials of the second kind.
+        """
+        g = self.genus
+        m = 4 * np.poly(np.array([float(b) for b in self.betas]))[::-1]
+        kinds = np.zeros((2 * g, 2 * g))
+        kinds[:g, :g] = np.eye(g)
+        for k in range(1, g + 1):
+            for j in range(k, 2 * g + 1 - k):
+                kinds[g + k - 1, j] = -(j + 1 - k) * m[j + 1 + k] / 4
+        over = [kinds @ self.monomial_integrals(number, 2 * g - 1) for number in range(2 * g)]
+        # y = 2iv on cuts; on gaps v is i√|R| as in the b-periods of the first kind.
+        a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1) / 2j
+        b = np.cumsum(np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1), axis=1) / 2
+        return a[:g], b[:g], a[g:], b[g:]
 
     def cycles(self, highest: int) -> tuple[Array, Array]:
         """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 … highest."""
