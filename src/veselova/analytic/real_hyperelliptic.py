@@ -144,7 +144,8 @@ class RealCurve:
         # y = 2iv on cuts; on gaps v is i√|R| as in the b-periods of the first kind.
         a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1) / 2j
         b = np.cumsum(np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1), axis=1) / 2
-        return a[:g], b[:g], a[g:], b[g:]
+        first, second = np.asarray(a, dtype=complex), np.asarray(b, dtype=complex)
+        return first[:g], second[:g], first[g:], second[g:]
 
     def cycles(self, highest: int) -> tuple[Array, Array]:
         """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 … highest."""
