@@ -34,6 +34,8 @@ def problems() -> list[tuple[str, vs.Problem]]:
         found.append((f"geodesic-{n}", vs.EllipsoidGeodesic(A, q, v, normalize=True)))
     found.append(("symmetric body", vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0.3, 1, -0.225])))
     found.append(("two equal of four", vs.Veselova([3, 2, 1, 1], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4])))
+    found.append(("body in SO(3)", vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])))
+    found.append(("its tensor", vs.VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], [0.6, 0, 0.8], [0.8, 1, -0.6])))
     found.append(("frozen direction", vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0])))
     found.append(("matrix A", vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6])))
     found.append(("beside a separatrix", vs.Veselova([3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True)))

@@ -111,7 +111,7 @@ CHAPTERS = {"": None, "mechanics": None, "analytic": None, "numeric": None, "ser
 def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
     # What is imported at a call may be of any extra, or is named by the error that says that it is missing.
-    declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"finufft"}
+    declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"finufft", "sympy"}
     for path in sorted((SOURCE / folder).glob("*.py")):
         for module in _third_party(path):
             names = {_name(name) for name in distributions.get(module, [module])}
@@ -168,7 +168,7 @@ def _without(extra: str | None, statement: str) -> subprocess.CompletedProcess[s
     everything = packages_distributions()
     missing = {module for module, names in everything.items() if not {_name(name) for name in names} & kept}
     # What the libraries that are kept need themselves stays.
-    declared = _libraries("all") | {"finufft"}
+    declared = _libraries("all") | {"finufft", "sympy"}
     missing = {module for module in missing if {_name(name) for name in everything[module]} & declared}
     source = _WITHOUT.format(missing=missing) + statement
     return subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=120)

@@ -15,6 +15,7 @@ from veselova.analytic.solution import Solution
 from veselova.analytic.theta import Theta
 from veselova.mechanics.closed_form import ClosedForm
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.problem import Problem
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.version import __version__
 
@@ -39,7 +40,7 @@ _CYCLES = 100.0
 _OWN_ROUNDING = 2.0
 
 
-def closed_form(problem: TorusProblem, accuracy: float = 1e-12) -> ClosedForm:
+def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
     """Return the motion of a problem as a document in double precision.
 
     ``accuracy``: the error that modes left out of the time map may make in q and the frame. Raises InvalidInput for another
@@ -47,58 +48,54 @@ def closed_form(problem: TorusProblem, accuracy: float = 1e-12) -> ClosedForm:
     """
     if isinstance(accuracy, bool) or not isinstance(accuracy, (int, float)) or not _FINEST <= accuracy <= _COARSEST:
         raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", shown(accuracy))
+    problem: TorusProblem = given.on_torus()
     solution = Solution(problem)
     if solution.separatrices:
         reason = "the start lies on a separatrix, which no torus describes for long; solve at times instead"
         raise Unsolved("no-closed-form", reason)
-    quotients, unit = solution.quotients, solution.tau1_unit
-    modes, coefficients = _modes(solution, accuracy)
-    g, places, constants = solution.curve.genus, quotients.places.tolist(), quotients.constants.tolist()
-    pairs = [[place, constant] for place, constant in zip(places, constants, strict=True)]
-    m = solution.moving.size
+    head = {"format": ClosedForm.format, "version": __version__, "time": problem.time, "digits": 15}
+    # The problem stands last, so that a reader without a JSON parser finds the field that it looks for.
+    parts = {**_attitude(solution), **_time_map(solution, accuracy), "error": _error(solution, accuracy)}
+    return ClosedForm({**head, **parts, "problem": given.as_dict()})
+
+
+def _attitude(solution: Solution) -> dict[str, Any]:
+    """Return the fields from phases to the attitude."""
+    quotients, unit, axes = solution.quotients, solution.tau1_unit, solution.problem.axes
+    g, m = solution.curve.genus, solution.moving.size
+    pairs = [[place, value] for place, value in zip(quotients.places.tolist(), quotients.constants.tolist(), strict=True)]
     columns = [pairs[m + g + k :: g] for k in range(g)]
-    axes = problem.axes
-    power = STRETCH_POWERS[problem.time]
-    T = solution.periods.riemann_matrix
-    start_error, growth = _errors(solution)
-    return ClosedForm(
-        {
-            "format": ClosedForm.format,
-            "version": __version__,
-            "time": problem.time,
-            "digits": 15,
-            "genus": g,
-            "A": problem.A.tolist(),
-            "axes": None if axes is None else axes.tolist(),
-            "riemann_matrix": np.asarray(T).tolist(),
-            "reduction": _reduction(solution),
-            "characteristics": [[[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions],
-            "q": pairs[:m],
-            "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
-            "normals": columns[:-1],
-            "gamma": columns[-1],
-            "phases": solution.in_tau1.start.tolist(),
-            "frequencies": (solution.in_tau1.rates / unit).tolist(),
-            "rotation": solution.rotation.tolist(),
-            "directions": solution.moving.directions.tolist(),
-            "frozen": (solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part).tolist(),
-            "mean_rate": solution.mean_rate / unit,
-            "modes": modes.tolist(),
-            "coefficients": coefficients,
-            "rate": {
-                "characteristic": places[m + g - 1],
-                "constant": solution.rate_constant / unit,
-                "power": power,
-            },
-            "units": {"time": problem.time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
-            "error": {
-                "at_start": _OWN_ROUNDING * start_error + accuracy,
-                "per_unit_time": _OWN_ROUNDING * growth,
-                "per_cycle": _OWN_ROUNDING * growth / solution.fastest,
-            },
-            "problem": problem.as_dict(),
-        }
-    )
+    return {
+        "genus": g,
+        "A": solution.problem.A.tolist(),
+        "axes": None if axes is None else axes.tolist(),
+        "riemann_matrix": np.asarray(solution.periods.riemann_matrix).tolist(),
+        "reduction": _reduction(solution),
+        "characteristics": [[[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions],
+        "q": pairs[:m],
+        "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
+        "normals": columns[:-1],
+        "gamma": columns[-1],
+        "rotation": solution.rotation.tolist(),
+        "directions": solution.moving.directions.tolist(),
+        "frozen": (solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part).tolist(),
+    }
+
+
+def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
+    """Return the fields from times to phases."""
+    unit, time = solution.tau1_unit, solution.problem.time
+    modes, coefficients = _modes(solution, accuracy)
+    of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
+    return {
+        "phases": solution.in_tau1.start.tolist(),
+        "frequencies": (solution.in_tau1.rates / unit).tolist(),
+        "mean_rate": solution.mean_rate / unit,
+        "modes": modes.tolist(),
+        "coefficients": coefficients,
+        "rate": {"characteristic": of_gamma, "constant": solution.rate_constant / unit, "power": STRETCH_POWERS[time]},
+        "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
+    }
 
 
 def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
@@ -136,13 +133,13 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
     return {"basis": coordinates.U.tolist(), "waves": list(coordinates.waves)}
 
 
-def _errors(solution: Solution) -> tuple[float, float]:
-    """Return the engine's error at t = 0, and by how much it grows in a unit of time."""
-    route = Route(solution, "theta")
-    far = _CYCLES / solution.fastest
+def _error(solution: Solution, accuracy: float) -> dict[str, float]:
+    """Return the bound of q and the frame: that of the engine at t = 0, and how it grows, and what modes left out may make."""
+    route, far = Route(solution, "theta"), _CYCLES / solution.fastest
     errors = []
     for time in (0.0, far):
         horizon = route.to(np.array([time]))
         name = None if solution.problem.time == "tau1" else "fourier"
-        errors.append(float(route.along(horizon, horizon.clock(name))[1][0]))
-    return errors[0], max(0.0, errors[1] - errors[0]) / far
+        errors.append(_OWN_ROUNDING * float(route.along(horizon, horizon.clock(name))[1][0]))
+    growth = max(0.0, errors[1] - errors[0])
+    return {"at_start": errors[0] + accuracy, "per_unit_time": growth / far, "per_cycle": growth / _CYCLES}
