@@ -6,8 +6,9 @@ constant. For u = q₀−q₁ and w = u', with |a₀−a₁| ≤ δ and (q₀+q�
     |w'| ≤ M|u| + f,   M = max|β−a_i| + 2(max a − min a),   f = 3δ + |E₀−E₁|,
 
 so |u| ≤ D, |w| ≤ μD with D = (|u(0)| + |w(0)|/μ + f/M) e^{μ|τ₁|}, μ = √M. The frame turns with E' = (q'qᵀ − qq'ᵀ)E, skew: two
-frames part by at most ∫2(|w| + |q'||u|). Clocks part by ∫|ρ₀−ρ₁|, ρ = dt/dτ₁ = k√(q,Aq), and every series by what it moves in
-that time. Coarse numbers are doubles, rounded up by far more than they are rounded.
+frames part by at most ∫2(|w| + |q'||u|). Clocks part by ∫|ρ₀−ρ₁|, ρ = d(time)/dτ₁ (see _Rates), and every series by what it
+moves in that time. F_0 may have any value: only E enters. Coarse numbers are doubles, rounded up by far more than they are
+rounded.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.clock import STRETCH_POWERS
 from veselova.analytic.precision import Values
 from veselova.analytic.reduction import Moving
 from veselova.analytic.spectrum import Spectrum, tangent
@@ -37,8 +39,7 @@ class Drift:
 
     apart: |u(0)| + |w(0)|/μ + f/M · matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
     frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| · bend: one of |q''|
-    clocks: |k₀−k₁| max√(q,Aq) + k δ((q,Aq)), per unit of τ₁ · clock_slope: k max A, by which |u| enters |ρ₀−ρ₁|
-    slowest: the least dt/dτ₁ · inverses: δ · highest: max a
+    clocks, clock_slope: |ρ₀−ρ₁| ≤ clocks + clock_slope·|u| · slowest: the least d(time)/dτ₁ · inverses: δ · highest: max a
     """
 
     apart: Any
@@ -66,25 +67,25 @@ class Drift:
             a1, (q1, p1) = a0.copy(), (_spread(x * signs, places, len(q0)) for x in (q1, p1))
             a1[places] = xp.array([1 / a for a in moved.A])
             energies = [np.sum(p * p) + np.sum(a * q * q) for a, q, p in ((a0, q0, p0), (a1, q1, p1))]
-            clocks = [1 / (rate * xp.sqrt(np.sum(q * q / a))) for a, q, rate in ((a0, q0, rate0), (a1, q1, rate1))]
+            values = [np.sum(q * q / a) for a, q in ((a0, q0), (a1, q1))]
+            rates = _Rates.of(given.time, [rate0, rate1], values, xp)
             u, w, inverses, A = (_norm(x, xp) for x in (q0 - q1, p0 - p1, a0 - a1, 1 / a0 - 1 / a1))
             low, high = _range([*a0, *a1])
             least, most = _range(energies)
-            slow, fast = _range(clocks)
             speed, (bend, level) = math.sqrt(most - low) * _UP, _bend_and_level(low, high, least, most)
             growth = math.sqrt(level) * _UP
             force = 3 * inverses + abs(energies[0] - energies[1])
-            # √(q,Aq) lies between 1/√max a and 1/√min a, and (q,Aq) is moved by |A₀−A₁| + 2 max A |u|.
-            widest, least_root = _UP / math.sqrt(low), math.sqrt(high) * _UP
+            # (q,Aq) is moved by |A₀−A₁| + 2 max A |u|.
+            steepest = rates.steepest(low, high)
             bounds = {
                 "apart": u + w / growth + force / (level / _UP**2),
                 "matrix": inverses + (4 * high + 2) * _UP * u + 2 * speed * w,
-                "clocks": abs(clocks[0] - clocks[1]) * widest + fast * least_root / 2 * _UP * A,
+                "clocks": rates.apart * rates.largest_power(low, high) + steepest * A,
                 "inverses": inverses,
             }
             small = {name: xp.at_most(value).item() for name, value in bounds.items()}
-        coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": slow / least_root / _UP, "highest": high}
-        return cls(frames=arithmetic.number(0), clock_slope=fast * least_root / low * _UP, **coarse, **small)
+        coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": rates.slowest(low, high), "highest": high}
+        return cls(frames=arithmetic.number(0), clock_slope=2 * steepest / low * _UP, **coarse, **small)
 
     def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
         """Return how far τ₁, q̇, the frame (as an operator, so each entry) and the λ's may be from those at Neumann times (N,)
@@ -96,6 +97,39 @@ class Drift:
         slope = (self.clocks + self.clock_slope * turned) / self.slowest / self.slowest
         velocity = (self.growth * apart + self.bend * late) / self.slowest + self.speed * slope
         return late, velocity, turned, 4 * self.highest * turned + self.inverses
+
+
+@dataclass(frozen=True)
+class _Rates:
+    """ρ = d(time)/dτ₁ = k (q,Aq)^p of both motions: p = 1/2 for t, −1 for arc length s, and 0 for τ₁ itself.
+
+    power: p · apart: |k₀−k₁|, a ball · least, most: doubles below and above both k. With a in [low, high], (q,Aq) lies between
+    1/high and 1/low.
+    """
+
+    power: float
+    apart: Any
+    least: float
+    most: float
+
+    @classmethod
+    def of(cls, time: str, rates: list[Any], values: list[Any], xp: Any) -> _Rates:
+        """Return the rates of motions with dτ₁/d(time) and (q,Aq) at the start."""
+        powers = {"t": xp.sqrt, "s": lambda x: 1 / x, "tau1": lambda x: xp.number(1)}
+        constants = [1 / (rate * powers[time](value)) for rate, value in zip(rates, values, strict=True)]
+        return cls(STRETCH_POWERS[time] / 2, abs(constants[0] - constants[1]), *_range(constants))
+
+    def largest_power(self, low: float, high: float) -> float:
+        """Return a bound of (q,Aq)^p."""
+        return float((1 / low if self.power > 0 else 1 / high) ** self.power) * _UP
+
+    def slowest(self, low: float, high: float) -> float:
+        """Return a number below ρ."""
+        return self.least * float((1 / high if self.power > 0 else 1 / low) ** self.power) / _UP
+
+    def steepest(self, low: float, high: float) -> float:
+        """Return a bound of |dρ/d(q,Aq)| = |kp| (q,Aq)^(p−1), which is largest where (q,Aq) is least: p < 1."""
+        return self.most * abs(self.power) * float(high ** (1 - self.power)) * _UP
 
 
 def expected_growth(spectrum: Spectrum, tau1: float) -> int:

@@ -9,11 +9,12 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from veselova.analytic.decay import MORE, SAMPLE, are_resolved, expected_terms
 from veselova.analytic.enclosed_series import EnclosedSeries
-from veselova.analytic.increasing import doublings, interval_step, is_shown
+from veselova.analytic.increasing import Rows, doublings, increasing_root, interval_step, is_shown
 from veselova.analytic.precision import DOUBLE, LAST_COEFFICIENTS, Values
 from veselova.analytic.strip import Orbit
 from veselova.mechanics.errors import Unsolved
@@ -44,6 +45,12 @@ _EXTRA_TERMS = 6
 #: doubles, which has a relative and an absolute error.
 _BEYOND, _CYCLES_BEYOND = 1 + 1e-9, 1e-12
 
+#: By how much panels are made longer where they end before the last time, at the least.
+_LONGER = 1.25
+
+#: A root in double precision is taken where its residual is below this, in half lengths of the panel.
+_NEAR = 1e-6
+
 
 class EnclosedClock:
     """τ₁ at given times on one orbit, in balls.
@@ -71,6 +78,11 @@ class EnclosedClock:
         for side, sign in ((self._forward, 1), (self._backward, -1)):
             chosen = np.flatnonzero(sign * approximate > 0)
             if side is not None and chosen.size:
+                farthest = np.max(sign * times[chosen])
+                while not side.end >= farthest:  # on a separatrix doubles lose the motion, and with it how far panels have to go
+                    ratio = float(farthest / side.end) if side.end > 0 else 0.0
+                    side = self._panels(float(side.reach) * max(_LONGER, ratio), sign)
+                    assert side is not None
                 result[chosen] = sign * side.roots(sign * times[chosen], sign * approximate[chosen])
         return np.asarray(result)
 
@@ -154,6 +166,16 @@ class _Panels:
     def _certified(self) -> bool:
         return self.steepest is not None
 
+    @property
+    def reach(self) -> Any:
+        """Return |τ₁| at the end of the last panel."""
+        return self.centres[-1] + self.half
+
+    @property
+    def end(self) -> Any:
+        """Return t there, a ball."""
+        return self._ends[-1]
+
     @cached_property
     def _steepness(self) -> Values:
         if self._certified:
@@ -207,7 +229,7 @@ class _Panels:
                 return xp.widened(constant + value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
 
         lowest, highest = xp.midpoints(xp.array([centre - self.half, centre + self.half]))
-        x = xp.array(np.clip(approximate, float(lowest), float(highest)))
+        x = self._near(p, (times - constant).astype(float), np.clip(approximate, float(lowest), float(highest)))
         for digits in doublings(xp.digits):
             value, rate = clock(x, digits)
             x = xp.midpoints(x - (value - times) / rate)
@@ -217,3 +239,19 @@ class _Panels:
         if self._certified and not is_shown(reach, rate, self.steepest, xp):
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
         return np.asarray(x - step)
+
+    def _near(self, p: int, local: NDArray[np.float64], approximate: NDArray[np.float64]) -> Values:
+        """Return roots on a panel to double precision, from local times and approximate values, which may say nothing."""
+        xp, half, centre = self.arithmetic, float(self.half), float(self.centres[p])
+        waves, rates = np.concatenate([[0.0], self._waves[p].astype(float)]), half * self.rates[p].astype(float)
+
+        def excess(u: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            return chebval(-u, waves) - local[rows], chebval(-u, rates)
+
+        start = (approximate - centre) / half
+        value, slope = excess(start, slice(None))
+        if np.all(np.abs(value) <= _NEAR * slope):
+            return np.asarray(xp.array(approximate))
+        one = np.ones(len(start))
+        root = increasing_root(excess, np.clip(start, -1, 1), -one, one, np.sqrt(np.finfo(float).eps))
+        return np.asarray(xp.midpoints(self.centres[p] + self.half * xp.array(root)))

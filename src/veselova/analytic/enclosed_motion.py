@@ -25,17 +25,14 @@ from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals, Later, Pair
 from veselova.mechanics.errors import InvalidInput, Unsolved
 from veselova.mechanics.times import exact_times
+from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
-from veselova.mechanics.veselova import Veselova
 from veselova.version import __version__
 
 __all__ = ["EnclosedMotion"]
 
 #: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
 _SPARE = 8
-
-#: The change by a move of the start, in units of half the change by that and the opposite one.
-_MOVED = 2
 
 #: Digits added beyond those that were missing, and attempts.
 _MORE = 4
@@ -55,7 +52,7 @@ _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 class EnclosedMotion:
     """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
 
-    problem: Veselova
+    problem: TorusProblem
     digits: int
     certified: bool
     method: str | None
@@ -68,7 +65,7 @@ class EnclosedMotion:
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
         began, (exact, grid) = time.perf_counter(), exact_times(times)
-        if not any(self.problem.exact.tangent):
+        if not (any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)):
             return self._resting(grid, began)
         solution = Solution(self.problem)
         horizon = Horizon(solution, grid)
@@ -101,7 +98,7 @@ class EnclosedMotion:
     def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:
         working = 2 * self.digits + _SPARE
         with balls(working, self.certified) as xp:
-            found = _Found.of(resting_series(self.problem, grid.size, xp), xp)
+            found = _Found.of(self.problem, resting_series(self.problem, grid.size, xp), xp)
         details = {"regime": "rest", "working_digits": working, "certified": self.certified}
         return self._trajectory("rest", grid, found, details, began)
 
@@ -120,27 +117,25 @@ class EnclosedMotion:
         solution = EnclosedSolution(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
             series, details = solution.series(xp.array(exact), clock)
-            if solution.separatrices:  # the start was moved; what another move would change stands for what this one did
-                neighbour = EnclosedSolution(coarse, working, self.certified, method, distance=-solution.distance)
-                other, _ = neighbour.series(xp.array(exact), clock)
-                series = {name: xp.widened(values, _MOVED * (values - other[name])) for name, values in series.items()}
-            return _Found.of(series, xp), details
+            return _Found.of(self.problem, series, xp), details
 
 
 @dataclass(frozen=True)
 class _Found:
-    """The series in balls of an arithmetic, and the largest radius of the frame at each time, (N,)."""
+    """The series of a problem in balls of an arithmetic, and the largest radius of those that are bounded at each time, (N,)."""
 
+    problem: TorusProblem
     arithmetic: Balls
     series: Mapping[str, Values]
     spread: Values
 
     @classmethod
-    def of(cls, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
-        """Return the series with that of their frame, infinite where nothing is known of a number."""
+    def of(cls, problem: TorusProblem, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
+        """Return the series with their radii, infinite where nothing is known of a number."""
         unknown = arithmetic.number(math.inf)
-        radii = np.frompyfunc(lambda x: x.rad() if x.is_finite() else unknown, 1, 1)(series["frame"])
-        return cls(arithmetic, series, np.max(radii, axis=(1, 2)))
+        radius = np.frompyfunc(lambda x: x.rad() if x.is_finite() else unknown, 1, 1)
+        radii = [radius(series[name]).reshape(len(series[name]), -1) for name in problem.bounded]
+        return cls(problem, arithmetic, series, np.max(np.concatenate(radii, axis=1), axis=1))
 
     def missing(self, digits: int, working: int) -> int:
         """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
@@ -160,8 +155,9 @@ class _Found:
         pairs: dict[str, Pair | Callable[[], Pair]] = {
             name: partial(self.arithmetic.decimals, values, shown) for name, values in self.series.items()
         }
-        pairs["omega"] = partial(_skew, self.arithmetic, self.series["omega"], shown)
-        return Decimals(digits, certified, Later(pairs, 0), Later(pairs, 1))
+        if "omega" in self.series:
+            pairs["omega"] = partial(_skew, self.arithmetic, self.series["omega"], shown)
+        return Decimals(digits, certified, Later(pairs, 0), Later(pairs, 1), self.problem.bounded)
 
 
 def _skew(arithmetic: Balls, omega: Values, digits: int) -> Pair:

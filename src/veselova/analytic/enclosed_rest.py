@@ -1,4 +1,4 @@
-"""A body at rest in balls: the state that it keeps, to any number of digits."""
+"""A problem at rest in balls: the state that it keeps, to any number of digits."""
 
 from __future__ import annotations
 
@@ -7,23 +7,35 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.body_frame_balls import BodyFrame
 from veselova.analytic.enclosed_frame import frame_around
-from veselova.analytic.enclosed_solution import series_of
 from veselova.analytic.enclosure import resting_spheroconic
 from veselova.analytic.precision import Values
 from veselova.analytic.reduction import moving_part
+from veselova.analytic.series_balls import States, along_all, series_of
 from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.torus_problem import TorusProblem
 
 __all__ = ["resting_series"]
 
 
-def resting_series(problem: Veselova, count: int, arithmetic: Any) -> Mapping[str, Values]:
-    """Return the series of a body with q̇ = 0, by name, at ``count`` times; raises Unsolved where no frame was given."""
-    xp, exact = arithmetic, problem.exact
-    if exact.frame is None:
+def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mapping[str, Values]:
+    """Return the series of a problem at rest, by name, at ``count`` times; raises Unsolved where no frame can be known.
+
+    Neumann's point rests where q is an eigenvector of A: so are the others, and the natural frame is one of axes. A body rests
+    anywhere, and its natural frame is known in double precision only.
+    """
+    xp, exact, moving = arithmetic, problem.exact, moving_part(problem)
+    q = xp.array(exact.q)
+    q = q / xp.sqrt(np.sum(q * q))
+    if exact.frame is not None:
+        frame = frame_around(q, exact.frame, xp)
+    elif problem.time == "tau1":
+        body = BodyFrame(problem, moving, xp.array([1]), xp.array(np.zeros((1, 0))), xp)
+        frame = np.column_stack([q, body.start])
+    else:
         raise Unsolved("at-rest", "q_dot = 0: a resting body's natural frame is known in double precision only; give a frame")
-    q, moving = xp.array(exact.q), moving_part(problem)
-    frame = frame_around(q / xp.sqrt(np.sum(q * q)), exact.frame, xp)
-    frames, coordinates = (np.stack([x] * count) for x in (frame, resting_spheroconic(moving, xp)))
-    return series_of(moving, xp.array(np.zeros((count, problem.n))), frames, coordinates, xp.array(np.zeros(count)), xp)
+    points = resting_spheroconic(moving, xp) / xp.number(moving.unit) if moving.size > 1 else xp.array(np.zeros(0))
+    frames, coordinates = (np.stack([x] * count) for x in (frame, along_all(points[None], moving.frozen, xp)[0]))
+    zeros = xp.array(np.zeros((count, problem.n)))
+    return series_of(problem, States(zeros[:, 0], zeros, frames, coordinates), xp)

@@ -46,9 +46,10 @@ def enclosed(found: Resolved) -> Spectrum:
         inverse = xp.array([1 / a for a in found.moving.A])
         points = _zeros(coarse.spheroconic, coarse.inverse, inverse, q * q, 0, xp)
         along = [_component(s, coarse, q, v, inverse, points) for s in range(len(points))]
-        constants = _zeros(coarse.constants[1:], coarse.spheroconic, points, xp.array(along) * xp.array(along), 1, xp)
-        zero = xp.array([0])
-        return Spectrum(xp, inverse, q, v, np.concatenate([zero, constants]), points, rate)
+        known = found.moving.time != "tau1"  # c_1 = 0, but for Neumann's system
+        rest = _zeros(coarse.constants[int(known) :], coarse.spheroconic, points, xp.array(along) * xp.array(along), 1, xp)
+        constants = np.concatenate([xp.array([0]), rest]) if known else rest
+        return Spectrum(xp, inverse, q, v, constants, points, rate)
 
 
 def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:

@@ -25,7 +25,6 @@ from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import validated_times
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
-from veselova.mechanics.veselova import Veselova
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
 __all__ = ["METHODS", "solve"]
@@ -91,8 +90,6 @@ def solve(
         raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", shown(method))
     if clock is not None:
         raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
-    if not isinstance(problem, Veselova):
-        raise InvalidInput(("digits",), f"{FEWEST_DIGITS}, not certified, for system {problem.system}", str(digits))
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(times)
@@ -155,8 +152,7 @@ class _TorusMotion(Motion[TorusProblem]):
         """Return why no digit is left, and what answers."""
         if self._departure is None:
             return "the data determine no digit there"
-        served = isinstance(self.problem, Veselova) and self.problem.axes is None
-        further = "; ask for more digits, which come from the exact data" if served else ""
+        further = "; ask for more digits, which come from the exact data" if self.problem.axes is None else ""
         return f"on a separatrix the data determine the motion, and doubles do not{further}"
 
     def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:

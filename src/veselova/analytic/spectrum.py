@@ -115,7 +115,7 @@ def resolved(
             raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
         found = spectrum(moving, digits, coinciding)
         threshold = Decimal((0, (1,), -coinciding))
-        if found.widths[0] * threshold > 1:
+        if found.widths[0] > Decimal((0, (1,), coinciding)):  # a comparison, unlike a product, asks no context
             raise Unsolved("beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I")
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:

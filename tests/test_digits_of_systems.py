@@ -1,0 +1,292 @@
+"""Many digits and certified errors of Neumann's system and of geodesics: the same chain under another time."""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections.abc import Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import veselova as vs
+from conftest import Server
+from hostile import BUDGET_S
+from taylor_truth import geodesic_at, neumann_at
+from test_cli import run
+from veselova.analytic.enclosed_solution import EnclosedSolution
+from veselova.analytic.solution import Solution
+from veselova.mechanics.archive import read_archive
+from veselova.mechanics.decimals import Decimals
+from veselova.service.documents import encoded, trajectory_document, trajectory_of
+
+#: Points on the unit sphere and tangents, exactly; F_0 is not zero.
+POINTS = {
+    2: (["3", "1"], ["3/5", "4/5"], ["-4/5", "3/5"]),
+    3: (["2", "1", "1/2"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
+    4: (["3", "2", "3/2", "1"], ["1/2", "1/2", "1/2", "1/2"], ["1", "-1/3", "0", "-2/3"]),
+    5: (["5", "3", "2", "3/2", "1"], ["1/4", "1/2", "1/4", "3/4", "1/4"], ["1", "1/2", "-1", "-1/3", "0"]),
+}
+
+#: An umbilic point: X_1² = A_1(A_1−A_2)/(A_1−A_3), X_3² = A_3(A_2−A_3)/(A_1−A_3), to the last digit.
+UMBILIC = (["1.69", "1.1716", "0.25"], ["0.78", "0", "0.4"])
+
+
+def neumann(n: int, speed: str = "1") -> vs.NeumannSystem:
+    A, q, v = POINTS[n]
+    return vs.NeumannSystem(A, q, [str(Fraction(x) * Fraction(speed)) for x in v])
+
+
+def geodesic(n: int) -> vs.EllipsoidGeodesic:
+    A, q, v = POINTS[n]
+    return vs.EllipsoidGeodesic(A, q, v, normalize=True)
+
+
+def decimals(problem: Any, times: Sequence[Any], **options: Any) -> Decimals:
+    found = vs.solve(problem, times, **options).decimals
+    assert found is not None
+    return found
+
+
+def start_of(problem: vs.EllipsoidGeodesic, digits: int) -> tuple[list[Any], list[Any]]:
+    """Return X and X_dot at s = 0 from the exact data, on the ellipsoid to so many digits."""
+    with mpmath.workdps(digits + 15):
+        exact = problem.exact
+        A, q, tangent = ([mpmath.mpf(x.numerator) / x.denominator for x in row] for row in (exact.A, exact.q, exact.tangent))
+        norm = mpmath.sqrt(mpmath.fdot(q, q))
+        root = mpmath.sqrt(sum(a * x * x for a, x in zip(A, q, strict=True))) / norm
+        X = [a * x / norm / root for a, x in zip(A, q, strict=True)]
+        # A times the velocity of q is along the tangent of the geodesic, but for a multiple of X.
+        V = [a * x for a, x in zip(A, tangent, strict=True)]
+        along = sum(x * y / a for x, y, a in zip(X, V, A, strict=True))
+        V = [y - along * x for x, y in zip(X, V, strict=True)]
+        size = mpmath.sqrt(mpmath.fdot(V, V))
+        return X, [y / size for y in V]
+
+
+def agree(found: Decimals, name: str, row: int, truth: Sequence[Any], digits: int) -> None:
+    """Hold decimals against numbers of mpmath: within their radii, which have the digits that were asked for."""
+    with mpmath.workdps(digits + 20):
+        for x, radius, expected in zip(found.midpoints[name][row], found.radii[name][row], truth, strict=True):
+            assert radius < Decimal(10) ** -(digits - 2), (name, row)
+            assert abs(mpmath.mpf(str(x)) - expected) <= mpmath.mpf(str(radius)) + mpmath.mpf(10) ** -(digits + 8), (name, row)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
+    A, q, v = POINTS[n]
+    for speed in ("1", "1/7") if n < 4 else ("1",):
+        velocity = [Fraction(x) * Fraction(speed) for x in v]
+        found = decimals(neumann(n, speed), ["-1.3", 0, "1.7"], digits=50)
+        assert max(found.error) < Decimal("1e-50")
+        for row, t in ((0, Fraction("-1.3")), (2, Fraction("1.7"))):
+            position, moving = neumann_at(A, q, velocity, t, 50)
+            agree(found, "q", row, position, 50)
+            agree(found, "q_prime", row, moving, 50)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+def test_a_geodesic_has_fifty_digits(n: int) -> None:
+    problem = geodesic(n)
+    found = decimals(problem, ["-1.3", 0, "1.7"], digits=50)
+    assert max(found.error) < Decimal("1e-50")
+    for row, s in ((0, Fraction("-1.3")), (2, Fraction("1.7"))):
+        X, V = geodesic_at(problem.exact.A, *start_of(problem, 50), s, 50)
+        agree(found, "X", row, X, 50)
+        agree(found, "X_dot", row, V, 50)
+
+
+@pytest.mark.parametrize("system", [neumann, geodesic])
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_frames_of_decimals_are_eigenvectors(n: int, system: Any) -> None:
+    """(A⁻¹ − q'q'ᵀ) n_k is c_k n_k but for a multiple of q, and signs are those of the answer in doubles."""
+    problem = system(n)
+    found, ordinary = decimals(problem, [2], digits=40), vs.solve(problem, [2])
+    with mpmath.workdps(60):
+        frame = mpmath.matrix(np.vectorize(str)(found.midpoints["frame"][0]).tolist())
+        assert mpmath.norm(frame.T * frame - mpmath.eye(n), 1) < mpmath.mpf("1e-39")
+        if system is neumann:
+            velocity = mpmath.matrix(np.vectorize(str)(found.midpoints["q_prime"][0]).tolist())
+            inverse = mpmath.diag([1 / (mpmath.mpf(a.numerator) / a.denominator) for a in problem.exact.A])
+            across = frame[:, 1:].T * (inverse - velocity * velocity.T) * frame[:, 1:]
+            rest = [abs(across[i, j]) for i in range(n - 1) for j in range(n - 1) if i != j]
+            assert max(rest, default=0) < mpmath.mpf("1e-38")
+    assert np.max(np.abs(found.midpoints["frame"].astype(float) - ordinary.frame)) < 1e-12
+
+
+@pytest.mark.parametrize("problem", [neumann(2), neumann(3, "2"), neumann(4), geodesic(2), geodesic(3)], ids=repr)
+def test_certified_radii_hold_the_motion(problem: Any) -> None:
+    times = ["-2", 0, "1", "6"]
+    proven, finer = decimals(problem, times, certified=True), decimals(problem, times, digits=40)
+    ordinary = vs.solve(problem, times)
+    assert proven.certified
+    assert max(proven.error) < Decimal("1e-15")
+    for name in problem.outputs:
+        assert np.all(np.abs(proven.midpoints[name] - finer.midpoints[name]) <= proven.radii[name] + finer.radii[name]), name
+        assert np.allclose(ordinary.series(name), finer.midpoints[name].astype(float), atol=1e-11, rtol=1e-11), name
+
+
+EQUAL = [
+    vs.NeumannSystem(["2", "2", "1"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
+    vs.NeumannSystem(["2", "1", "1/2"], ["3/5", "0", "4/5"], ["-4/5", "0", "3/5"]),
+    vs.NeumannSystem(["2", "2", "2", "1"], ["1/2", "1/2", "1/2", "1/2"], ["1", "-1/3", "0", "-2/3"]),
+    vs.NeumannSystem(["2", "2", "2"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
+    vs.EllipsoidGeodesic(["2", "2", "1"], ["2", "1", "2"], ["1", "2", "-2"], normalize=True),
+    vs.EllipsoidGeodesic(["3", "2", "1"], ["1", "0", "1"], ["1", "0", "-2"], normalize=True),
+    vs.EllipsoidGeodesic(["3", "3", "2", "1"], ["1", "1", "0", "1"], ["1", "2", "0", "-2"], normalize=True),
+]
+
+
+@pytest.mark.parametrize("problem", EQUAL, ids=lambda p: f"{p.system}-{'-'.join(map(str, p.given['A']))}")
+@pytest.mark.parametrize("options", [{"digits": 40}, {"digits": 20, "certified": True}])
+def test_equal_axes_and_resting_directions_have_all_digits(problem: Any, options: dict[str, Any]) -> None:
+    found = decimals(problem, ["-1", "1.5"], **options)
+    digits = options["digits"]
+    for row, t in enumerate((Fraction(-1), Fraction("1.5"))):
+        if problem.system == "neumann":
+            start = [[Fraction(x) for x in problem.given[name]] for name in ("q", "q_prime")]
+            truth = dict(zip(("q", "q_prime"), neumann_at(problem.exact.A, *start, t, digits), strict=True))
+        else:
+            position = geodesic_at(problem.exact.A, *start_of(problem, digits), t, digits)
+            truth = dict(zip(("X", "X_dot"), position, strict=True))
+        for name, values in truth.items():
+            agree(found, name, row, values, digits)
+
+
+def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
+    """Its neighbours leave it like e^s, and it runs through the opposite umbilic point again and again."""
+    problem = vs.EllipsoidGeodesic(*UMBILIC, ["0.4", "1", "-0.3"], normalize=True)
+    found = vs.solve(problem, ["-2", "10"], digits=34)
+    assert found.provenance.details["regime"] == "separatrix"
+    assert found.decimals is not None
+    start = start_of(problem, 45)
+    for row, s in enumerate((-2, 10)):
+        X, V = geodesic_at(problem.exact.A, *start, s, 45)
+        agree(found.decimals, "X", row, X, 34)
+        agree(found.decimals, "X_dot", row, V, 34)
+
+
+@pytest.mark.parametrize("time", ["1", "50", "120", "250", "400"])
+def test_a_separatrix_dwells_at_its_equilibrium_for_ever(time: str) -> None:
+    """q = (sech t, tanh t). Neighbours that have fallen back dwell at the other one, both of them at the same times."""
+    found = decimals(vs.NeumannSystem(["1", "1/2"], ["1", "0"], ["0", "1"]), [time], digits=30)
+    with mpmath.workdps(60):
+        agree(found, "q", 0, [mpmath.sech(mpmath.mpf(time)), mpmath.tanh(mpmath.mpf(time))], 30)
+
+
+def test_a_separatrix_too_far_for_its_bound_is_refused() -> None:
+    with pytest.raises(vs.Unsolved) as refused:
+        vs.solve(vs.NeumannSystem(["1", "1/2"], ["1", "0"], ["0", "1"]), ["1e5"], digits=30)
+    assert refused.value.outcome == "too-far"
+
+
+@pytest.mark.parametrize("problem", [neumann(2), neumann(3), neumann(5), geodesic(2), geodesic(3)], ids=repr)
+def test_thirty_digits_at_a_million_million(problem: Any) -> None:
+    """Digits beyond those asked for change nothing, and doubles are as near as they say."""
+    times = ["1e12"]
+    found, finer, ordinary = decimals(problem, times, digits=30), decimals(problem, times, digits=40), vs.solve(problem, [1e12])
+    assert max(found.error) < Decimal("1e-30")
+    for name in problem.outputs:
+        assert np.all(np.abs(found.midpoints[name] - finer.midpoints[name]) <= found.radii[name] + finer.radii[name]), name
+    for name in problem.bounded:
+        assert np.max(np.abs(ordinary.series(name) - finer.midpoints[name].astype(float))) <= ordinary.error[0] + 1e-16, name
+
+
+def test_neumanns_point_comes_back_from_a_million_million() -> None:
+    problem = neumann(3)
+    there = decimals(problem, ["1e12"], digits=45)
+    state = (list(map(str, there.midpoints[name][0])) for name in ("q", "q_prime"))
+    back = decimals(vs.NeumannSystem(POINTS[3][0], *state, normalize=True), ["-1e12"], digits=25)
+    assert max(abs(x - Decimal(y.numerator) / y.denominator) for x, y in zip(back.midpoints["q"][0], problem.exact.q)) < Decimal(
+        "1e-24"
+    )
+
+
+@pytest.mark.parametrize("count", [400])
+def test_many_times_come_from_windows(count: int) -> None:
+    for problem in (neumann(3), geodesic(3)):
+        times = [str(Fraction(i, 20)) for i in range(count)]
+        found, single = decimals(problem, times, digits=30), decimals(problem, times[-3:], digits=40)
+        for name in problem.outputs:
+            apart = np.abs(found.midpoints[name][-3:] - single.midpoints[name])
+            assert np.all(apart <= found.radii[name][-3:] + single.radii[name]), name
+
+
+@pytest.mark.parametrize("q", [["0", "1", "0"], ["3/5", "4/5", "0"]])
+def test_a_resting_point_keeps_its_frame(q: list[str]) -> None:
+    found = decimals(vs.NeumannSystem(["2", "2", "1"], q, ["0", "0", "0"]), ["-1", "5"], digits=40, certified=True)
+    assert (
+        found.strings("q") == [[str(Decimal(x.numerator) / x.denominator) for x in map(Fraction, q)]] * 2
+        or max(found.error) < 1e-40
+    )
+    for at_time in found.midpoints["frame"]:
+        for exact, x in zip(map(Fraction, q), at_time[:, 0], strict=True):
+            assert abs(x - Decimal(exact.numerator) / exact.denominator) < Decimal("1e-40")
+        assert np.max(np.abs(at_time.T @ at_time - np.eye(3, dtype=int))) < Decimal("1e-39")
+        assert min(abs(abs(x) - 1) for x in at_time[2, 1:]) < Decimal("1e-40")
+    assert not np.any(found.midpoints["q_prime"])
+
+
+@pytest.mark.parametrize("problem", [neumann(3), geodesic(3)], ids=repr)
+def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) -> None:
+    trajectory = vs.solve(problem, ["0.5", "2"], digits=30)
+    expected = trajectory.decimals
+    assert expected is not None
+    import orjson
+
+    stream = io.BytesIO()
+    trajectory.to_npz(stream)
+    stream.seek(0)
+    document = trajectory_of(problem, orjson.loads(encoded(trajectory_document(trajectory))))
+    archive = read_archive(problem, np.load(stream))
+    for found in (document.decimals, archive.decimals, pickle.loads(pickle.dumps(trajectory)).decimals):
+        assert found is not None
+        for name in problem.stored:
+            assert np.all(found.midpoints[name] == expected.midpoints[name]), name
+        for name in problem.outputs:
+            apart = np.abs(found.midpoints[name] - expected.midpoints[name])
+            assert np.all(apart <= found.radii[name] + expected.radii[name]), name
+            assert np.max(found.radii[name]) < Decimal("1e-29"), name
+        assert max(found.error) < Decimal("1e-30")
+
+
+@pytest.mark.parametrize("problem", [neumann(3), geodesic(3)], ids=repr)
+def test_the_service_answers_in_decimals(server: Server, problem: Any) -> None:
+    with vs.Client(server.url) as client:
+        answer = client.trajectory(problem, ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S)
+    here = decimals(problem, ["0.1", 2], digits=40, certified=True)
+    assert answer.decimals is not None
+    assert answer.decimals.certified
+    for name in problem.stored:
+        assert np.all(answer.decimals.midpoints[name] == here.midpoints[name]), name
+
+
+def test_the_command_line_answers_in_decimals() -> None:
+    import json
+
+    A, q, v = POINTS[3]
+    request = {"problem": {"system": "neumann", "A": A, "q": q, "q_prime": v}, "times": ["1/3"], "digits": 40}
+    answer = run("solve", "-", "--json", stdin=json.dumps(request).encode())
+    assert answer.returncode == 0, answer.stderr
+    document = json.loads(answer.stdout)
+    here = decimals(neumann(3), [Fraction(1, 3)], digits=40)
+    assert document["series"]["q_prime"] == here.strings("q_prime")
+    assert document["provenance"]["details"]["clock"] == "uniform"
+
+
+def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
+    """Taylor coefficients of ds/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
+    for n in (3, 5):
+        solution = EnclosedSolution(Solution(geodesic(n)), 50, True, "angles")
+        with solution.arithmetic as xp:
+            width, largest = solution.orbit.strip
+            step = xp.number(width) / 40
+            values = solution.orbit.rates(step * xp.array(list(range(9))))
+            assert np.max(values.astype(float)) <= float(largest)
+            for k in range(1, 9):
+                values = np.diff(values)
+                assert abs(float(values[0])) <= float(step) ** k * float(largest) * width**-k * float(mpmath.factorial(k))
