@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from veselova.service.jobs import JobStatus
     from veselova.service.sweeps import Progress
 
-__all__ = ["JobDocument", "job_document"]
+__all__ = ["JobDocument", "JobList", "job_document"]
 
 
 class JobDocument(BaseModel):
@@ -28,6 +28,12 @@ class JobDocument(BaseModel):
     finished_at: str | None
     request: dict[str, Any] | None = Field(description="the request, its defaults filled in; null in listings and events")
     links: dict[str, str]
+
+
+class JobList(BaseModel):
+    """The last jobs, newest first."""
+
+    jobs: list[JobDocument]
 
 
 def job_document(job: JobStatus, progress: Progress | None, trajectories: bool) -> dict[str, Any]:

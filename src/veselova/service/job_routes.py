@@ -15,8 +15,9 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.admission import require_acceptable
 from veselova.service.download import MEDIA_TYPES
-from veselova.service.job_document import JobDocument, job_document
+from veselova.service.job_document import JobDocument, JobList, job_document
 from veselova.service.job_service import JobService
+from veselova.service.json_schemas import PREFIX
 from veselova.service.negotiation import accepted_type
 from veselova.service.problem_details import Refused
 from veselova.service.reading import Reader
@@ -29,16 +30,20 @@ __all__ = ["job_router"]
 #: Longest Idempotency-Key.
 _LONGEST_KEY = 255
 
+#: The path of one job.
+_ONE = "/v1/jobs/{job_id}"
+
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
 
 _BODY = {
     "requestBody": {
         "required": True,
-        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/SweepRequest"}}},
+        "content": {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}},
     }
 }
 _JOB: dict[int | str, dict[str, Any]] = {200: {"model": JobDocument, "description": "The job"}}
+_LIST: dict[int | str, dict[str, Any]] = {200: {"model": JobList, "description": "The jobs"}}
 _ACCEPTED: dict[int | str, dict[str, Any]] = {202: {"model": JobDocument, "description": "The job, at Location"}}
 _REMOVED: dict[int | str, dict[str, Any]] = {204: {"description": "The job is forgotten"}}
 
@@ -61,20 +66,31 @@ _Remove = Annotated[bool, Query(description="forget the job and its results, too
 def job_router(reader: Reader, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
     routes, jobs = APIRouter(tags=["sweeps"]), _JobRoutes(reader, service)
-    table: tuple[tuple[str, str, Any, str, dict[str, Any], dict[int | str, Any]], ...] = (
-        ("POST", "/v1/sweeps", jobs.sweep, "Solve many problems", {"status_code": 202, "openapi_extra": _BODY}, _ACCEPTED),
-        ("GET", "/v1/jobs", jobs.listed, "List the jobs, newest first", {}, {}),
-        ("GET", "/v1/jobs/{job_id}", jobs.job, "Tell how far a job is", {}, _JOB),
-        ("GET", "/v1/jobs/{job_id}/result", jobs.result, "Give the table of a finished job", {}, _TABLE),
-        ("GET", "/v1/jobs/{job_id}/trajectories", jobs.trajectories, "Give the trajectories that a job kept", {}, _ARCHIVE),
-        ("DELETE", "/v1/jobs/{job_id}", jobs.end, "Cancel a job, or remove it", {}, {**_JOB, **_REMOVED}),
+    accepted: dict[str, Any] = {"status_code": 202, "openapi_extra": _BODY}
+    table: tuple[tuple[str, str, Any, str, str, dict[str, Any], dict[int | str, Any]], ...] = (
+        ("POST", "/v1/sweeps", jobs.sweep, "create_sweep", "Solve many problems", accepted, _ACCEPTED),
+        ("GET", "/v1/jobs", jobs.listed, "list_jobs", "List the jobs, newest first", {}, _LIST),
+        ("GET", _ONE, jobs.job, "get_job", "Tell how far a job is", {}, _JOB),
+        ("GET", f"{_ONE}/result", jobs.result, "get_job_result", "Give the table of a finished job", {}, _TABLE),
+        (
+            "GET",
+            f"{_ONE}/trajectories",
+            jobs.trajectories,
+            "get_job_trajectories",
+            "Give the trajectories that a job kept",
+            {},
+            _ARCHIVE,
+        ),
+        ("DELETE", _ONE, jobs.end, "cancel_job", "Cancel a job, or remove it", {}, {**_JOB, **_REMOVED}),
     )
-    for method, path, endpoint, summary, options, responses in table:
-        routes.add_api_route(path, endpoint, methods=[method], summary=summary, responses=responses, **options)
+    for method, path, endpoint, operation, summary, options, responses in table:
+        described: dict[str, Any] = {"operation_id": operation, "summary": summary, "responses": responses, **options}
+        routes.add_api_route(path, endpoint, methods=[method], **described)
     # The check comes before the stream: an event stream that has begun can no longer be refused.
     routes.add_api_route(
-        "/v1/jobs/{job_id}/events",
+        f"{_ONE}/events",
         jobs.events,
+        operation_id="watch_job",
         summary="Tell each time that a job moves on",
         response_class=EventSourceResponse,
         dependencies=[Depends(jobs.require)],

@@ -42,11 +42,12 @@ _DRAWS = [
     {"type": "object", "properties": {name: _PAIR}, "required": [name], "additionalProperties": False}
     for name in ("uniform", "log_uniform", "normal")
 ]
+_LIST = {"type": "array", "items": {"description": "a value of the same shape as in the problem"}, "minItems": 1}
 _VARY = {
     "type": "object",
     "minProperties": 1,
     "propertyNames": {"pattern": "^/"},
-    "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, _GRID, *_DRAWS]},
+    "additionalProperties": {"anyOf": [_LIST, _GRID, *_DRAWS]},
 }
 
 #: Axes of more values, all together, are none, whatever the server allows.

@@ -1,0 +1,129 @@
+"""The OpenAPI document as generators of clients read it, and the JSON schemas one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import jsonschema_rs
+import pytest
+
+from conftest import Server
+from veselova.service.app import create_app
+from veselova.service.examples import BODY4, BODY4_PROBLEM
+from veselova.service.json_schemas import PREFIX, schema_document, schema_names
+from veselova.service.settings import Settings
+from veselova.service.systems import SYSTEMS
+
+#: Names of functions in generated clients: programs of users call them, so that none may change or go.
+OPERATIONS = {
+    "cancel_job",
+    "check_health",
+    "check_readiness",
+    "compare_engines",
+    "compute_torus",
+    "create_sweep",
+    "get_job",
+    "get_job_result",
+    "get_job_trajectories",
+    "get_schema",
+    "get_trajectory",
+    "head_trajectory",
+    "list_jobs",
+    "list_schemas",
+    "list_systems",
+    "solve_trajectory",
+    "watch_job",
+}
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The OpenAPI document of a server that is not running."""
+    return create_app(Settings(data_dir=tmp_path_factory.mktemp("data")), loopback=True).openapi()
+
+
+def parts(value: Any, place: str = "#") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield all objects within a document and where they stand."""
+    if isinstance(value, dict):
+        yield place, value
+    children = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, child in children:
+        yield from parts(child, f"{place}/{str(name).replace('~', '~0').replace('/', '~1')}")
+
+
+def test_every_array_says_what_it_holds(document: dict[str, Any]) -> None:
+    arrays = [(place, part) for place, part in parts(document) if part.get("type") == "array"]
+    assert len(arrays) > 50
+    assert [place for place, part in arrays if "items" not in part] == []
+
+
+def test_every_operation_has_its_own_name_for_good(document: dict[str, Any]) -> None:
+    names = [operation["operationId"] for operations in document["paths"].values() for operation in operations.values()]
+    assert len(names) == len(set(names))
+    assert set(names) == OPERATIONS
+
+
+def test_every_reference_resolves_and_every_schema_is_referred_to(document: dict[str, Any]) -> None:
+    known = {place for place, _ in parts(document)}
+    found = {part["$ref"] for _, part in parts(document) if isinstance(part.get("$ref"), str)}
+    targets = {target for _, part in parts(document) for target in part.get("discriminator", {}).get("mapping", {}).values()}
+    assert found | targets <= known
+    assert found == {PREFIX + name for name in document["components"]["schemas"]}
+
+
+def test_bodies_and_parameters_can_be_refused(document: dict[str, Any]) -> None:
+    for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori", "/v1/sweeps"):
+        assert {"400", "413", "415", "422"} < set(document["paths"][path]["post"]["responses"]), path
+
+
+def test_all_refusals_are_problem_documents(document: dict[str, Any]) -> None:
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            for status, response in operation["responses"].items():
+                if status >= "400" and method != "head":
+                    assert list(response["content"]) == ["application/problem+json"], (path, method, status)
+
+
+@pytest.mark.parametrize("name", schema_names())
+def test_each_schema_stands_alone(name: str) -> None:
+    schema = schema_document(name)
+    jsonschema_rs.meta.validate(schema)
+    known = {place for place, _ in parts(schema)}
+    found = {part["$ref"] for _, part in parts(schema) if isinstance(part.get("$ref"), str)}
+    assert found <= known
+    assert {reference.split("/")[-1] for reference in found} == set(schema["$defs"])
+
+
+def test_schemas_tell_requests_from_what_is_none() -> None:
+    request = jsonschema_rs.Draft202012Validator(schema_document("TrajectoryRequest"))
+    assert request.is_valid(BODY4)
+    assert not request.is_valid({**BODY4, "no_such_field": 1})
+    assert not request.is_valid({"problem": BODY4_PROBLEM})
+    sweep = jsonschema_rs.Draft202012Validator(schema_document("SweepRequest"))
+    for value in (["7/2", 4], {"start": 3, "stop": 4, "count": 11}, {"uniform": [3, 4]}):
+        assert sweep.is_valid({"problem": BODY4_PROBLEM, "vary": {"/A/0": value}})
+    for value in ([], 3, {"start": 3}):
+        assert not sweep.is_valid({"problem": BODY4_PROBLEM, "vary": {"/A/0": value}})
+
+
+def test_the_server_gives_its_schemas(server: Server) -> None:
+    listed = server.get("/v1/schemas").json()["schemas"]
+    assert {item["name"] for item in listed} == set(schema_names())
+    assert {"TrajectoryRequest", "ComparisonRequest", "TorusRequest", "SweepRequest"} < {item["name"] for item in listed}
+    for item in listed:
+        answer = server.get(item["link"])
+        assert answer.headers["content-type"] == "application/schema+json"
+        assert answer.json() == schema_document(item["name"])
+    for item in server.get("/v1/systems").json()["systems"]:
+        schema = server.get(item["schema"]).json()
+        assert schema["properties"]["system"]["const"] == item["system"]
+        assert set(schema["properties"]) == {"system", *item["fields"]}
+    assert len(server.get("/v1/systems").json()["systems"]) == len(SYSTEMS)
+
+
+@pytest.mark.parametrize("name", ["NoSuchModel", "trajectoryrequest", "%00", "a" * 3000])
+def test_a_schema_of_no_name_is_not_found(server: Server, name: str) -> None:
+    answer = server.get(f"/v1/schemas/{name}")
+    assert answer.status_code == 404
+    assert answer.json()["type"] == "urn:veselova:problem:no-such-resource"
