@@ -34,7 +34,7 @@ from veselova.analytic.solution import Solution
 from veselova.analytic.spectrum import resolved
 from veselova.mechanics.archive import read_archive
 from veselova.mechanics.decimals import Decimals
-from veselova.mechanics.times import exact_times
+from veselova.mechanics.times import TimeGrid
 from veselova.service.documents import encoded, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
@@ -194,8 +194,8 @@ def test_strings_are_taken_exactly_and_doubles_as_what_they_store() -> None:
 
 def test_times_in_an_array_are_taken_as_exactly_as_in_a_list(server: Server) -> None:
     times = np.array(["1/3", 2], dtype=object)
-    assert exact_times(times)[0] == (Fraction(1, 3), 2)
-    assert exact_times(np.array([0.1]))[0] == (Fraction(0.1),)
+    assert TimeGrid.of(times).exact == (Fraction(1, 3), 2)
+    assert TimeGrid.of(np.array([0.1])).exact == (Fraction(0.1),)
     with vs.Client(server.url) as client:
         answers = [
             solve(body3(), given, digits=25).decimals for solve in (vs.solve, client.trajectory) for given in (times, list(times))

@@ -16,7 +16,7 @@ from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
 from veselova.mechanics.errors import VeselovaError, shown
 from veselova.mechanics.exact import exact_number, plain
-from veselova.mechanics.times import uniform_times, validated_times
+from veselova.mechanics.times import TimeGrid
 
 
 def test_numerals_given_as_texts_are_shown_as_texts() -> None:
@@ -82,7 +82,7 @@ def test_bad_input_is_refused_by_name(field: str, changes: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize(
-    "times", [[], [float("nan")], [0, float("inf")], [0, 0], [1, 0], ["a"], [True], 3.0, "0,1", None, [[0, 1]], {"start": 0}]
+    "times", [[], [float("nan")], [0, float("inf")], ["a"], [True], float("nan"), "0,1", None, [[0, 1]], {"start": 0}]
 )
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
 def test_bad_times_are_refused(times: Any, engine: str) -> None:
@@ -138,16 +138,18 @@ def test_no_value_of_any_shape_escapes_validation(value: Any) -> None:
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=6))
 def test_times_are_kept_to_the_last_bit(times: list[float]) -> None:
-    ordered = sorted(set(times))
-    assert validated_times(ordered).tolist() == ordered
+    assert TimeGrid.of(times).asked.tolist() == times
 
 
 def test_uniform_times_include_both_ends() -> None:
-    assert uniform_times(0.0, 1.0, 5).tolist() == [0, 0.25, 0.5, 0.75, 1]
-    assert uniform_times(2.0, 2.0, 1).tolist() == [2.0]
+    def uniform(*grid: float) -> TimeGrid:
+        return TimeGrid.of(dict(zip(("start", "stop", "count"), grid, strict=True)))
+
+    assert uniform(0.0, 1.0, 5).doubles.tolist() == [0, 0.25, 0.5, 0.75, 1]
+    assert uniform(2.0, 2.0, 1).doubles.tolist() == [2.0]
     for bad in ((0.0, 1.0, 0), (1.0, 0.0, 3), (-1e308, 1e308, 3)):
         with pytest.raises(InvalidInput):
-            uniform_times(*bad)
+            uniform(*bad)
 
 
 def test_normalize_scales_and_projects_first() -> None:

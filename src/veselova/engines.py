@@ -14,6 +14,7 @@ from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_doubl
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import require_truth_value
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -39,7 +40,12 @@ def solve(
     certified: bool = False,
     formulation: str | None = None,
 ) -> Trajectory:
-    """Return the motion of a problem at the given times (the start is t = 0; negative times are fine).
+    """Return the motion of a problem at the given times, in the order in which they are given; the start is t = 0.
+
+    ``times``: a number, a list or array of numbers in any order, or a mapping of start, stop and count. A text ("0.1", "1/3"), a
+    Fraction, a Decimal or a whole number is taken exactly: ``trajectory.times`` has the nearest doubles, and
+    ``trajectory.remainders`` the rest. The points between start and stop are those of ``numpy.linspace`` where both ends are
+    doubles, else exact.
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``; None takes the closed form where
     the problem has one, ``problem.default_engine``. ``method``: None for the engine's default; analytic: ``theta``,
@@ -128,7 +134,8 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
     if isinstance(problem, Problem) and len(problem.engines) < len(ENGINES):
         given = f"{problem.system}, which {' and '.join(problem.engines)} alone solves"
         raise InvalidInput(("problem",), "a system that both engines solve", given)
-    return Comparison(solve(problem, times, "analytic"), solve(problem, times, "numeric", method))
+    grid = TimeGrid.of(times)
+    return Comparison(solve(problem, grid, "analytic"), solve(problem, grid, "numeric", method))
 
 
 def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any) -> tuple[NDArray[Any], NDArray[Any]]:

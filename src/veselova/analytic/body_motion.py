@@ -23,6 +23,7 @@ from veselova.mechanics.exact import exact_number, exact_vector
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separation import family_polynomial
 from veselova.mechanics.sphere import exact_cross
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.veselova_so3 import VeselovaSO3
 
 __all__ = ["BodyMotion"]
@@ -66,11 +67,11 @@ class BodyMotion(Motion[VeselovaSO3]):
         gamma, Omega = (tuple(map(Fraction, (problem.axes.T @ v).tolist())) for v in (problem.gamma, problem.Omega))
         return gamma, Omega
 
-    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
-        orbit.require_panels(grid)  # e_2 and e_3 turn by an integral along the orbit
-        clock = orbit.clock(grid)
-        tau, z = clock.tau1(grid)
+        orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
+        clock = orbit.clock(grid.doubles)
+        tau, z = clock.tau1(grid.doubles, grid.remainders)
         largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
         low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
         panels = integrated(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
@@ -79,7 +80,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         frame = self._frame(gamma, lines, -panels.at(tau))
         error, along = orbit.error(tau, clock, self._turning_steepness)
         error = error + panels.error(tau) + panels.mean_size * along
-        error = orbit.require_digit(error, grid)
+        error = orbit.require_digit(error, grid.doubles)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(clock)
 

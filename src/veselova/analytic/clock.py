@@ -166,8 +166,8 @@ class Clock(ABC):
     name: ClassVar[str]
 
     @abstractmethod
-    def tau1(self, times: Array) -> tuple[Array, Array]:
-        """Return (τ₁, z modulo 2) at physical times."""
+    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
+        """Return (τ₁, z modulo 2) at physical times, doubles (N,) and their remainders (N,), which z takes with all digits."""
 
     @property
     @abstractmethod
@@ -213,9 +213,9 @@ class UniformClock(Clock):
         """Return (0, z): the mean time is the time."""
         return np.zeros_like(means), self._in_time.phases(means)
 
-    def tau1(self, times: Array) -> tuple[Array, Array]:
+    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
         """Return (τ₁, z)."""
-        return times / self._rate, self._in_time.phases(times)
+        return times / self._rate, self._in_time.phases(times, remainders)
 
     def time(self, tau1: Array) -> Array:
         """Return τ₁ in the problem's unit."""

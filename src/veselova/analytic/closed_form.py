@@ -16,6 +16,7 @@ from veselova.analytic.theta import Theta
 from veselova.mechanics.closed_form import ClosedForm
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.version import __version__
 
@@ -138,7 +139,7 @@ def _error(solution: Solution, accuracy: float) -> dict[str, float]:
     route, far = Route(solution, "theta"), _CYCLES / solution.fastest
     errors = []
     for time in (0.0, far):
-        horizon = route.to(np.array([time]))
+        horizon = route.to(TimeGrid.of([time]))
         name = None if solution.problem.time == "tau1" else "fourier"
         errors.append(_OWN_ROUNDING * float(route.along(horizon, horizon.clock(name))[1][0]))
     growth = max(0.0, errors[1] - errors[0])

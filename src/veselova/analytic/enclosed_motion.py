@@ -24,7 +24,7 @@ from veselova.analytic.reduction import moving_part
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals, Later, Pair
 from veselova.mechanics.errors import InvalidInput, Unsolved
-from veselova.mechanics.times import exact_times
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.version import __version__
@@ -64,9 +64,10 @@ class EnclosedMotion:
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
-        began, (exact, grid) = time.perf_counter(), exact_times(times)
+        began, asked = time.perf_counter(), TimeGrid.of(times, exact=True)
+        exact, grid = asked.exact, asked.doubles
         if not (any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)):
-            return self._resting(grid, began)
+            return self._resting(asked, began)
         solution = Solution(self.problem)
         horizon = Horizon(solution, grid)
         clock = horizon.clock()
@@ -84,7 +85,7 @@ class EnclosedMotion:
             missing = found.missing(self.digits, working)
             if missing <= 0:
                 details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
-                return self._trajectory(method, grid, found, details, began)
+                return self._trajectory(method, asked, found, details, began)
             working += missing + _MORE
         raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
 
@@ -95,21 +96,21 @@ class EnclosedMotion:
         short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
         return "theta" if short and not self.certified else "angles"
 
-    def _resting(self, grid: NDArray[np.float64], began: float) -> Trajectory:
+    def _resting(self, asked: TimeGrid, began: float) -> Trajectory:
         working = 2 * self.digits + _SPARE
         with balls(working, self.certified) as xp:
-            found = _Found.of(self.problem, resting_series(self.problem, grid.size, xp), xp)
+            found = _Found.of(self.problem, resting_series(self.problem, asked.doubles.size, xp), xp)
         details = {"regime": "rest", "working_digits": working, "certified": self.certified}
-        return self._trajectory("rest", grid, found, details, began)
+        return self._trajectory("rest", asked, found, details, began)
 
-    def _trajectory(
-        self, method: str, grid: NDArray[np.float64], found: _Found, details: Mapping[str, Any], began: float
-    ) -> Trajectory:
+    def _trajectory(self, method: str, asked: TimeGrid, found: _Found, details: Mapping[str, Any], began: float) -> Trajectory:
+        if asked.places is not None:
+            found = found.at(asked.places)
         decimals = found.decimals(self.digits, self.certified)
         arrays = {name: found.rounded(name) for name in self.problem.stored}
         error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
         provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
-        return Trajectory(self.problem, grid, error, arrays, provenance, self, decimals)
+        return Trajectory(self.problem, asked.asked, error, arrays, provenance, self, decimals, asked.asked_remainders)
 
     def _attempt(
         self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], clock: Clock, reach: float
@@ -136,6 +137,11 @@ class _Found:
         radius = np.frompyfunc(lambda x: x.rad() if x.is_finite() else unknown, 1, 1)
         radii = [radius(series[name]).reshape(len(series[name]), -1) for name in problem.bounded]
         return cls(problem, arithmetic, series, np.max(np.concatenate(radii, axis=1), axis=1))
+
+    def at(self, places: NDArray[np.intp]) -> _Found:
+        """Return the series at the times of these places."""
+        series = {name: values[places] for name, values in self.series.items()}
+        return _Found(self.problem, self.arithmetic, series, self.spread[places])
 
     def missing(self, digits: int, working: int) -> int:
         """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""

@@ -40,8 +40,17 @@ class Filling:
     So the answer is written by long rows, in three fifths of the time of short ones, and functions of many states run along them.
     """
 
-    def __init__(self, times: Array, fewest: int, clock: Clock, rates: Array, evaluation: Evaluation) -> None:
+    def __init__(
+        self,
+        times: Array,
+        fewest: int,
+        clock: Clock,
+        rates: Array,
+        evaluation: Evaluation,
+        remainders: Array | None = None,
+    ) -> None:
         self._times, self._fewest, self._clock, self._rates, self._evaluation = times, fewest, clock, rates, evaluation
+        self._remainders = remainders
         self._error, self._open = np.zeros(times.size), np.ones(times.size, dtype=bool)
         self._shapes: list[tuple[int, ...]] = []
         self._evaluations = 0
@@ -55,7 +64,7 @@ class Filling:
         rest = np.flatnonzero(self._open)
         for k in range(0, rest.size, AT_ONCE):
             rows = rest[k : k + AT_ONCE]
-            tau1, z = self._clock.tau1(self._times[rows])
+            tau1, z = self._clock.tau1(self._times[rows], self._remainders_at(rows))
             _, series = self._evaluation(tau1, z)
             self._evaluations += rows.size
             self._shapes = [part.shape[1:] for part in series]
@@ -100,6 +109,10 @@ class Filling:
         begins = np.flatnonzero(first != np.append(-1, last[:-1])).tolist()
         for run in map(slice, begins, [*begins[1:], first.size]):  # windows that adjoin
             rows = slice(first[run][0], last[run][-1])
-            pieces[run].fill(self._times[rows], starts[run], ahead[run], self._states[:, rows])
+            out, remainders = self._states[:, rows], self._remainders_at(rows)
+            pieces[run].fill(self._times[rows], starts[run], ahead[run], out, remainders)
             self._open[rows] = False
             self._error[rows] = np.repeat(2 * tails[run] + SUM_ROUNDING, (last - first)[run])
+
+    def _remainders_at(self, rows: slice | Places) -> Array | None:
+        return None if self._remainders is None else self._remainders[rows]

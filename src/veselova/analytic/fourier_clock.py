@@ -142,9 +142,9 @@ class FourierClock(Clock):
         a, b, c = (float(np.sum(np.abs(coefficients * pace**k))) / (least * d) for k, d in ((1, 1), (2, 3), (3, 12)))
         return float((_OPEN / (self._fastest * (a**3 + 2 * a * b + c))) ** 0.25) if a else np.inf
 
-    def tau1(self, times: Array) -> tuple[Array, Array]:
+    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
         """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0; large modes come first."""
-        uniform, delta = self._in_time.advance(times), np.zeros(times.size)
+        uniform, delta = self._in_time.advance(times, remainders), np.zeros(times.size)
         reach, mean, rates = np.full(times.size, self._reach), self._mean, self._in_tau1.rates
 
         def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:

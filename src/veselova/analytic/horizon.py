@@ -26,11 +26,11 @@ _MOST_CYCLES = 1e28
 class Horizon:
     """Times (N,), increasing, at which one solution is wanted; ``method``: the route to the attitude, None for the default.
 
-    cycles: the most that any phase makes between t = 0 and the times
+    remainders: what exact times are beyond the doubles · cycles: the most that any phase makes between t = 0 and the times
     """
 
-    def __init__(self, solution: Solution, times: Array, method: str | None = None) -> None:
-        self.solution, self.times, self.method = solution, times, method
+    def __init__(self, solution: Solution, times: Array, method: str | None = None, remainders: Array | None = None) -> None:
+        self.solution, self.times, self.method, self.remainders = solution, times, method, remainders
         self.cycles = solution.fastest * max(abs(times.item(0)), abs(times.item(-1)))
 
     @property
@@ -58,7 +58,7 @@ class Horizon:
         """Return the windows in which many times are interpolated where that is cheaper with the clock and the method has any."""
         none = self.times.size < FEW_TIMES or self.method in ("products", "nufft")
         fewest = self.times.size + 1 if none else self.costs.fewest_in_window(NODES, clock)
-        return Windows(self.times, self.solution.fastest, fewest)
+        return Windows(self.times, self.solution.fastest, fewest, self.remainders)
 
     def clock(self, name: str | None = None) -> Clock:
         """Return a clock for the times: ``fourier`` or ``panels``, by cost where no name is given.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.problem import Problem, Series
-from veselova.mechanics.times import validated_times
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.trajectory import Provenance, Trajectory
 
 __all__ = ["Motion"]
@@ -37,17 +37,17 @@ class Motion(ABC, Generic[P]):
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times."""
-        return self.along(validated_times(times))
+        return self.along(TimeGrid.of(times))
 
-    def along(self, grid: Array) -> Trajectory:
-        """Return the trajectory at validated times."""
+    def along(self, grid: TimeGrid) -> Trajectory:
+        """Return the trajectory at validated times, in the order in which they were asked for."""
         began = time.perf_counter()
         if self._rests:
             provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
         series, error, method, details = self._evaluated(grid)
         provenance = Provenance.since(began, "analytic", method, details)
-        return Trajectory(self.problem, grid, _SAFETY * error, series, provenance, dense=self)
+        return Trajectory.on_grid(self.problem, grid, _SAFETY * error, series, provenance, self)
 
     @property
     def _rests(self) -> bool:
@@ -55,5 +55,5 @@ class Motion(ABC, Generic[P]):
         return not self.problem.moves
 
     @abstractmethod
-    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         """Return the series of a problem that moves, their error before the safety factor, the method and its details."""

@@ -68,15 +68,19 @@ class LinearFlow:
     def _halves(self) -> tuple[Array, Array]:
         return halves(self.rates)
 
-    def advance(self, x: Array) -> Array:
+    def advance(self, x: Array, remainders: Array | None = None) -> Array:
         """Return x·(rates + rests) modulo 2, shape (N, g), to one rounding of the reduced value.
 
-        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
+        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact. ``remainders`` (N,) are what the
+        times are beyond x, at most a rounding of it: their products with the rests are below 2^−106 of x·rate.
         """
         column = x[:, None]
         product, error = exact_product(column, self.rates, self._halves)
-        return np.asarray(np.fmod(product, 2.0) + (error + column * self.rests))
+        error += column * self.rests
+        if remainders is not None:
+            error += remainders[:, None] * self.rates
+        return np.asarray(np.fmod(product, 2.0) + error)
 
-    def phases(self, x: Array) -> Array:
+    def phases(self, x: Array, remainders: Array | None = None) -> Array:
         """Return z(x), reduced as ``advance`` is."""
-        return self.start + self.advance(x)
+        return self.start + self.advance(x, remainders)

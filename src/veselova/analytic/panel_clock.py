@@ -108,11 +108,13 @@ class PanelClock(Clock):
         """Return t at Neumann times within the panels."""
         return self.panels.at(tau1)
 
-    def tau1(self, times: Array) -> tuple[Array, Array]:
+    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
         """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's polynomial."""
         panels = self.panels
         panel = panels.panel_of(panels.values, times)
         target = times - panels.values[panel]
+        if remainders is not None:
+            target += remainders
         x = 2 * target / (panels.values[panel + 1] - panels.values[panel]) - 1
 
         def excess(x: Array, rows: Rows) -> tuple[Array, Array]:

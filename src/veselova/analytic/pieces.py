@@ -105,10 +105,10 @@ class Pieces:
             return self
         return Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
-    def fill(self, times: Array, starts: Array, ahead: Array, out: Array) -> None:
+    def fill(self, times: Array, starts: Array, ahead: Array, out: Array, remainders: Array | None = None) -> None:
         """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start at starts + ahead, (W,) both.
 
-        Starts of few bits are taken from the times exactly; only then comes what has all its digits.
+        Starts of few bits are taken from the times exactly; only then comes what has all its digits, remainders of times too.
         """
         begins = np.repeat(starts, self.borders.shape[1] - 1)
         offsets, scales = (ahead[:, None] + self.borders[:, :-1]).ravel(), (2 / np.diff(self.borders)).ravel()
@@ -118,6 +118,8 @@ class Pieces:
             counts = np.diff(np.clip(ends - first, 0, block.size), prepend=0)
             x = block - np.repeat(begins, counts)
             x -= np.repeat(offsets, counts)
+            if remainders is not None:
+                x += remainders[first : first + _PLACED]
             x *= np.repeat(scales, counts)
             x -= 1
             self._sum(x, counts, out[:, first : first + block.size])

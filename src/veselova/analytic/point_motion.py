@@ -14,6 +14,7 @@ from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart, drawn_apart
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
+from veselova.mechanics.times import TimeGrid
 
 __all__ = ["PointMotion"]
 
@@ -38,12 +39,12 @@ class PointMotion(Motion[SeparableVeselova]):
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
         return SeparableOrbit(SeparableStart(drawn_apart(inverse), q, v, self.problem.polynomial, walls, size))
 
-    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
-        clock = orbit.clock(grid)
-        tau, z = clock.tau1(grid)
+        clock = orbit.clock(grid.doubles)
+        tau, z = clock.tau1(grid.doubles, grid.remainders)
         at, velocity = orbit.states(z)
         series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
-        error = orbit.require_digit(orbit.error(tau, clock)[0], grid)
+        error = orbit.require_digit(orbit.error(tau, clock)[0], grid.doubles)
         return series, error, "angles", orbit.details(clock)

@@ -22,7 +22,7 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
     series = {"Omega": np.cross(point.series("q_dot"), frame[:, :, 0]), "frame": frame}
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     decimals = None if point.decimals is None else _decimals(problem, point.decimals)
-    return Trajectory(problem, point.times, point.error, series, point.provenance, dense, decimals)
+    return Trajectory(problem, point.times, point.error, series, point.provenance, dense, decimals, point.remainders)
 
 
 def _motion_at(problem: VeselovaSO3, dense: Callable[[Any], Trajectory], times: Any) -> Trajectory:

@@ -13,6 +13,7 @@ from veselova.analytic.error import ErrorBound
 from veselova.analytic.filling import Along
 from veselova.analytic.horizon import Horizon
 from veselova.analytic.solution import Solution
+from veselova.mechanics.times import TimeGrid
 
 __all__ = ["METHODS", "Route"]
 
@@ -34,9 +35,9 @@ class Route:
         """Return the method."""
         return self.given or self.solution.default_method()
 
-    def to(self, times: Array) -> Horizon:
-        """Return what the times (N,) ask for."""
-        return Horizon(self.solution, times, self.given)
+    def to(self, times: TimeGrid) -> Horizon:
+        """Return what the times ask for."""
+        return Horizon(self.solution, times.doubles, self.given, times.remainders)
 
     def along(self, horizon: Horizon, clock: Clock) -> tuple[Along, Array]:
         """Return the motion, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.

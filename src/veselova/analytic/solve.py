@@ -22,7 +22,7 @@ from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
-from veselova.mechanics.times import validated_times
+from veselova.mechanics.times import TimeGrid
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.trajectory import Trajectory
 from veselova.mechanics.veselova_so3 import VeselovaSO3
@@ -68,7 +68,7 @@ def solve(
     BackendMissing for ``nufft`` without finufft.
     ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about 1e-14 at t of order 10².
     """
-    grid = validated_times(times)
+    grid = TimeGrid.of(times, beyond_double(digits, certified))
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
@@ -76,7 +76,7 @@ def solve(
         _require_exact_axes(problem, digits, certified)
         options: Any = {"method": method, "clock": clock, "digits": digits, "certified": certified, "solution": solution}
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
-        return motion_of_body(problem, solve(point, times, **options))
+        return motion_of_body(problem, solve(point, grid, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
@@ -92,7 +92,7 @@ def solve(
         raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
     from veselova.analytic.enclosed_motion import EnclosedMotion
 
-    return EnclosedMotion(problem, digits, certified, method)(times)
+    return EnclosedMotion(problem, digits, certified, method)(grid)
 
 
 def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
@@ -104,7 +104,7 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
 
 
 def _separable_motion(
-    problem: VeselovaSO3 | SeparableVeselova, grid: Array, method: str | None, clock: str | None, beyond: bool
+    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, method: str | None, clock: str | None, beyond: bool
 ) -> Trajectory:
     """Return the motion in a separable potential; it has one method, one choice of clocks and 15 digits."""
     for field, given, allowed in (("method", method, (None, "angles")), ("clock", clock, (None,)), ("digits", beyond, (False,))):
@@ -155,15 +155,15 @@ class _TorusMotion(Motion[TorusProblem]):
         further = "; ask for more digits, which come from the exact data" if self.problem.axes is None else ""
         return f"on a separatrix the data determine the motion, and doubles do not{further}"
 
-    def _evaluated(self, grid: Array) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         route = self._route
         horizon = route.to(grid)
         clock = horizon.clock(self.clock)
         along, error = route.along(horizon, clock)
         if self._departure is not None:
-            error = np.maximum(error, self._departure.at(grid))
+            error = np.maximum(error, self._departure.at(grid.doubles))
         if not error.max() <= _NO_DIGIT:  # or it is no number
-            lost = grid[~(error <= _NO_DIGIT)]
+            lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
             cause = self._cause + _OR_CANCELLATION * (route.method == "nufft")
             raise Unsolved("no-digit-left", f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
@@ -185,5 +185,6 @@ class _TorusMotion(Motion[TorusProblem]):
 
 def _frames(routes: Sequence[Route], clock: str | None, instants: Array) -> list[Array]:
     """Return the frames of several motions at increasing times."""
-    horizons = [route.to(instants) for route in routes]
+    grid = TimeGrid.of(instants)
+    horizons = [route.to(grid) for route in routes]
     return [route.along(horizon, horizon.clock(clock))[0].series[1] for route, horizon in zip(routes, horizons, strict=True)]

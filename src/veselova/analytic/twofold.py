@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.remainders import exact_sum
+
 __all__ = ["Twofold", "exact_product", "exact_sum", "halves", "stacked", "where"]
 
 Array = NDArray[np.float64]
@@ -112,13 +114,6 @@ def halves(x: Array) -> tuple[Array, Array]:
     scaled = _SPLITTER * x
     high = scaled - (scaled - x)
     return high, x - high
-
-
-def exact_sum(a: Array, b: Array) -> tuple[Array, Array]:
-    """Return (s, e) with a + b = s + e exactly, s the rounded sum."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
 
 
 def _ordered_sum(a: Array, b: Array) -> tuple[Array, Array]:

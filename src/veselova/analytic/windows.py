@@ -66,10 +66,11 @@ class Windows:
     """The windows of one orbit at increasing times.
 
     ``fastest`` is the most cycles that a phase makes in a unit of time, ``fewest`` the times that make a window worth its while.
+    ``remainders`` are what exact times are beyond the doubles.
     """
 
-    def __init__(self, times: Array, fastest: float, fewest: int) -> None:
-        self._times, self._fastest, self._fewest = times, fastest, fewest
+    def __init__(self, times: Array, fastest: float, fewest: int, remainders: Array | None = None) -> None:
+        self._times, self._fastest, self._fewest, self._remainders = times, fastest, fewest, remainders
 
     @cached_property
     def _length(self) -> float:
@@ -108,9 +109,9 @@ class Windows:
     def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         if not self._stretches.windows and self._times.size <= AT_ONCE:
-            tau1, z = clock.tau1(self._times)
+            tau1, z = clock.tau1(self._times, self._remainders)
             return Along(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
-        filling = Filling(self._times, self._fewest, clock, rates, evaluation)
+        filling = Filling(self._times, self._fewest, clock, rates, evaluation, self._remainders)
         if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
             cells, count = self._over_stretches(filling, clock)
             for _ in range(MOST_HALVINGS):

@@ -44,6 +44,8 @@ def _arrays(trajectory: Trajectory, outputs: tuple[str, ...]) -> Iterator[tuple[
 def archived_series(trajectory: Trajectory, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yield times, error and the chosen series by the names of their arrays, decimals and their radii as texts as well."""
     yield "times", trajectory.times
+    if trajectory.remainders is not None:
+        yield "remainders", trajectory.remainders
     yield "error", trajectory.error
     for name in outputs:
         yield name, trajectory.series(name)
@@ -79,4 +81,6 @@ def read_archive(problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
             {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
         )
         decimals = Decimals(provenance.digits, bool(provenance.details["certified"]), midpoints, radii, problem.bounded)
-    return Trajectory(problem, archive["times"], archive["error"], series, provenance, decimals=decimals)
+    remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401  an open archive has no get
+    times, error = archive["times"], archive["error"]
+    return Trajectory(problem, times, error, series, provenance, decimals=decimals, remainders=remainders)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.closed_form_evaluation import evaluate
 from veselova.mechanics.closed_form_schema import FORMAT, require_document
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.times import validated_times
+from veselova.mechanics.times import TimeGrid
 
 __all__ = ["ClosedForm", "ClosedFormStates"]
 
@@ -92,13 +92,16 @@ class ClosedForm:
     def at(self, times: Any) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
-        Times are those of the system: t, s or τ₁. Raises InvalidInput for bad times. Accuracy: ``error`` of the states; tested
+        Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve`` takes. Raises
+        InvalidInput for bad times. Accuracy: ``error`` of the states; tested
         for genus 1…4 against the engine, |t| ≤ 10⁴, and to 10¹² for documents of 30 digits.
         """
-        grid = validated_times(times)
-        error = self.document["error"]
-        bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid)
-        return ClosedFormStates(grid, bound, evaluate(self.document, self.arrays, grid))
+        grid, error = TimeGrid.of(times), self.document["error"]
+        bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
+        series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
+        if grid.places is not None:
+            series = {name: values[grid.places] for name, values in series.items()}
+        return ClosedFormStates(grid.asked, bound, series)
 
     def to_json(self, indent: int | None = None) -> str:
         """Return the document as JSON text."""

@@ -24,9 +24,11 @@ _BLOCK = 400_000
 _MOST_STEPS = 200
 
 
-def evaluate(document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array) -> dict[str, Array]:
-    """Return the series of a document at times (N,), by name."""
-    tau1, z = neumann_time(document, arrays, times)
+def evaluate(
+    document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array, remainders: Array | None = None
+) -> dict[str, Array]:
+    """Return the series of a document at times (N,), or at times + remainders, by name."""
+    tau1, z = neumann_time(document, arrays, times, remainders)
     values = np.concatenate([lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)])
     quotients = values / values[:, :1]
 
@@ -68,7 +70,9 @@ def _rows(count: int, block: int) -> list[slice]:
     return [slice(first, first + max(1, block)) for first in range(0, count, max(1, block))]
 
 
-def neumann_time(document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array) -> tuple[Array, Array]:
+def neumann_time(
+    document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array, remainders: Array | None = None
+) -> tuple[Array, Array]:
     """Return τ₁ (N,) and the phases z modulo 2, (N, g).
 
     With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰ + (f/F_0)t + fδ. The left
@@ -76,6 +80,8 @@ def neumann_time(document: Mapping[str, Any], arrays: Mapping[str, Array], times
     """
     f, modes, mean = arrays["frequencies"], arrays["modes"], float(document["mean_rate"])
     advance = _uniform_advance(document, f / mean, times)
+    if remainders is not None:
+        advance += remainders[:, None] * (f / mean)
     delta = np.zeros(len(times))
     if len(modes):
         for rows in _rows(len(times), _BLOCK // len(modes)):

@@ -79,7 +79,9 @@ def _parse(value: Any) -> Fraction:
         return Fraction(value)
     if isinstance(value, Integral):
         return Fraction(int(value))
-    if isinstance(value, Real):  # NumPy's other floating types
+    if isinstance(value, np.floating):  # of any width: longdouble has more digits than a float
+        return Fraction(*value.as_integer_ratio())
+    if isinstance(value, Real):
         return Fraction(float(value))
     raise TypeError("not a number")
 
@@ -161,6 +163,8 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, (Fraction, Decimal)) or type(value) is int:
         return str(value)
+    if isinstance(value, np.longdouble) and np.isfinite(value):
+        return plain(Fraction(*value.as_integer_ratio()))
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +36,9 @@ def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Fig
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
+    trajectory = _by_time(trajectory)
+    if comparison is not None:
+        comparison = replace(comparison, analytic=trajectory, numeric=_by_time(comparison.numeric))
     rows, problem, provenance = 2 if comparison is None else 3, trajectory.problem, trajectory.provenance
     figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
     portrait = trajectory.series(problem.portrait).reshape(trajectory.times.size, -1)
@@ -55,6 +59,22 @@ def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Fig
     axes[-1].set_xlabel(f"time {problem.time}")
     figure.suptitle(f"{problem.title} ({provenance.engine}, {provenance.method})")
     return figure
+
+
+def _by_time(trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory in the order of time, in which lines are drawn; its doubles alone."""
+    order = np.argsort(trajectory.times, kind="stable")
+    if (np.diff(order) == 1).all():
+        return trajectory
+    arrays = {name: values[order] for name, values in trajectory.arrays.items()}
+    return replace(
+        trajectory,
+        times=trajectory.times[order],
+        error=trajectory.error[order],
+        arrays=arrays,
+        decimals=None,
+        remainders=None,
+    )
 
 
 def _draw_drift(axes: Axes, trajectory: Trajectory) -> None:

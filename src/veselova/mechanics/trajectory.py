@@ -17,6 +17,7 @@ from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.table import Table, Target, flat_columns, opened, row_blocks
+from veselova.mechanics.times import TimeGrid
 from veselova.version import __version__
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class Trajectory:
     times (N,) · error (N,) bounds the true error of every component of the problem's ``bounded`` series: true ≤ error
     arrays: the series that do not follow from others, by name, first axis the times, which may be the last in memory
     decimals: the same series to more digits, or with certified errors, where that was asked for
+    remainders (N,) what the exact times, as they were asked for, are beyond ``times``; None where they are doubles
 
     System veselova: q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i, along the body axes of the problem · omega (N, n, n)
     = q∧q̇, equation (44.3) · spheroconic (N, n−1), increasing · tau1 (N,) Neumann time, zero at t = 0
@@ -67,17 +69,34 @@ class Trajectory:
     provenance: Provenance
     dense: Callable[[Any], Trajectory] | None = field(default=None, repr=False)
     decimals: Decimals | None = None
+    remainders: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "arrays", dict(self.arrays))
-        for array in (self.times, self.error, *self.arrays.values()):
-            array.setflags(write=False)
+        for array in (self.times, self.error, self.remainders, *self.arrays.values()):
+            if array is not None:
+                array.setflags(write=False)
 
     @classmethod
-    def at_rest(cls, problem: Problem, times: Array, provenance: Provenance, dense: Callable[[Any], Trajectory]) -> Trajectory:
+    def on_grid(
+        cls,
+        problem: Problem,
+        grid: TimeGrid,
+        error: Array,
+        arrays: Series,
+        provenance: Provenance,
+        dense: Callable[[Any], Trajectory] | None = None,
+    ) -> Trajectory:
+        """Return the trajectory at the times asked for, in their order, from what is known at those of a grid."""
+        if grid.places is not None:
+            error, arrays = error[grid.places], {name: values[grid.places] for name, values in arrays.items()}
+        return cls(problem, grid.asked, error, arrays, provenance, dense, remainders=grid.asked_remainders)
+
+    @classmethod
+    def at_rest(cls, problem: Problem, grid: TimeGrid, provenance: Provenance, dense: Callable[[Any], Trajectory]) -> Trajectory:
         """Return the trajectory of a problem that does not move: its start, to rounding."""
-        arrays = {name: np.repeat(values, times.size, axis=0) for name, values in problem.start.items()}
-        return cls(problem, times, np.full(times.size, np.finfo(float).eps), arrays, provenance, dense)
+        arrays = {name: np.repeat(values, grid.doubles.size, axis=0) for name, values in problem.start.items()}
+        return cls.on_grid(problem, grid, np.full(grid.doubles.size, np.finfo(float).eps), arrays, provenance, dense)
 
     @classmethod
     def of_decimals(
@@ -87,11 +106,12 @@ class Trajectory:
         decimals: Decimals,
         provenance: Provenance,
         dense: Callable[[Any], Trajectory] | None = None,
+        remainders: Array | None = None,
     ) -> Trajectory:
         """Return the trajectory whose arrays are the decimals rounded to doubles, which its error includes."""
         arrays = {name: decimals.midpoints[name].astype(np.float64) for name in problem.stored}
         error = np.nextafter(decimals.error.astype(np.float64), np.inf) + np.finfo(float).eps / 2
-        return cls(problem, times, error, arrays, provenance, dense, decimals)
+        return cls(problem, times, error, arrays, provenance, dense, decimals, remainders)
 
     def series(self, name: str) -> Array:
         """Return one of the problem's outputs by name; raises InvalidInput for another."""
@@ -167,7 +187,10 @@ class Trajectory:
         return chosen
 
     def _table(self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        table: dict[str, NDArray[Any]] = {self.problem.time: self.times, "error": error}
+        table: dict[str, NDArray[Any]] = {self.problem.time: self.times}
+        if self.remainders is not None:
+            table[f"{self.problem.time}_remainder"] = self.remainders
+        table["error"] = error
         for name, values in series.items():
             table |= flat_columns(name, values)
         for name, values in self.integrals.items():
@@ -208,6 +231,8 @@ class Trajectory:
             raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
         variables: dict[str, Any] = {name: (("time", *axes), self.series(name)) for name, axes in self.problem.outputs.items()}
         variables["error"] = (("time",), self.error)
+        if self.remainders is not None:
+            variables["time_remainder"] = (("time",), self.remainders)
         return Dataset(variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict()))
 
     def plot(self) -> Figure:
@@ -217,7 +242,7 @@ class Trajectory:
         return picture(self)
 
     def __repr__(self) -> str:
-        span = f"{self.times.size} times from {self.times[0]:g} to {self.times[-1]:g}"
+        span = f"{self.times.size} times from {self.times.min():g} to {self.times.max():g}"
         how = f"{self.provenance.engine} ({self.provenance.method})"
         return f"<Trajectory: {self.problem.title}, {span}, {how}, error ≤ {np.max(self.error):.2g}>"
 
@@ -225,7 +250,7 @@ class Trajectory:
         rows = {
             "system": self.problem.title,
             "engine": f"{self.provenance.engine} ({self.provenance.method})",
-            "times": f"{self.times.size} from {self.times[0]:g} to {self.times[-1]:g}",
+            "times": f"{self.times.size} from {self.times.min():g} to {self.times.max():g}",
             "largest error": f"{np.max(self.error):.2g}",
             "seconds": f"{self.provenance.seconds:.3g}",
             **{f"drift of {name}": f"{value:.2g}" for name, value in self.drift.items()},

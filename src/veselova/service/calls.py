@@ -10,10 +10,9 @@ from typing import Any, Generic, TypeVar
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.table import Target
-from veselova.mechanics.times import validated_times
+from veselova.mechanics.times import as_request
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Provenance, Trajectory
 from veselova.service.documents import comparison_of, torus_of, trajectory_of
@@ -51,13 +50,6 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
     from veselova.service.schemas import TorusRequest, read_request
 
     return read_request(TorusRequest, {"problem": dict(problem)}).problem.problem()
-
-
-def _times(times: Any) -> Any:
-    if isinstance(times, Mapping):
-        return dict(times)
-    validated_times(times)  # refuses here what the server would
-    return plain(times)
 
 
 def trajectory_call(
@@ -116,7 +108,7 @@ def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) 
 def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
     return {
         "problem": problem.as_request(),
-        "times": _times(times),
+        "times": as_request(times),
         "method": method,
         "outputs": list(problem.stored),
         "budget_s": budget_s,

@@ -48,7 +48,7 @@ def _heading(console: Console, text: str) -> None:
 
 def _describe(trajectory: Trajectory) -> str:
     problem, provenance = trajectory.problem, trajectory.provenance
-    count, shown = trajectory.times.size, _told_apart(trajectory.times[[0, -1]])
+    count, shown = trajectory.times.size, _told_apart(np.array([trajectory.times.min(), trajectory.times.max()]))
     span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
     return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
 

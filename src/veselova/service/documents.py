@@ -48,6 +48,7 @@ def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = 
     return {
         "engine": trajectory.provenance.engine,
         "times": trajectory.times,
+        **({} if trajectory.remainders is None else {"remainders": trajectory.remainders}),
         "series": series,
         "integrals": {name: {"initial": values[0], "drift": drift[name]} for name, values in trajectory.integrals.items()},
         "error": error,
@@ -62,7 +63,12 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         return _with_decimals(problem, document)
     series = {name: np.array(document["series"][name], dtype=np.float64) for name in problem.stored}
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
-    return Trajectory(problem, times, error, series, Provenance(**document["provenance"]))
+    return Trajectory(problem, times, error, series, Provenance(**document["provenance"]), remainders=_remainders(document))
+
+
+def _remainders(document: Mapping[str, Any]) -> Any:
+    """Return what exact times are beyond the doubles of a document, None where that is nothing."""
+    return np.array(document["remainders"], dtype=np.float64) if "remainders" in document else None
 
 
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
@@ -72,7 +78,8 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     for name in problem.derived:
         midpoints[name], radii[name] = problem.derive_decimals(name, midpoints, radii, provenance.digits)
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
-    return Trajectory.of_decimals(problem, np.array(document["times"], dtype=np.float64), decimals, provenance)
+    times = np.array(document["times"], dtype=np.float64)
+    return Trajectory.of_decimals(problem, times, decimals, provenance, remainders=_remainders(document))
 
 
 def comparison_document(comparison: Comparison, outputs: Iterable[str] | None = None) -> dict[str, Any]:

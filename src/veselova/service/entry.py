@@ -99,7 +99,8 @@ def _arrays(trajectory: Trajectory) -> Arrays:
     if trajectory.decimals is not None:
         return dict(archived_series(trajectory, problem.outputs))
     series = {name: values for name, values in trajectory.arrays.items() if name not in problem.derived}
-    return {"times": trajectory.times, "error": trajectory.error, **series}
+    remainders = {} if trajectory.remainders is None else {"remainders": trajectory.remainders}
+    return {"times": trajectory.times, **remainders, "error": trajectory.error, **series}
 
 
 def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> None:
@@ -160,4 +161,5 @@ def unpacked(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
     problem, provenance = asked.problem.problem(), header["provenance"]
     if header["decimals"]:
         return asked, read_archive(problem, {**arrays, "provenance": provenance})
-    return asked, Trajectory(problem, arrays.pop("times"), arrays.pop("error"), arrays, Provenance(**provenance))
+    times, error, remainders = arrays.pop("times"), arrays.pop("error"), arrays.pop("remainders", None)
+    return asked, Trajectory(problem, times, error, arrays, Provenance(**provenance), remainders=remainders)

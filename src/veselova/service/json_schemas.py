@@ -62,7 +62,11 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     "Trajectory": _object(
         {
             "engine": {"type": "string"},
-            "times": _NUMBERS,
+            "times": {**_NUMBERS, "description": "the doubles nearest to the times asked for, in their order"},
+            "remainders": {
+                **_NUMBERS,
+                "description": "what the exact times are beyond these doubles; left out where that is nothing",
+            },
             "series": {
                 **_object(_series(_NUMBER_OR_DECIMAL), required=[]),
                 "description": f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for",

@@ -14,9 +14,8 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
-from veselova.mechanics.exact import exact_number, to_float
 from veselova.mechanics.problem import Problem
-from veselova.mechanics.times import uniform_times, validated_times
+from veselova.mechanics.times import TimeGrid
 from veselova.service.examples import BODY4, BODY4_PROBLEM
 from veselova.service.json_text import layers
 from veselova.service.systems import SYSTEMS, ProblemModel, Request, Times
@@ -58,7 +57,7 @@ class ComparisonRequest(TorusRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
 
-    times: Annotated[Times, Field(description="finite, strictly increasing; the start is t = 0, negative times are fine")]
+    times: Annotated[Times, Field(description="finite, in any order; the start is t = 0, negative times are fine")]
     method: Annotated[str | None, Field(description="analytic: theta, products, nufft, angles; numeric: dop853, taylor")] = None
     formulation: Annotated[str | None, Field(description="numeric: which equations of the system are integrated")] = None
     outputs: Annotated[
@@ -69,25 +68,12 @@ class ComparisonRequest(TorusRequest):
         int, Field(ge=FEWEST_DIGITS, le=FEWEST_DIGITS, description="a comparison has the digits of the numeric engine")
     ] = FEWEST_DIGITS
 
-    def time_grid(self) -> Any:
-        """Return the times asked for, an array or the list given; raises InvalidInput located at ``times``."""
-        if not isinstance(self.times, dict):
-            grid = validated_times(self.times)
-            return self.times if self._exact else grid
-        unknown = [key for key in self.times if key not in ("start", "stop", "count")]
-        if unknown or len(self.times) < 3:
-            given = f"the fields {', '.join(self.times) or 'none'}"
-            raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", shown(given))
-        count = self.times["count"]
-        if isinstance(count, bool) or not isinstance(count, int):
-            raise InvalidInput(("times", "count"), "a whole number", shown(count))
-        exact = [exact_number(self.times[key], ("times", key)) for key in ("start", "stop")]
-        start, stop = to_float(exact).tolist()
-        grid = uniform_times(start, stop, count)
-        if not self._exact:
-            return grid
-        step = (exact[1] - exact[0]) / max(count - 1, 1)
-        return [exact[0] + i * step for i in range(count)]
+    def time_grid(self) -> TimeGrid:
+        """Return the times asked for; raises InvalidInput located at ``times``."""
+        if not isinstance(self.times, (list, dict)):  # Python takes a single number too, the schema of requests does not
+            required = "a list of numbers, or exactly the fields start, stop, count"
+            raise InvalidInput(("times",), required, shown(self.times))
+        return TimeGrid.of(self.times, self._exact)
 
     @property
     def _exact(self) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from veselova.mechanics.errors import BackendMissing, install_extra
+from veselova.mechanics.times import TimeGrid
 from veselova.service.parameters import components, tabulated
 from veselova.service.sweep_request import SweepRequest
 from veselova.service.systems import SYSTEMS
@@ -37,7 +38,10 @@ def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path |
             values = columns[name].to_numpy()
             variables[name] = (dimensions, values.reshape(sweep.shape))
     if trajectories is not None:
-        coordinates["time"] = _times(sweep)
+        grid = _times(sweep)
+        coordinates["time"] = grid.asked
+        if grid.asked_remainders is not None:
+            variables["time_remainder"] = (("time",), grid.asked_remainders)
         variables |= _outputs(sweep, dimensions, trajectories)
     return xarray.Dataset(variables, coordinates, {"request": sweep.canonical.decode()})
 
@@ -56,7 +60,7 @@ def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[s
     return coordinates, variables, given
 
 
-def _times(sweep: SweepRequest) -> Any:
+def _times(sweep: SweepRequest) -> TimeGrid:
     """Return the times of the motions."""
     from veselova.service.schemas import ComparisonRequest, read_request
 

@@ -16,6 +16,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 from veselova.mechanics.errors import InvalidInput, VeselovaError, shown
 from veselova.mechanics.exact import plain
 from veselova.mechanics.problem import Problem
+from veselova.mechanics.times import as_request
 from veselova.mechanics.veselova import Veselova
 from veselova.service.examples import BODY4_PROBLEM
 from veselova.service.parameters import Axis, Draw, Parameter, Path, components, is_double, parameters, replaced, tabulated
@@ -268,6 +269,5 @@ def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any]
     if not isinstance(vary, Mapping):
         raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
     stated = plain(vary)
-    if times is not None and not isinstance(times, Mapping):
-        times = plain(times)
+    times = None if times is None else as_request(times)
     return {"problem": problem.as_request() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
