@@ -273,3 +273,25 @@ def test_the_wheel_works_in_an_empty_environment(wheel: Path, tmp_path: Path) ->
     _pip(environment, f"{wheel}[service]")
     demo = run(environment / "bin" / "veselova", "demo")
     assert demo.returncode == 0, demo.stderr
+
+
+def _locked(name: str) -> set[str]:
+    return {package.lower() for package in re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), re.MULTILINE)}
+
+
+def test_licences_of_all_locked_packages_are_listed() -> None:
+    table = (ROOT / "docs" / "licences.md").read_text()
+    rows = re.findall(r"^\| ([\w.-]+) \| (.+?) \| (runtime|tests) \| (.*) \|$", table, re.MULTILINE)
+    runtime = _locked("requirements.lock")
+    listed = {package: where == "runtime" for package, _, where, _ in rows}
+    assert listed == {package: package in runtime for package in runtime | _locked("requirements-check.lock")}
+    for package, licence, where, remark in rows:
+        assert licence != "not stated", package
+        # The container is given away: nothing in it may be under the GPL, which binds what it is combined with.
+        assert where == "tests" or not re.search(r"\bA?GPL", licence + remark), package
+
+
+def test_both_stages_of_the_container_take_a_base_by_digest() -> None:
+    source = (ROOT / "Dockerfile").read_text()
+    assert re.findall(r"^FROM (\S+)", source, re.MULTILINE) == ["${BASE}", "${BASE}"]
+    assert "@sha256:" in source
