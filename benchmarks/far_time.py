@@ -19,7 +19,7 @@ import numpy as np
 
 import veselova as vs
 from veselova.analytic.solution import Solution
-from veselova.numeric.taylor import Taylor
+from veselova.numeric.heyoka_peer import HeyokaPeer
 
 FAR = 1e6
 
@@ -41,12 +41,10 @@ def main() -> None:
             single.append(time.perf_counter() - began)
         one = statistics.median(single)
 
-        integrator = Taylor(problem.flow(), Taylor.tolerances[0])
-        integrator.advance(problem.flow().initial, 0.0, 10.0, np.empty(0))
+        peer, near = HeyokaPeer(problem), np.array([1000 / speed])
+        peer(near / 100)
         began = time.perf_counter()
-        state = problem.flow().initial
-        for k in range(100):
-            state = problem.flow().project(integrator.advance(state, 10.0 * k, 10.0 * (k + 1), np.empty(0))[1])
+        peer(near)
         integrating = (time.perf_counter() - began) * FAR / 1000
 
         solution = Solution(problem)

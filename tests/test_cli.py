@@ -276,7 +276,7 @@ def test_bench_prints_a_table_that_can_be_pasted() -> None:
     assert f"processors {os.cpu_count()}" in heading
     table = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
     assert table[0] == ["question", "closed form", "peer", "takes", "ratio", "difference"]
-    assert len(table) == 9
+    assert len(table) == 10
     for question, ours, peer, theirs, ratio, difference in table[2:]:
         assert _seconds(theirs) / _seconds(ours) == pytest.approx(float(ratio), rel=0.02), (question, peer)
         assert 0 < float(difference) < 1e-9, (question, peer)
