@@ -2,9 +2,10 @@
 
     python benchmarks/far_time.py      needs the extra `fast`
 
-Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶ after it (median of 9), heyoka's
-time to integrate to t = 1000, measured in the same run and scaled to 10⁶ (cost is proportional to time), their ratio; then the
-reported error, the difference to the same closed form without guard digits, and the conditioning floor ε|ω|t.
+Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶ after it (median of 9),
+heyoka's least time of five to integrate to t = 1000, called as its users call it, in the same run and scaled to 10⁶ (its cost is
+proportional to time), their ratio; then the reported error,
+the difference to the same closed form without guard digits, and the conditioning floor ε|ω|t.
 """
 
 from __future__ import annotations
@@ -31,21 +32,24 @@ def main() -> None:
         problem = vs.Veselova(np.exp(rng.uniform(0, np.log(5), n)), rng.normal(size=n), rng.normal(size=n), normalize=True)
         speed = float(np.linalg.norm(problem.q_dot))
         times = np.array([FAR / speed])
-        began = time.perf_counter()
+        began = time.process_time()
         trajectory = vs.solve(problem, times)
-        setup = time.perf_counter() - began
+        setup = time.process_time() - began
         single = []
         for i in range(9):
-            began = time.perf_counter()
+            began = time.process_time()
             trajectory.at(times * (1 - 1e-7 * i))
-            single.append(time.perf_counter() - began)
+            single.append(time.process_time() - began)
         one = statistics.median(single)
 
         peer, near = HeyokaPeer(problem), np.array([1000 / speed])
         peer(near / 100)
-        began = time.perf_counter()
-        peer(near)
-        integrating = (time.perf_counter() - began) * FAR / 1000
+        integration = []
+        for _ in range(5):
+            began = time.process_time()
+            peer(near)
+            integration.append(time.process_time() - began)
+        integrating = min(integration) * FAR / 1000
 
         solution = Solution(problem)
         unguarded = solution.attitude(solution.fourier_clock(False).tau1(times)[1], "angles")
