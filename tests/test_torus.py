@@ -97,13 +97,15 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(n: int, rng: n
 
 
 @pytest.mark.parametrize("small", [1e-81, 1e-140])
-def test_narrow_intervals_whose_product_is_no_float_are_refused_by_name(small: float) -> None:
-    """Two directions that hardly move make two neighbouring cuts of such widths squared."""
+def test_narrow_intervals_whose_product_is_no_float_are_those_of_a_plane_motion(small: float) -> None:
+    """Two directions that hardly move make two neighbouring cuts of such widths squared; until they grow, a plane is left."""
     problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
-    for ask in (torus, lambda problem: solve(problem, [1.0])):
-        with pytest.raises(Unsolved) as raised:
-            ask(problem)
-        assert raised.value.outcome == "beyond-floats"
+    plane = Veselova([4, 1], [1, 1], [1, -1.5], normalize=True)
+    assert np.isclose(torus(problem).periods[0, 0], torus(plane).periods[0, 0], rtol=1e-14)
+    found, within = solve(problem, [1.0, 10.0]), Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True)
+    integrated = solve(within, [1.0, 10.0], "numeric")
+    assert np.max(found.error) < 1e-11
+    assert np.all(np.abs(found.q - integrated.q) <= (found.error + integrated.error)[:, None])
 
 
 @pytest.mark.parametrize(

@@ -52,20 +52,11 @@ class BodyMotion(Motion[VeselovaSO3]):
         alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
         alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
         moments = list(drawn_apart([problem.moments[i] for i in order]))
-        gamma, Omega = self._exact_start
+        gamma, Omega = problem.along_axes()
         velocity = exact_cross(gamma, Omega)  # scaled as γ is
         x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
         v, walls = family_polynomial(moments, *alphas[:2]), tuple(alphas[2 + i] for i in order)
         return SeparableOrbit(SeparableStart(tuple(moments), x, w, v, walls))
-
-    @property
-    def _exact_start(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
-        """Return γ, of any length, and Ω along the principal axes: as given, in doubles where the axes are known in doubles."""
-        problem = self.problem
-        if problem.axes is None:
-            return problem.exact_gamma, problem.exact_Omega
-        gamma, Omega = (tuple(map(Fraction, (problem.axes.T @ v).tolist())) for v in (problem.gamma, problem.Omega))
-        return gamma, Omega
 
     def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion

@@ -38,7 +38,7 @@ _ON_ORBIT = 24
 #: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of them.
 _WIDE, _MANY = 10.0, 10_000
 
-#: Rounding of the principal axes and of the data along them, in units of the conditioning floor.
+#: Rounding of the principal axes and of a given frame along them, in ε, besides one for each term of a scalar product.
 _AXES_ROUNDING = 8.0
 
 
@@ -65,8 +65,8 @@ class ErrorBound:
         if (slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))) is not None:
             error *= slowness
         error += at_once
-        if solution.problem.axes is not None:  # principal axes of a matrix are doubles, and so is what is seen along them
-            error += _AXES_ROUNDING * solution.problem.conditioning_floor(horizon.times)
+        if solution.problem.axes is not None:  # back along the body axes, scalar products of n terms
+            error += (solution.problem.n + _AXES_ROUNDING) * _EPSILON
         return error
 
     @cached_property

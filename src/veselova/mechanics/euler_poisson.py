@@ -30,7 +30,8 @@ class EulerPoisson(RigidBody):
                𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
     frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ and γ̇
 
-    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled first. Raises InvalidInput, which names the field.
+    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made orthonormal.
+    Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝒥Ω. Formulations: ``velocity``, (3.4); ``momentum``, the momentum in space.
     """
 

@@ -6,15 +6,15 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput, shown
 from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, to_float
 from veselova.mechanics.sphere import INPUT_TOLERANCE
+from veselova.mechanics.wide_axes import WideAxes, wide_axes
 
-__all__ = ["positive_numbers", "principal_inertia", "require_moderate"]
+__all__ = ["positive_numbers", "principal_inertia", "require_moderate", "symmetric_matrix"]
 
-Array = NDArray[np.float64]
+_EPSILON = float(np.finfo(float).eps)
 
 #: The inverse of a smaller number is no float; the square of one up to the second is.
 _LEAST, _MODERATE = Fraction(1, 10**308), Fraction(10**120)
@@ -41,29 +41,34 @@ def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = 
         raise InvalidInput((name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given)
 
 
-def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Array | None]:
-    """Return the diagonal of A as exact numbers, and the principal axes as columns when A was given as a matrix.
+def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], WideAxes | None]:
+    """Return the diagonal of A as exact numbers, and the principal axes when A was given as a matrix.
 
+    Both are of the symmetric part, to 2^−256 of its largest entry: what is seen along them has no rounding of theirs.
     The axes are a rotation, determinant +1, so that vector products and determinants of frames are the same along them.
     ``name``: of the argument, for its refusals.
     """
     if not is_matrix(A):
         return positive_numbers(A, name), None
-    n = len(A)
-    if n < 2:
-        raise InvalidInput((name,), "at least 2 rows (n ≥ 2)", f"{n}")
-    matrix = to_float(exact_matrix(A, (name,), n))
-    asymmetry = np.abs(matrix - matrix.T)
-    if np.max(asymmetry) > INPUT_TOLERANCE * np.max(np.abs(matrix)):
-        i, j = divmod(int(np.argmax(asymmetry)), n)
+    if len(A) < 2:
+        raise InvalidInput((name,), "at least 2 rows (n ≥ 2)", f"{len(A)}")
+    matrix = symmetric_matrix(A, name)
+    if not any(map(any, matrix)):
+        raise InvalidInput((name,), "a positive definite matrix", "zero")
+    axes = wide_axes(matrix)
+    if axes.values[0] <= len(A) * Fraction(_EPSILON) * axes.values[-1]:
+        raise InvalidInput((name,), "a positive definite matrix", f"one with eigenvalue {float(axes.values[0]):.3g}")
+    return axes.values, axes
+
+
+def symmetric_matrix(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], ...]:
+    """Return the symmetric part of a matrix exactly; raises InvalidInput unless it is all of it to 1e-9 of the largest entry."""
+    given = exact_matrix(A, (name,), len(A))
+    matrix = to_float(given)
+    asymmetry = np.abs(matrix / 2 - matrix.T / 2)  # a sum may leave the range of a float
+    if np.max(asymmetry) > INPUT_TOLERANCE / 2 * np.max(np.abs(matrix)):
+        i, j = divmod(int(np.argmax(asymmetry)), len(given))
         raise InvalidInput((name, i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
-    values, axes = np.linalg.eigh(matrix / 2 + matrix.T / 2)  # the sum itself may leave the range of a float
-    if values[0] <= n * np.finfo(float).eps * values[-1]:
-        raise InvalidInput((name,), "a positive definite matrix", f"one with eigenvalue {values[0]:.3g}")
-    return tuple(map(Fraction, values.tolist())), _right_handed(axes)
-
-
-def _right_handed(axes: Array) -> Array:
-    """Return the axes, the last one reversed where the determinant is −1: eigenvectors come with any sign."""
-    axes[:, -1] *= np.linalg.slogdet(axes)[0]
-    return axes
+    return tuple(
+        tuple((x + y) / 2 for x, y in zip(*lines, strict=True)) for lines in zip(given, zip(*given, strict=True), strict=True)
+    )

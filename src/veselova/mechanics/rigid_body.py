@@ -12,17 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.errors import InvalidInput
-from veselova.mechanics.exact import exact_matrix, exact_vector, is_matrix, require_truth_value, stated, to_float
+from veselova.mechanics.exact import exact_vector, is_matrix, require_truth_value, stated, to_float
+from veselova.mechanics.given_frame import admissible_frame, given_frame
 from veselova.mechanics.integrals import unit_scale
 from veselova.mechanics.natural_frame import natural_frame
 from veselova.mechanics.potential import Potential
-from veselova.mechanics.principal_inertia import principal_inertia, require_moderate
+from veselova.mechanics.principal_inertia import principal_inertia, require_moderate, symmetric_matrix
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.rigid_body_flow import RigidBodyFlow, momentum
-from veselova.mechanics.sphere import INPUT_TOLERANCE, over_largest, unit
-from veselova.mechanics.veselova import admissible_frame
+from veselova.mechanics.sphere import INPUT_TOLERANCE, exact_cross, over_largest, unit
+from veselova.mechanics.wide_axes import WideAxes
 
-__all__ = ["RigidBody"]
+__all__ = ["RigidBody", "exact_inverse"]
 
 Array = NDArray[np.float64]
 
@@ -34,14 +35,14 @@ _ROUNDING = 16 * np.finfo(float).eps
 class RigidBody(Problem):
     """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 = γ, e_2, e_3, in body axes.
 
-    moments, axes  principal moments (3,), exact where given so, and the principal axes as columns where a matrix was given
+    moments, wide_axes  principal moments (3,), exact where given so, and the principal axes where a matrix was given
     inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0 · potential  V(γ)
     linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
     exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the frame None for the natural one
     """
 
     moments: tuple[Fraction, ...]
-    axes: Array | None
+    wide_axes: WideAxes | None
     inertia: Array
     inverse: Array
     gamma: Array
@@ -65,8 +66,8 @@ class RigidBody(Problem):
         require_truth_value(normalize, "normalize")
         moments, axes, tensor, inverse = _inertia(inertia)
         exact_gamma, exact_Omega = exact_vector(gamma, ("gamma",), 3), exact_vector(Omega, ("Omega",), 3)
-        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), 3)
         direction, velocity = _direction(exact_gamma, normalize), to_float(exact_Omega)
+        exact_frame = None if frame is None else given_frame(frame, exact_gamma, normalize, "gamma")
         V = Potential.of(potential, tensor, inverse, dual=not self.constrained)
         V.require_finite(direction)
         across = direction if self.constrained else tensor @ direction
@@ -78,18 +79,28 @@ class RigidBody(Problem):
         if not np.all(np.isfinite(squares)) or (np.any(velocity) and not np.all(squares)):
             required = "an angular velocity whose energy and squared momentum are within the range of a float"
             raise InvalidInput(("Omega",), required, f"squares of {', '.join(f'{x:.3g}' for x in squares)}")
-        principal = axes.T if axes is not None else np.eye(3)
+        principal = axes.rounded.T if axes is not None else np.eye(3)
         if exact_frame is None:
             rate = principal @ np.cross(direction, velocity)
             start = natural_frame(1 / to_float(moments), principal @ direction, rate)
             start = principal.T @ start
         else:
-            start = admissible_frame(to_float(exact_frame), direction, "gamma")
-        self._set(moments=moments, axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
+            start = admissible_frame(to_float(exact_frame), direction)
+        self._set(moments=moments, wide_axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
         given = stated(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
         self._set(given=given)
+
+    @property
+    def axes(self) -> Array | None:
+        """Return the principal axes as columns, (3, 3), where a matrix was given."""
+        return None if self.wide_axes is None else self.wide_axes.rounded
+
+    def along_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+        """Return γ, of any length, and Ω along the principal axes, as given."""
+        given, axes = (self.exact_gamma, self.exact_Omega), self.wide_axes
+        return given if axes is None else (axes.along(given[0]), axes.along(given[1]))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6)}" for name in ("inertia", "gamma", "Omega"))
@@ -145,7 +156,7 @@ class RigidBody(Problem):
         return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
 
 
-def _inertia(given: Any) -> tuple[tuple[Fraction, ...], Array | None, Array, Array]:
+def _inertia(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]:
     """Return the principal moments, the principal axes where a matrix is given, the tensor and its inverse."""
     form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
     moments, axes = principal_inertia(given, "inertia")
@@ -153,11 +164,17 @@ def _inertia(given: Any) -> tuple[tuple[Fraction, ...], Array | None, Array, Arr
     if len(moments) != 3:
         raise InvalidInput(("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}")
     values = to_float(moments)
-    reciprocals = 1 / values
     if axes is None:
-        return moments, None, np.diag(values), np.diag(reciprocals)
-    tensor = to_float(exact_matrix(given, ("inertia",), 3))
-    return moments, axes, (tensor + tensor.T) / 2, axes @ (reciprocals[:, None] * axes.T)
+        return moments, None, np.diag(values), np.diag(1 / values)
+    tensor = symmetric_matrix(given, "inertia")
+    return moments, axes, to_float(tensor), to_float(exact_inverse(tensor))
+
+
+def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the inverse of a symmetric 3 × 3 matrix, exactly: vector products of its rows over the determinant."""
+    cofactors = [exact_cross(tensor[i - 2], tensor[i - 1]) for i in range(3)]
+    determinant = sum((x * y for x, y in zip(tensor[0], cofactors[0], strict=True)), Fraction())
+    return tuple(tuple(x / determinant for x in row) for row in cofactors)
 
 
 def _direction(exact: tuple[Fraction, ...], normalize: bool) -> Array:

@@ -15,17 +15,18 @@ from numpy.typing import NDArray
 from veselova.mechanics import integrals
 from veselova.mechanics.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.errors import InvalidInput
-from veselova.mechanics.exact import exact_matrix, read_only, require_truth_value, stated, to_float
-from veselova.mechanics.natural_frame import moser_frame, orthonormalized, refined
+from veselova.mechanics.exact import read_only, require_truth_value, stated, to_float
+from veselova.mechanics.given_frame import admissible_frame, given_frame
+from veselova.mechanics.natural_frame import moser_frame, refined
 from veselova.mechanics.neumann import NeumannSystem
 from veselova.mechanics.principal_inertia import principal_inertia
 from veselova.mechanics.problem import Series
 from veselova.mechanics.reduced_flow import ReducedFlow
-from veselova.mechanics.sphere import INPUT_TOLERANCE, ExactState, point_on_sphere, unit
+from veselova.mechanics.sphere import ExactState, over_largest, point_on_sphere, unit
 from veselova.mechanics.spheroconic import to_spheroconic
 from veselova.mechanics.torus_problem import TorusProblem
 
-__all__ = ["Veselova", "admissible_frame"]
+__all__ = ["Veselova"]
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,8 @@ class Veselova(TorusProblem):
     q_dot    its velocity, tangent to the sphere, (n,); zero is a body at rest
     frame    the frame [e_1 … e_n] at t = 0, (n, n), columns e_i, e_1 = q; None for the natural frame (Theorem recon0)
 
-    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first.
+    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first,
+    and the frame made orthonormal with e_1 = q, its determinant keeping its sign (``given_frame``).
     Every number may be given as a string ("0.7", "7/10") and is then taken exactly. What is off the manifold by less than
     the tolerance is projected onto it. Raises InvalidInput, which names the field, what was required and what was given.
     """
@@ -71,26 +73,24 @@ class Veselova(TorusProblem):
         require_truth_value(normalize, "normalize")
         diagonal, axes = principal_inertia(A)
         exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
-        exact_frame = None if frame is None else exact_matrix(frame, ("frame",), len(diagonal))
-        given_frame = None if exact_frame is None else to_float(exact_frame)
+        exact_frame = None if frame is None else given_frame(frame, exact.q, normalize)
         if axes is not None:
-            with np.errstate(over="ignore", invalid="ignore"):  # refused below
-                position, velocity = axes.T @ position, axes.T @ to_float(exact.q_dot)
-            given_frame = None if given_frame is None else axes.T @ given_frame
-            _require_finite(velocity, exact.q_dot)
-            q_along, q_dot_along = (tuple(map(Fraction, vector.tolist())) for vector in (position, velocity))
-            exact = replace(exact, q=q_along, q_dot=q_dot_along)
+            # The tangential part, so that a body at rest stays so.
+            exact = replace(exact, q=axes.along(exact.q), q_dot=axes.along(exact.tangent))
+            position = to_float(over_largest(exact.q))
         exact = replace(exact, frame=exact_frame)
         position, velocity = unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         found = integrals.StateIntegrals(A_float, position, velocity)
         _require_representable_energy(float(found.energy), velocity)
-        if given_frame is None:
+        if exact_frame is None:
             near_frame = moser_frame(found.A, position, found.q_prime)
         else:
-            near_frame = admissible_frame(given_frame, position)
+            along = to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
+            near_frame = admissible_frame(along, position)
         given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
-        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, axes=axes, exact=exact, given=given)
+        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given)
+        self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
     def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
@@ -230,24 +230,6 @@ def _rounded(tangent: tuple[Fraction, ...]) -> Array:
         raise InvalidInput(("q_dot",), "a tangential part within the range of a float", given) from None
 
 
-def _require_finite(velocity: Array, given: tuple[Fraction, ...]) -> None:
-    if not np.all(np.isfinite(velocity)):
-        largest = f"entries up to {float(max(abs(x) for x in given)):.3g}"
-        raise InvalidInput(("q_dot",), "components along the principal axes within the range of a float", largest)
-
-
 def _require_representable_energy(energy: float, q_dot: Array) -> None:
     if not math.isfinite(energy) or (energy == 0 and q_dot.any()):
         raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")
-
-
-def admissible_frame(frame: Array, q: Array, name: str = "q") -> Array:
-    """Return the given frame made exactly orthogonal with first column q; raises InvalidInput beyond the tolerance."""
-    defect = float(np.max(np.abs(frame.T @ frame - np.eye(q.size))))
-    if not defect <= INPUT_TOLERANCE:
-        raise InvalidInput(("frame",), "an orthogonal matrix to 1e-9", f"one with |EᵀE − 1| up to {defect:.3g}")
-    offset = float(np.max(np.abs(frame[:, 0] - q)))
-    if offset > INPUT_TOLERANCE:
-        raise InvalidInput(("frame",), f"first column e_1 equal to {name} to 1e-9", f"a difference of {offset:.3g}")
-    rest = frame[:, 1:] - np.outer(q, q @ frame[:, 1:])
-    return orthonormalized(np.column_stack([q, rest]))

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from veselova.mechanics.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.decimals import Objects, Pair
 from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.exact import exact_vector
+from veselova.mechanics.exact import exact_vector, to_float
 from veselova.mechanics.neumann import NeumannSystem
+from veselova.mechanics.principal_inertia import symmetric_matrix
 from veselova.mechanics.problem import Series
-from veselova.mechanics.rigid_body import RigidBody
+from veselova.mechanics.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.rigid_body_flow import momentum
-from veselova.mechanics.sphere import INPUT_TOLERANCE, exact_cross, inverse_length
+from veselova.mechanics.sphere import INPUT_TOLERANCE, exact_cross, inverse_length, over_largest, unit
 from veselova.mechanics.torus_problem import TorusProblem
 from veselova.mechanics.veselova import Veselova
 
@@ -42,7 +43,8 @@ class VeselovaSO3(RigidBody):
     potential  V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of (3.5), {"polynomial": […]}; None for 0
     frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ and γ̇
 
-    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled first. Raises InvalidInput, which names the field.
+    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made orthonormal.
+    Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations: ``multiplier``, (3.1) with
     (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a).
 
@@ -163,7 +165,8 @@ class VeselovaSO3(RigidBody):
 
     def _rank_one(self, bits: int) -> Veselova:
         self._require_geodesic()
-        A: Any = [1 / moment for moment in self.moments] if self.axes is None else self.inverse
+        exact = self.wide_axes is None
+        A: Any = [1 / moment for moment in self.moments] if exact else exact_inverse(symmetric_matrix(self.given["inertia"]))
         gamma, length = self.exact_gamma, inverse_length(self.exact_gamma, bits)
         velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
         return Veselova(A, gamma, velocity, self.exact_frame, normalize=True)
@@ -176,13 +179,11 @@ class VeselovaSO3(RigidBody):
         self._require_geodesic()
         if not np.any(self.Omega):
             raise Unsolved("not-rank-one", "a body at rest has no Neumann time: dτ₁/dt = 0")
-        moments = np.array([float(moment) for moment in self.moments])
-        rate = np.sqrt(self.Omega @ self.inertia @ self.Omega / np.prod(moments) / (self.gamma @ self.inverse @ self.gamma))
-        to_principal = np.eye(3) if self.axes is None else self.axes.T
-        q_prime = np.cross(self.gamma, self.Omega) / rate
-        return NeumannSystem(
-            [1 / moment for moment in self.moments], to_principal @ self.gamma, to_principal @ q_prime, normalize=True
-        )
+        exact_gamma, exact_Omega = self.along_axes()
+        gamma, Omega = unit(to_float(over_largest(exact_gamma))), to_float(exact_Omega)
+        moments = to_float(self.moments)
+        rate = np.sqrt(Omega @ (moments * Omega) / np.prod(moments) / (gamma @ (gamma / moments)))
+        return NeumannSystem([1 / moment for moment in self.moments], gamma, np.cross(gamma, Omega) / rate, normalize=True)
 
     def _require_geodesic(self) -> None:
         if self.potential.terms:
