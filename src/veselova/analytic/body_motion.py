@@ -70,7 +70,8 @@ class BodyMotion(Motion[VeselovaSO3]):
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
         error, along = orbit.error(tau, clock, self._turning_steepness)
-        error = error + panels.error(tau) + panels.mean_size * along
+        # Beside a pole of the coordinate lines they turn thousands of times faster than in the mean.
+        error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * along
         error = orbit.require_digit(error, grid.doubles)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(clock)

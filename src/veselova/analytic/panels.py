@@ -29,7 +29,7 @@ class Panels:
 
     borders (P+1,) in τ₁, zero among them · lengths (P,)
     integrals (P, 2, N+1), coefficients of the integral from the left border, and of its derivative in x, −1 … 1 on a panel
-    values (P+1,) of the integral at the borders · tails (P+1,), what series leave out of them · mean_size of f
+    values (P+1,) of the integral at the borders · tails (P+1,), what series leave out of them · mean_size of f over τ₁
     """
 
     borders: Array
@@ -52,7 +52,7 @@ class Panels:
         over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
         left_out = np.maximum(tails[order], TAIL) * sizes * lengths
         values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
-        return cls(borders, lengths, integrals, values, tails_from_zero, float(np.mean(sizes)))
+        return cls(borders, lengths, integrals, values, tails_from_zero, float(sizes @ lengths / np.sum(lengths)))
 
     @property
     def size(self) -> int:
@@ -61,9 +61,18 @@ class Panels:
 
     def at(self, tau1: Array) -> Array:
         """Return the integrals from zero to Neumann times within the panels."""
-        panel = self.panel_of(self.borders, tau1)
-        x = 2 * (tau1 - self.borders[panel]) / self.lengths[panel] - 1
+        panel, x = self._places(tau1)
         return np.asarray(self.values[panel] + self.within(panel, x)[0])
+
+    def integrand(self, tau1: Array) -> Array:
+        """Return f at Neumann times within the panels."""
+        panel, x = self._places(tau1)
+        return np.asarray(2 / self.lengths[panel] * self.within(panel, x)[1])
+
+    def _places(self, tau1: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return the panels of Neumann times and where these lie in them, −1 … 1."""
+        panel = self.panel_of(self.borders, tau1)
+        return panel, 2 * (tau1 - self.borders[panel]) / self.lengths[panel] - 1
 
     def error(self, tau1: Array) -> Array:
         """Return the tails of the panels between zero and increasing Neumann times, twice."""
