@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from veselova.analytic.periods import Periods
 from veselova.analytic.solution import Solution
-from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.torus_problem import TorusProblem
 
@@ -21,8 +20,8 @@ Array = NDArray[np.float64]
 def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
     """Return the invariant torus on which a motion runs, and where it starts there; ``solution``: that of the problem.
 
-    Directions that do not move belong to no torus: the curve is that of the moving part. Raises Unsolved at rest, and where
-    periods leave the range of a float. Digits: periods and T to about 1e-15 relative, tested for n = 2…8.
+    Directions that do not move belong to no torus: the curve is that of the moving part. Raises Unsolved at rest.
+    Digits: periods and T to about 1e-15 relative, tested for n = 2…8.
     """
     solution = solution or Solution(problem)
     curve, moving, root = solution.curve, solution.moving, solution.tau1_unit
@@ -31,19 +30,17 @@ def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
     # With λ in units of the largest I, λ^{k−1}dλ/√R scales like I^{k−g−½}.
     with np.errstate(over="ignore", under="ignore"):
         periods = _monomial_cycles(solution.periods) * np.exp(math.log(unit) * (g + 0.5 - np.arange(1, g + 1)))[:, None]
-    if not (np.all(np.isfinite(periods)) and np.all(np.any(periods != 0, axis=1))):
-        raise Unsolved(
-            "beyond-floats", "periods of λ^k dλ/√R leave the range of a float at this scale of A; only ratios of A matter"
-        )
+    # The curve itself depends on ratios of A alone, and so does all that follows.
+    in_range = bool(np.all(np.isfinite(periods)) and np.all(np.any(np.abs(periods) >= np.finfo(float).tiny, axis=1)))
     known = 0 if problem.time == "tau1" else 1  # c_1 = 0 goes without saying
     constants = [float(c) / unit for c in solution.spectrum.constants[known:]] + [1 / float(a) for a in moving.frozen]
     return Torus(
         n=problem.n,
-        energy=problem.energy,
+        energy=problem.energy if problem.has_units else None,
         constants=np.sort(constants),
         branch_points=np.array(curve.branch_points) / unit,
         origins=tuple(f"{o.kind}{moving.axes[o.index] + 1 if o.kind == 'I' else o.index + 1}" for o in curve.origins),
-        periods=periods,
+        periods=periods if in_range else None,
         actions=actions(solution.periods) / root,
         rotation_numbers=np.array(solution.in_time.rates / solution.in_time.rates[0]),
         signs=_signs(problem),

@@ -33,6 +33,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+#: Binary digits before or after the point that a float may have, with room for the rounding of constants along a motion.
+_MOST_BINARY_DIGITS = 1020
+
 #: I_i and I_j closer than this (relative) share one Neumann integral: their quotient P_ij²/(I_i−I_j) carries no digits.
 _COINCIDENT = 1e-12
 
@@ -230,17 +233,33 @@ class StateIntegrals:
         return np.asarray((self.A * self._q * self._q).sum(axis=-1), dtype=np.float64)
 
     @property
+    def scaled_energy(self) -> Array:
+        """Return the h of A over 2^k, shape (...)."""
+        with np.errstate(over="ignore"):  # beyond float range it is infinite, and the problem refuses it
+            return np.asarray(self._rate * self._rate * (self._qAq / (2 * self.A.prod())), dtype=np.float64)
+
+    @property
+    def scaled_momentum(self) -> Array:
+        """Return the p of A over 2^k, shape (..., n)."""
+        return np.asarray(self.A * self._sliding * self._qAq[..., None] / self.A.prod(), dtype=np.float64)
+
+    @property
     def energy(self) -> Array:
-        """Return h, shape (...)."""
-        with np.errstate(over="ignore"):  # an energy beyond float range is infinite, and the problem refuses it
-            h = self._rate * self._rate * (self._qAq / (2 * self.A.prod()))
-            return np.asarray(np.ldexp(h, self._unit), dtype=np.float64)
+        """Return h, shape (...); inf or 0 where det A takes it out of the range of a float."""
+        with np.errstate(over="ignore"):
+            return np.asarray(np.ldexp(self.scaled_energy, self._unit), dtype=np.float64)
 
     @property
     def momentum(self) -> Array:
-        """Return p, shape (..., n)."""
-        p = self.A * self._sliding * self._qAq[..., None] / self.A.prod()
-        return np.asarray(np.ldexp(p, self._unit), dtype=np.float64)
+        """Return p, shape (..., n); its entries may leave the range of a float as h does."""
+        with np.errstate(over="ignore"):
+            return np.asarray(np.ldexp(self.scaled_momentum, self._unit), dtype=np.float64)
+
+    @property
+    def has_units(self) -> bool:
+        """Return whether h and |p| of a first state, both constant along its motion, are floats with all their digits."""
+        sizes = self.scaled_energy.ravel()[:1], norm(self.scaled_momentum).ravel()[:1]
+        return all(not size.any() or abs(np.log2(size[0]) + self._unit) < _MOST_BINARY_DIGITS for size in sizes)
 
     @property
     def neumann(self) -> Array:

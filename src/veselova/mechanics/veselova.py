@@ -82,7 +82,7 @@ class Veselova(TorusProblem):
         position, velocity = unit(position), _rounded(exact.tangent)
         A_float = to_float(diagonal)
         found = integrals.StateIntegrals(A_float, position, velocity)
-        _require_representable_energy(float(found.energy), velocity)
+        _require_representable_energy(float(found.scaled_energy), velocity)
         if exact_frame is None:
             near_frame = moser_frame(found.A, position, found.q_prime)
         else:
@@ -135,7 +135,7 @@ class Veselova(TorusProblem):
 
     @cached_property
     def energy(self) -> float:
-        """Return the kinetic energy h, equation (redL)."""
+        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the range of a float."""
         return float(integrals.energy(self.A, self.q, self.q_dot))
 
     @cached_property
@@ -151,7 +151,12 @@ class Veselova(TorusProblem):
     @property
     def title(self) -> str:
         """Return the system and its dimension."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+        return f"{self.system}, n = {self.n}" + (f", energy {self.energy:.12g}" if self.has_units else "")
+
+    @cached_property
+    def has_units(self) -> bool:
+        """Return whether h and p are floats: they scale like A^(2−n), and the motion does not depend on the scale of A."""
+        return integrals.StateIntegrals(self.A, self.q, self.q_dot).has_units
 
     @property
     def turning(self) -> float:
@@ -198,20 +203,22 @@ class Veselova(TorusProblem):
         """Return the integrals of motion along states in the body axes, by name, first axis the times.
 
         ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n; ``constants`` c_2…c_{n−1}.
+        ``energy`` and ``linear`` are left out where det A takes h or p out of the range of a float.
         """
         q_dot, frame = series["q_dot"], series["frame"]
         if self.axes is not None:
             q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
         q = frame[..., 0]
         found = integrals.StateIntegrals(self.A, q, q_dot)
-        p = found.momentum
+        p = found.scaled_momentum
         size = integrals.norm(p)
+        with_units = self.has_units
         return {
-            "energy": found.energy,
+            **({"energy": found.energy} if with_units else {}),
             "q_norm": (q * q).sum(axis=-1),
             "q_p": np.divide((q * p).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0),
             "neumann": found.neumann,
-            "linear": integrals.linear_integrals(p, frame),
+            **({"linear": integrals.linear_integrals(found.momentum, frame)} if with_units else {}),
             "constants": found.constants,
         }
 

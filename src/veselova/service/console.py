@@ -118,7 +118,8 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
 
 def print_torus(console: Console, torus: Torus, time: str) -> None:
     """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own ``time``, periods."""
-    console.print(f"n = {torus.n}, genus {torus.phases.size}, energy {torus.energy:.12g}, regime {torus.regime}", highlight=False)
+    energy = "energy beyond the range of a float" if torus.energy is None else f"energy {torus.energy:.12g}"
+    console.print(f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}", highlight=False)
     _heading(console, "Branch points")
     table = _table("b", "origin", "value")
     for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
@@ -130,7 +131,8 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     for s, row in enumerate(zip(*columns, strict=True), start=1):
         table.add_row(str(s), *(f"{x:.15g}" for x in row))
     console.print(table)
-    _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
+    if torus.periods is not None:
+        _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
     _print_matrix(console, f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})", torus.riemann_matrix)
 
 

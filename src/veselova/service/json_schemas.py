@@ -104,11 +104,11 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     "Torus": _object(
         {
             "n": {"type": "integer"},
-            "energy": {"type": "number"},
+            "energy": {"anyOf": [{"type": "number"}, {"type": "null"}], "description": "null beyond the range of a double"},
             "constants": _NUMBERS,
             "branch_points": _NUMBERS,
             "origins": {"type": "array", "items": {"type": "string"}},
-            "periods": _MATRIX,
+            "periods": {"anyOf": [_MATRIX, {"type": "null"}], "description": "null beyond the range of a double"},
             "riemann_matrix": _MATRIX,
             "riemann_matrix_residual": {"type": "number"},
             "frequencies_tau1": _NUMBERS,

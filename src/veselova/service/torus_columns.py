@@ -31,7 +31,8 @@ _SURELY = INPUT_TOLERANCE / 2
 def columns_of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one torus."""
     for name in _NUMBERS:
-        yield from components(name, np.asarray(getattr(found, name)).tolist())
+        if (value := getattr(found, name)) is not None:
+            yield from components(name, np.asarray(value).tolist())
     yield "mean_rate", found.mean_rate
     yield "regime", found.regime
     yield "origins", " ".join(found.origins)

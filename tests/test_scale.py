@@ -1,0 +1,83 @@
+"""The motion of a body depends on ratios of the A's alone; det A may leave the range of a float."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import veselova as vs
+from veselova.mechanics.errors import InvalidInput
+from veselova.service.cli import app
+
+#: n = 4: h and p are multiples of A^(2−n), periods of A^(g + ½ − k).
+A = np.array([3.0, 2.0, 1.5, 1.0])
+Q, Q_DOT = [0.5, 0.5, 0.5, 0.5], [1.1, -0.7, 0.3, -0.7]
+TIMES = [-3.0, 1.0, 10.0]
+
+
+@pytest.mark.parametrize("engine", ["analytic", "numeric"])
+@pytest.mark.parametrize("exponent", [-1000, -500, 500, 1000])
+def test_the_motion_does_not_depend_on_the_scale_of_A(engine: str, exponent: int) -> None:
+    scaled, plain = (vs.solve(vs.Veselova(a, Q, Q_DOT), TIMES, engine) for a in (np.ldexp(A, exponent), A))
+    assert (scaled.frame == plain.frame).all()
+    assert (scaled.error == plain.error).all()
+    assert np.array_equal(scaled.q_dot, plain.q_dot)
+
+
+@pytest.mark.parametrize("exponent", [-1000, -500, 500, 1000])
+def test_a_torus_does_not_depend_on_the_scale_of_A(exponent: int) -> None:
+    scaled, plain = (vs.torus(vs.Veselova(a, Q, Q_DOT)) for a in (np.ldexp(A, exponent), A))
+    for name in ("frequencies_t", "riemann_matrix", "phases", "rotation_numbers"):
+        assert np.allclose(getattr(scaled, name), getattr(plain, name), rtol=1e-14, atol=1e-15)
+    assert np.allclose(np.ldexp(scaled.constants, exponent), plain.constants, rtol=1e-14)
+    assert scaled.periods is None
+    assert (scaled.energy is None) == (abs(exponent) == 1000)
+    assert plain.periods is not None
+
+
+def test_what_det_A_takes_out_of_range_is_left_out_of_the_integrals() -> None:
+    problem = vs.Veselova(np.ldexp(A, 1000), Q, Q_DOT)
+    assert not problem.has_units
+    assert "energy" not in problem.title
+    integrals = vs.solve(problem, TIMES).integrals
+    assert set(integrals) == {"q_norm", "q_p", "neumann", "constants"}
+    assert np.max(np.abs(integrals["q_p"])) < 1e-15
+    assert set(vs.solve(vs.Veselova(A, Q, Q_DOT), TIMES).integrals) == {*integrals, "energy", "linear"}
+
+
+def test_two_hundred_dimensions_are_a_problem_like_another() -> None:
+    n, rng = 200, np.random.default_rng(3)
+    q, q_dot = rng.normal(size=(2, n))
+    problem = vs.Veselova(list(range(1, n + 1)), q, q_dot / np.linalg.norm(q_dot), normalize=True)
+    halved = vs.Veselova([a / 128 for a in range(1, n + 1)], q, q_dot / np.linalg.norm(q_dot), normalize=True)
+    assert problem.energy == 0
+    assert halved.energy > 0
+    found, other = (vs.solve(p, [0.5], "numeric") for p in (problem, halved))
+    assert (found.frame == other.frame).all()
+    assert np.max(np.abs(found.integrals["constants"] * 128 - other.integrals["constants"])) < 1e-12
+
+
+@pytest.mark.slow
+def test_two_hundred_dimensions_in_closed_form() -> None:
+    n, rng = 200, np.random.default_rng(3)
+    q, q_dot = rng.normal(size=(2, n))
+    assert vs.compare(vs.Veselova(list(range(1, n + 1)), q, q_dot / 14, normalize=True), [0.5]).agrees
+
+
+@pytest.mark.parametrize("factor", [1e200, 1e-200])
+def test_a_velocity_whose_square_is_no_float_is_refused_as_one(factor: float) -> None:
+    with pytest.raises(InvalidInput, match="q_dot"):
+        vs.Veselova(A, Q, np.array(Q_DOT) * factor)
+
+
+def test_the_command_line_says_null(tmp_path: Path) -> None:
+    path = tmp_path / "large.json"
+    path.write_text(json.dumps({"problem": {"system": "veselova", "A": np.ldexp(A, 1000).tolist(), "q": Q, "q_dot": Q_DOT}}))
+    document = json.loads(CliRunner().invoke(app, ["torus", str(path), "--json"]).stdout)
+    assert document["energy"] is None
+    assert document["periods"] is None
+    assert "beyond the range" in CliRunner().invoke(app, ["torus", str(path)]).stdout
