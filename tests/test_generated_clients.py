@@ -36,7 +36,7 @@ with Client(sys.argv[1]) as client:
     body = TrajectoryRequest(problem=problem, times=[0, 1], outputs=["q", "tau1"])
     trajectory = solve_trajectory.sync(client=client, body=body)
     torus = compute_torus.sync(client=client, body=TorusRequest(problem=problem))
-    refused = solve_trajectory.sync(client=client, body=TrajectoryRequest(problem=problem, times=[1, 0]))
+    refused = solve_trajectory.sync(client=client, body=TrajectoryRequest(problem=problem, times=["x", 0]))
     sweep = SweepRequest(problem=problem, vary=SweepRequestVary.from_dict({"/A/0": [3, "7/2"]}))
     create_sweep._get_kwargs(body=sweep)
     systems = [item.system for item in list_systems.sync(client=client).systems]
@@ -58,7 +58,7 @@ const problem: components["schemas"]["VeselovaModel"] = {
 const motion = await client.POST("/v1/trajectories", { body: { problem, times: [0, 1], outputs: ["q", "tau1"] } });
 if (motion.error !== undefined || typeof motion.data !== "object") throw new Error(motion.error?.detail);
 const torus = await client.POST("/v1/tori", { body: { problem } });
-const refused = await client.POST("/v1/trajectories", { body: { problem, times: [1, 0] } });
+const refused = await client.POST("/v1/trajectories", { body: { problem, times: ["x", 0] } });
 const sweep: components["schemas"]["SweepRequest"] = { problem, vary: { "/A/0": [3, "7/2"] } };
 const systems = await client.GET("/v1/systems");
 console.log(JSON.stringify([
@@ -88,7 +88,7 @@ def require_solved(printed: str) -> None:
     q, frequencies, pointer, vary, systems = json.loads(printed)
     np.testing.assert_allclose(q, ANSWERS["trajectory"]["series"]["q"], atol=1e-12)
     np.testing.assert_allclose(frequencies, ANSWERS["torus"]["frequencies_t"], atol=1e-11)
-    assert pointer == "/times/1"
+    assert pointer == "/times/0"
     assert vary == {"/A/0": [3, "7/2"]}
     assert systems == list(SYSTEMS)
 

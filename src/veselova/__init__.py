@@ -86,7 +86,12 @@ __all__ = ["__version__", *sorted(_HOMES)]
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        raise AttributeError(f"module 'veselova' has no attribute {name!r}")
+        hint = ""
+        if not name.startswith("_"):
+            from veselova.mechanics.errors import did_you_mean
+
+            hint = did_you_mean(name, _HOMES)
+        raise AttributeError(f"module 'veselova' has no attribute {name!r}{hint}")
     try:
         value = getattr(import_module(_HOMES[name]), name)
     except ModuleNotFoundError as error:

@@ -11,7 +11,7 @@ import numpy as np
 
 from veselova.mechanics.comparison import Comparison
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import Faults, InvalidInput, shown, unknown_name
 from veselova.mechanics.exact import require_truth_value
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.times import TimeGrid
@@ -76,13 +76,9 @@ def _solve(
     if engine is None:  # what is asked for beyond double precision is asked of the closed form, which says why it has none
         engine = "analytic" if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False) else None
         engine = engine or problem.default_engine
-    if not isinstance(engine, str) or engine not in problem.engines:
-        raise InvalidInput(("engine",), f"one of {', '.join(problem.engines)} for system {problem.system}", shown(engine))
-    _require_precision(engine, digits, certified)
+    require_options(type(problem), engine, method, formulation, digits, certified)
     named = {"method": method, "formulation": formulation}
     options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
-    if engine == "analytic" and formulation is not None:
-        raise InvalidInput(("formulation",), "none (the closed form has one)", shown(formulation))
     if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
     elif engine == "analytic" and solution is not None:
@@ -116,6 +112,24 @@ class Prepared:
         """Return the motion; takes and raises what the function of this name does."""
         known = self._solution if "_solution" in vars(self) else None
         return _solve(self.problem, times, engine, method, solution=known, **options)
+
+
+def require_options(
+    system: type[Problem], engine: Any, method: Any, formulation: Any, digits: Any = FEWEST_DIGITS, certified: Any = False
+) -> None:
+    """Raise InvalidInput, with all faults, unless an engine of a system has this method, formulation, and precision."""
+    faults = Faults()
+    if not isinstance(engine, str) or engine not in system.engines:
+        faults.found.append(unknown_name(("engine",), engine, list(system.engines), f"for system {system.system}"))
+    else:
+        if method is not None and method not in system.engines[engine]:
+            faults.found.append(unknown_name(("method",), method, system.engines[engine]))
+        if formulation is not None and engine == "analytic":
+            faults.add(("formulation",), "none (the closed form has one)", shown(formulation))
+        elif formulation is not None and formulation not in system.formulations:
+            faults.found.append(unknown_name(("formulation",), formulation, system.formulations))
+        faults.attempt(_require_precision, engine, digits, certified)
+    faults.require_none()
 
 
 def _require_precision(engine: str, digits: Any, certified: Any) -> None:

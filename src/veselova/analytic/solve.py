@@ -19,7 +19,7 @@ from veselova.analytic.route import METHODS, Route
 from veselova.analytic.separatrix import DepartureBound
 from veselova.analytic.solution import Solution
 from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.errors import InvalidInput, Unsolved, shown, unknown_name
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import TimeGrid
@@ -71,7 +71,7 @@ def solve(
     grid = TimeGrid.of(times, beyond_double(digits, certified))
     for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
         if value is not None and value not in names:
-            raise InvalidInput((field,), f"one of {', '.join(names)}", shown(value))
+            raise unknown_name((field,), value, names)
     if isinstance(problem, VeselovaSO3) and problem.has_torus:
         _require_exact_axes(problem, digits, certified)
         options: Any = {"method": method, "clock": clock, "digits": digits, "certified": certified, "solution": solution}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.closed_form_evaluation import evaluate
 from veselova.mechanics.closed_form_schema import FORMAT, require_document
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import InvalidInput, did_you_mean, shown
 from veselova.mechanics.times import TimeGrid
 
 __all__ = ["ClosedForm", "ClosedFormStates"]
@@ -37,7 +37,7 @@ class ClosedFormStates:
         series = self.__dict__.get("series", {})
         if name in series:
             return np.asarray(series[name])
-        raise AttributeError(f"these states have no {name!r}; they have {', '.join(series)}")
+        raise AttributeError(f"these states have no {name!r}; they have {', '.join(series)}{did_you_mean(name, series)}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

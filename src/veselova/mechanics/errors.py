@@ -13,7 +13,7 @@ VeselovaError
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from reprlib import Repr
@@ -31,9 +31,11 @@ __all__ = [
     "ServiceUnreachable",
     "Unsolved",
     "VeselovaError",
+    "did_you_mean",
     "install_extra",
     "shown",
     "summary",
+    "unknown_name",
 ]
 
 #: Longest rendering of a given value in a message: enough to recognise it, short enough for one line.
@@ -173,6 +175,22 @@ def summary(faults: Sequence[InvalidInput], further: int = 0) -> str:
     """Return the first faults in words, and how many there are besides them and ``further`` ones."""
     unsaid = len(faults[_SPELLED_OUT:]) + further
     return " ".join(map(str, faults[:_SPELLED_OUT])) + (f" And {unsaid} more." if unsaid else "")
+
+
+def did_you_mean(given: object, names: Iterable[str]) -> str:
+    """Return " (did you mean …?)" with the name that is most like a given one, whatever their case, or nothing."""
+    from difflib import get_close_matches
+
+    known = {name.casefold(): name for name in names}
+    # Comparing takes the product of the lengths; a longer text is no name.
+    close = get_close_matches(given.casefold(), known, 1) if isinstance(given, str) and len(given) <= _LONGEST_NAME else []
+    return f" (did you mean {known[close[0]]}?)" if close else ""
+
+
+def unknown_name(path: Sequence[str | int], given: object, names: Sequence[str], scope: str = "") -> InvalidInput:
+    """Return the fault of a name that is none of those known, which are known in a scope such as "for system lr"."""
+    required = " ".join(filter(None, (f"one of {', '.join(names)}", scope)))
+    return InvalidInput(path, required, shown(given) + did_you_mean(given, names))
 
 
 class Faults:

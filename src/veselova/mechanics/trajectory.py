@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.archive import write_archive
 from veselova.mechanics.decimals import FEWEST_DIGITS, Decimals
-from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, shown
+from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, did_you_mean, shown, unknown_name
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.table import Table, Target, flat_columns, opened, row_blocks
 from veselova.mechanics.times import TimeGrid
@@ -125,7 +125,10 @@ class Trajectory:
     def __getattr__(self, name: str) -> Array:
         problem: Problem | None = self.__dict__.get("problem")
         if problem is None or name not in problem.outputs:  # no problem yet: while a pickle is read
-            raise AttributeError(f"a trajectory{f' of system {problem.system}' if problem else ''} has no {name!r}")
+            system = f" of system {problem.system}" if problem else ""
+            # Names with underscores are asked for by protocols (copy, pickle, notebooks), and not by people.
+            hint = did_you_mean(name, dir(self)) if problem and not name.startswith("_") else ""
+            raise AttributeError(f"a trajectory{system} has no {name!r}{hint}")
         return self.series(name)
 
     def __dir__(self) -> list[str]:
@@ -183,7 +186,7 @@ class Trajectory:
             raise InvalidInput(("outputs",), f"a list of one or more of {', '.join(names)}", shown(outputs))
         for i, name in enumerate(chosen):
             if name not in names:
-                raise InvalidInput(("outputs", i), f"one of {', '.join(names)}", shown(name))
+                raise unknown_name(("outputs", i), name, list(names))
         return chosen
 
     def _table(self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

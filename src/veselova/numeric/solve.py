@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.errors import Unsolved, unknown_name
 from veselova.mechanics.flow import Flow
 from veselova.mechanics.problem import Problem, Series
 from veselova.mechanics.times import TimeGrid
@@ -62,9 +62,9 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     """
     grid = TimeGrid.of(times)
     if not isinstance(method, str) or method not in METHODS:
-        raise InvalidInput(("method",), f"one of {', '.join(METHODS)}", shown(method))
+        raise unknown_name(("method",), method, list(METHODS))
     if formulation is not None and formulation not in problem.formulations:
-        raise InvalidInput(("formulation",), f"one of {', '.join(problem.formulations)}", shown(formulation))
+        raise unknown_name(("formulation",), formulation, problem.formulations)
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
     chosen, began = formulation or problem.formulations[0], time.perf_counter()

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 
 import orjson
 
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import InvalidInput, shown, unknown_name
 from veselova.mechanics.table import Target
 from veselova.mechanics.trajectory import Provenance
 from veselova.service.whole_file import whole_file
@@ -30,7 +30,7 @@ MEDIA_TYPES: Mapping[str, str] = {
 def media_type_of(name: Any) -> str:
     """Return the media type of a format; raises InvalidInput for another name."""
     if name not in MEDIA_TYPES:
-        raise InvalidInput(("format",), f"one of {', '.join(MEDIA_TYPES)}", shown(name))
+        raise unknown_name(("format",), name, list(MEDIA_TYPES))
     return MEDIA_TYPES[name]
 
 

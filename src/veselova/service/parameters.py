@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.errors import InvalidInput, shown
+from veselova.mechanics.errors import InvalidInput, shown, unknown_name
 from veselova.mechanics.exact import exact_number
 
 __all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replaced", "tabulated"]
@@ -177,7 +177,7 @@ def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
         raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", shown(count))
     if spacing not in _SPACINGS:
-        raise InvalidInput((*where, "spacing"), f"one of {', '.join(_SPACINGS)}", shown(spacing))
+        raise unknown_name((*where, "spacing"), spacing, _SPACINGS)
     start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
     if not math.isfinite(stop - start):
         raise InvalidInput(where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}")

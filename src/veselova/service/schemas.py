@@ -6,14 +6,16 @@ problem is built, so that Python, command line and HTTP refuse the same input wi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from veselova.engines import require_options
 from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.errors import InvalidInput, InvalidRequest, VeselovaError, shown
+from veselova.mechanics.errors import Faults, InvalidInput, InvalidRequest, VeselovaError, did_you_mean, shown, unknown_name
 from veselova.mechanics.problem import Problem
 from veselova.mechanics.times import TimeGrid
 from veselova.service.examples import BODY4, BODY4_PROBLEM
@@ -30,6 +32,10 @@ _MOST_FIELDS = 40
 
 #: No system has as many series.
 MOST_OUTPUTS = 20
+
+#: Problems and times up to here are looked at for further faults before the limits of the server are.
+_SMALL_DIMENSION = 16
+_FEW_TIMES = 1000
 
 #: A field name is quoted up to here.
 _LONGEST_NAME = 100
@@ -82,13 +88,20 @@ class ComparisonRequest(TorusRequest):
 
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request for the system that it asks of."""
-        kind = SYSTEMS[self.problem.system].problem_class
-        named = f"one of {', '.join(kind.outputs)}"
-        return [
-            InvalidInput(("outputs", i), named, shown(name))
-            for i, name in enumerate(self.outputs or ())
-            if name not in kind.outputs
-        ]
+        kind, faults = SYSTEMS[self.problem.system].problem_class, Faults()
+        self._try_options(faults)
+        for i, name in enumerate(self.outputs or ()):
+            if name not in kind.outputs:
+                faults.found.append(unknown_name(("outputs", i), name, list(kind.outputs)))
+        if faults.found and self.problem.dimension <= _SMALL_DIMENSION and self.time_count() <= _FEW_TIMES:
+            faults.attempt(self.problem.problem)
+            faults.attempt(self.time_grid)
+        return faults.found
+
+    def _try_options(self, faults: Faults) -> None:
+        """Collect what is wrong with the options of the engines."""
+        if self.method is not None:  # of the numerical engine
+            faults.attempt(require_options, SYSTEMS[self.problem.system].problem_class, "numeric", self.method, None)
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""
@@ -120,6 +133,13 @@ class TrajectoryRequest(ComparisonRequest):
         except VeselovaError:  # a fault that is named where the problem is solved
             return next(iter(kind.engines))
 
+    def _try_options(self, faults: Faults) -> None:
+        kind = SYSTEMS[self.problem.system].problem_class
+        if self.engine is None and (self.method, self.formulation) == (None, None):
+            return
+        engine = self.engine or ("analytic" if self._exact and "analytic" in kind.engines else self.chosen_engine)
+        faults.attempt(require_options, kind, engine, self.method, self.formulation, self.digits, self.certified)
+
     @property
     def _exact(self) -> bool:
         return beyond_double(self.digits, self.certified)
@@ -138,7 +158,8 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     try:
         request = model.model_validate(document)
     except ValidationError as error:
-        raise InvalidRequest([_fault(item) for item in error.errors(include_url=False, include_context=True)]) from None
+        found = error.errors(include_url=False, include_context=True)
+        raise InvalidRequest([_fault(item, _fields(model, document, item["loc"])) for item in found]) from None
     if faults := request.faults():
         raise InvalidRequest(faults)
     return request
@@ -149,7 +170,14 @@ def _is_deeper(document: Any, levels: int) -> bool:
     return any(isinstance(value, (dict, list)) for value in next(islice(layers(document), levels, None), ()))
 
 
-def _fault(item: Any) -> InvalidInput:
+def _fields(model: type[TorusRequest], document: Any, place: tuple[int | str, ...]) -> Sequence[str]:
+    """Return the names of the fields that there are where pydantic found a fault."""
+    if len(place) == 1:
+        return list(model.model_fields)
+    return list(SYSTEMS[document["problem"]["system"]].model_fields) if len(place) == 3 and place[1] in SYSTEMS else []
+
+
+def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     """Return pydantic's finding in the words of the other doors: field, required, given."""
     path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
     if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:  # where pydantic says which model it took
@@ -160,11 +188,11 @@ def _fault(item: Any) -> InvalidInput:
             return InvalidInput((*path, "system"), "this field", "nothing")
         return InvalidInput(path, "a JSON object", given)
     if kind == "union_tag_invalid":
-        return InvalidInput((*path, "system"), f"one of {', '.join(SYSTEMS)}", shown(item["input"]["system"]))
+        return unknown_name((*path, "system"), item["input"]["system"], list(SYSTEMS))
     if kind == "missing":
         return InvalidInput(path, "this field", "nothing")
     if kind == "extra_forbidden":
-        return InvalidInput(path, "no field of this name", f"the field {shown(str(path[-1]))}")
+        return InvalidInput(path, "no field of this name", f"the field {shown(str(path[-1]))}{did_you_mean(path[-1], fields)}")
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return InvalidInput(path, "a JSON object", given)
     required: str = {

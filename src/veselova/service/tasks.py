@@ -7,6 +7,7 @@ from typing import Any
 
 from veselova.engines import Prepared, compare, torus
 from veselova.mechanics.comparison import Comparison
+from veselova.mechanics.errors import Faults
 from veselova.mechanics.torus import Torus
 from veselova.mechanics.trajectory import Trajectory
 from veselova.service.documents import comparison_document, encoded, trajectory_document
@@ -18,9 +19,13 @@ __all__ = ["TASKS", "requested_comparison", "requested_torus", "requested_trajec
 
 def requested_trajectory(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
     """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that is made already."""
-    prepared = prepared or Prepared(request.problem.problem())
+    faults = Faults()
+    prepared = prepared or faults.attempt(lambda: Prepared(request.problem.problem()))
+    grid = faults.attempt(request.time_grid)
+    faults.require_none()
+    assert prepared is not None
     options: dict[str, Any] = {name: getattr(request, name) for name in ("digits", "certified", "formulation")}
-    return prepared.solve(request.time_grid(), request.engine, request.method, **options)
+    return prepared.solve(grid, request.engine, request.method, **options)
 
 
 def requested_comparison(request: ComparisonRequest) -> Comparison:

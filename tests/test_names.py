@@ -1,0 +1,88 @@
+"""Names that are none: refused at once at every door, with the one that may have been meant, and with all other faults."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import pytest
+
+import veselova as vs
+from conftest import Server
+from test_http import is_problem, post
+from veselova.mechanics.errors import did_you_mean
+from veselova.service.examples import BODY4_PROBLEM
+from veselova.service.schemas import TrajectoryRequest, read_request
+
+VARY = {"/A/0": {"start": 3, "stop": 4, "count": 3}}
+NAMES = [
+    ({"method": "theeta"}, "/method", "theta"),
+    ({"method": "nufft", "engine": "numeric"}, "/method", None),
+    ({"method": "dop583", "engine": "numeric"}, "/method", "dop853"),
+    ({"engine": "numeric", "formulation": "reducde"}, "/formulation", "reduced"),
+    ({"formulation": "reduced"}, "/formulation", None),
+    ({"outputs": ["q", "fraem"]}, "/outputs/1", "frame"),
+    ({"problem": {**BODY4_PROBLEM, "system": "veselovaa"}}, "/problem/system", "veselova"),
+    ({"problem": {**BODY4_PROBLEM, "qdot": [1]}}, "/problem/qdot", "q_dot"),
+    ({"outpust": ["q"]}, "/outpust", "outputs"),
+]
+
+
+@pytest.mark.parametrize("path", ["/v1/trajectories", "/v1/sweeps"])
+@pytest.mark.parametrize(("change", "pointer", "meant"), NAMES)
+def test_an_unknown_name_is_refused_at_once(server: Server, path: str, change: Any, pointer: str, meant: str | None) -> None:
+    body = {"problem": BODY4_PROBLEM, "times": [0, 1], **({"vary": VARY} if path == "/v1/sweeps" else {}), **change}
+    document = is_problem(post(server, path, body), 422, "invalid-input")
+    assert [error["pointer"] for error in document["errors"]] == [pointer]
+    assert (f"(did you mean {meant}?)" in document["detail"]) == (meant is not None)
+
+
+def test_a_comparison_takes_methods_of_integration_alone(server: Server) -> None:
+    for method in ("theta", "tailor"):
+        document = is_problem(
+            post(server, "/v1/comparisons", {"problem": BODY4_PROBLEM, "times": [0, 1], "method": method}), 422, "invalid-input"
+        )
+        assert document["errors"][0]["pointer"] == "/method"
+
+
+def test_all_faults_of_a_body_come_back_together(server: Server) -> None:
+    bad = {**BODY4_PROBLEM, "A": ["x", 2, 1, 1]}
+    body = {"problem": bad, "times": ["x", 0], "engine": "numeric", "method": "tailor", "digits": 30, "outputs": ["Q"]}
+    document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
+    pointers = {error["pointer"] for error in document["errors"]}
+    assert pointers == {"/problem/A/0", "/times/0", "/method", "/digits", "/outputs/0"}
+    document = is_problem(post(server, "/v1/trajectories", {"problem": bad, "times": ["x", 0]}), 422, "invalid-input")
+    assert {error["pointer"] for error in document["errors"]} == {"/problem/A/0", "/times/0"}
+
+
+def test_times_without_end_are_not_made_for_the_sake_of_further_faults() -> None:
+    times = {"start": 0, "stop": 1, "count": 10**12}
+    with pytest.raises(vs.InvalidInput) as caught:
+        read_request(TrajectoryRequest, {"problem": BODY4_PROBLEM, "times": times, "method": "none"})
+    assert [fault.field for fault in caught.value.faults] == ["method"]
+
+
+def test_attributes_that_are_none_name_the_nearest() -> None:
+    with pytest.raises(AttributeError, match=r"no attribute 'Veselovaa' \(did you mean Veselova\?\)$"):
+        _ = vs.Veselovaa
+    trajectory = vs.solve(vs.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1]), [0, 1])
+    with pytest.raises(AttributeError, match=r"has no 'omga' \(did you mean omega\?\)$"):
+        _ = trajectory.omga
+    with pytest.raises(AttributeError, match=r"\(did you mean error\?\)$"):
+        _ = trajectory.eror
+    assert pickle.loads(pickle.dumps(trajectory)).error.shape == (2,)
+
+
+def test_python_names_all_faults_of_its_options() -> None:
+    problem = vs.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1])
+    with pytest.raises(vs.InvalidRequest) as caught:
+        vs.solve(problem, [0, 1], "numeric", "tailor", digits=30, formulation="redced")
+    assert [fault.field for fault in caught.value.faults] == ["method", "formulation", "digits"]
+    with pytest.raises(vs.InvalidInput, match=r"engine: .*given analitic \(did you mean analytic\?\)"):
+        vs.solve(problem, [0, 1], "analitic")
+
+
+def test_a_suggestion_is_near_or_none() -> None:
+    assert did_you_mean("OMEGA", ["omega", "q"]) == " (did you mean omega?)"
+    for given in ("zzz", "", 3, None, ["omega"], "omega" * 10**6):
+        assert did_you_mean(given, ["omega", "q"]) == ""
