@@ -208,7 +208,7 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
 
 
 def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
-    row = "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', NULL)"
+    row = "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', NULL, '', 1)"
     with sqlite3.connect(own.log.parent / "data" / "veselova.db") as database:
         database.execute(row)
     assert numbers(own)[("veselova_jobs", "failed")] == 1
@@ -265,7 +265,8 @@ def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None
     with sqlite3.connect(tmp_path / "veselova.db") as database:
         database.execute("DROP TABLE api_keys")
     detail = is_problem(in_process(broken, "/readyz"), 503, "not-ready")["detail"]
-    assert detail == "No worker is warm yet. The keys cannot be read: the database does not answer (OperationalError)."
+    parts = ("No worker is warm yet.", "Jobs cannot be stored or read at present.")
+    assert detail == f"{' '.join(parts)} The keys cannot be read: the database does not answer (OperationalError)."
 
 
 @pytest.mark.parametrize("busy", [True, False])

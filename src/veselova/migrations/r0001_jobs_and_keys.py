@@ -10,7 +10,7 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Make the tables."""
+    """Make the tables; some are there already where version 0.1.0 was stopped in the middle of this step."""
     op.create_table(
         "jobs",
         sa.Column("id", sa.String(32), primary_key=True),
@@ -21,19 +21,22 @@ def upgrade() -> None:
         sa.Column("chunk_rows", sa.Integer, nullable=False),
         sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
         sa.Column("finished_at", sa.DateTime(timezone=True)),
+        if_not_exists=True,
     )
-    op.create_index("ix_jobs_state", "jobs", ["state"])
+    op.create_index("ix_jobs_state", "jobs", ["state"], if_not_exists=True)
     op.create_table(
         "chunks",
         sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
         sa.Column("position", sa.Integer, primary_key=True, autoincrement=False),
         sa.Column("rows", sa.Integer, nullable=False),
         sa.Column("sha256", sa.String(64), nullable=False),
+        if_not_exists=True,
     )
     op.create_table(
         "idempotency_keys",
         sa.Column("key", sa.String(255), primary_key=True),
         sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False),
+        if_not_exists=True,
     )
     op.create_table(
         "api_keys",
@@ -42,6 +45,7 @@ def upgrade() -> None:
         sa.Column("sha256", sa.String(64), nullable=False, unique=True),
         sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
         sa.Column("revoked_at", sa.DateTime(timezone=True)),
+        if_not_exists=True,
     )
 
 

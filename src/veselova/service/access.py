@@ -10,6 +10,7 @@ import anyio.to_thread
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from veselova.service.caller import ADMIN, READ, SOLVE, Caller, put_caller
 from veselova.service.keys import Key, Keys
 from veselova.service.problem_details import Refused, problem_response
 from veselova.service.rates import Allowance, Rate, network_of, rate_of
@@ -23,6 +24,10 @@ UNLIMITED = frozenset({"/healthz", "/readyz"})
 
 #: The contract of the service is no secret: without a key, within the limit of the address.
 _PUBLIC = frozenset({"/docs", "/openapi.json"})
+
+#: Methods for which a key of scope ``read`` is enough, and paths that tell of what all do.
+_READING = frozenset({"GET", "HEAD", "OPTIONS"})
+_ADMINISTRATIVE = frozenset({"/metrics"})
 
 #: Anything else is no method of HTTP; what is counted by method must not be counted by a client's inventions.
 _METHODS = frozenset(HTTPMethod) | {"QUERY"}
@@ -66,7 +71,7 @@ class Access:
         self._refused = refused
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer it with 401, 429, 501 or 503."""
+        """Pass a request on, or answer it with 401, 403, 429, 501 or 503."""
         if scope["type"] != "http" or scope["path"] in UNLIMITED:
             await self._app(scope, receive, send)
             return
@@ -94,6 +99,7 @@ class Access:
             raise Refused("unknown-method", "The method is not one of HTTP's.")
         address = network_of((scope.get("client") or (None,))[0])
         credentials = Headers(scope=scope).getlist("authorization")
+        put_caller(scope, Caller(address))
         if self._policy.keys is None or not credentials:
             await _spend(self._policy.by_address, address, "address", headers)
             if self._policy.keys is None or scope["path"] in _PUBLIC:
@@ -103,6 +109,8 @@ class Access:
         key = await self._holder(self._policy.keys, credentials, address, headers)
         note(key=key.id)
         await _spend(self._policy.by_key, key.id, "key", headers)
+        _require_scope(key, _scope_of(scope), headers)
+        put_caller(scope, Caller(key.owner, key.owner, key.scope))
 
     async def _holder(self, keys: Keys, credentials: list[str], address: str, headers: dict[str, str]) -> Key:
         """Return the key that was shown; an address that showed too many wrong ones is not looked at."""
@@ -113,12 +121,28 @@ class Access:
         key = None
         if len(credentials) == 1 and scheme.lower() == "bearer":
             key = await anyio.to_thread.run_sync(keys.holder, text.strip())
+        if key is not None and key.expired:
+            headers["WWW-Authenticate"] = 'Bearer realm="veselova", error="invalid_token"'
+            raise Refused("unauthorized", "The API key has expired; whoever runs the server can make another.")
         if key is not None:
             return key
         if failures is not None:
             await failures.spend(address)
         headers["WWW-Authenticate"] = 'Bearer realm="veselova", error="invalid_token"'
         raise Refused("unauthorized", "Authorization: required an API key of this server, as Bearer vsl_…; given another.")
+
+
+def _scope_of(scope: Scope) -> str:
+    """Return the scope that a request needs; it is found before anything is looked for, so a refusal tells of nothing."""
+    if scope["path"] in _ADMINISTRATIVE:
+        return ADMIN
+    return READ if scope["method"] in _READING else SOLVE
+
+
+def _require_scope(key: Key, needed: str, headers: dict[str, str]) -> None:
+    if not Caller(scope=key.scope).may(needed):
+        headers["WWW-Authenticate"] = f'Bearer realm="veselova", error="insufficient_scope", scope="{needed}"'
+        raise Refused("insufficient-scope", f"The API key: required scope {needed}; given one of scope {key.scope}.")
 
 
 async def _spend(rate: Rate | None, caller: str, kind: str, headers: dict[str, str]) -> None:

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from veselova.service.admission import require_acceptable
 from veselova.service.cache import Cache
+from veselova.service.caller import caller_of
 from veselova.service.connection import while_connected
 from veselova.service.delivery import Delivery, Wanted, answered, restored, solved
 from veselova.service.entry import DamagedEntry
@@ -69,7 +70,9 @@ class Answers:
 
         async def work() -> Response:
             with self._metrics.work(kind, asked.system, asked.engine):
-                delivery = await self._workers.run(answered, kind, asked.content, wanted, budget_s=asked.budget_s)
+                delivery = await self._workers.run(
+                    answered, kind, asked.content, wanted, budget_s=asked.budget_s, caller=caller_of(request).name
+                )
             return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
 
         return await self._guarded(request, work, wanted.place)
@@ -79,29 +82,30 @@ class Answers:
         form = _format(request)
         asked = await self._reader.asked("trajectory", request)
         name = asked.name
-        await self._require_news(request, name, entity_tag(name, form.name))
+        kept_as = _kept_as(name, request)
+        await self._require_news(request, kept_as, entity_tag(name, form.name))
         wanted = Wanted(form.name, _coding(request), self._place(asked.large))
-        entry, content = self._cache.entry(name), self._pending.find(name)
+        entry, content = self._cache.entry(kept_as), self._pending.find(kept_as)
         task = (restored, content, wanted) if content else (solved, asked.content, wanted, entry)
 
         async def work() -> Response:
             with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
-                    delivery = await self._workers.run(*task, budget_s=asked.budget_s)
+                    delivery = await self._workers.run(*task, budget_s=asked.budget_s, caller=caller_of(request).name)
                     ending.kept = delivery.kept
                 finally:
                     self._metrics.cached(hit=ending.kept)
-            headers = _headers(name, form, await self._kept(name, delivery))
+            headers = _headers(name, form, await self._kept(kept_as, delivery))
             return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.kept else headers)
 
         return await self._guarded(request, work, wanted.place, None if entry is None else entry.part)
 
-    async def _require_news(self, request: Request, name: str, tag: str) -> None:
+    async def _require_news(self, request: Request, kept_as: str, tag: str) -> None:
         """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304 answers GET and HEAD alone."""
         stated = _header(request, "if-none-match")
         if stated is None:
             return
-        if matches(stated, tag, await self._find(name) is not None):
+        if matches(stated, tag, await self._find(kept_as) is not None):
             raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
 
     async def _find(self, name: str) -> bytes | str | None:
@@ -123,7 +127,8 @@ class Answers:
     async def named(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
         form = _format(request)
-        kept = await self._find(name) if is_identity(name) else None
+        kept_as = _kept_as(name, request)
+        kept = await self._find(kept_as) if is_identity(name) else None
         if kept is None:
             raise _not_kept(name)
         headers = {**_headers(name, form), "Cache-Control": _FOREVER}
@@ -136,17 +141,17 @@ class Answers:
         wanted = Wanted(form.name, _coding(request), self._place(_bytes(kept) > _LARGE_BYTES))
 
         async def work() -> Response:
-            delivery = await self._restored(name, kept, wanted, self._settings.max_budget_s)
+            delivery = await self._restored(kept_as, kept, wanted, caller_of(request).name)
             if delivery is None:
                 raise _not_kept(name)
             return _response(delivery, wanted, {**headers, "Cache-Status": _HIT})
 
         return await self._guarded(request, work, wanted.place)
 
-    async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, budget_s: float) -> Delivery | None:
+    async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, caller: str) -> Delivery | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
-            return await self._workers.run(restored, kept, wanted, budget_s=budget_s)
+            return await self._workers.run(restored, kept, wanted, budget_s=self._settings.max_budget_s, caller=caller)
         except DamagedEntry:
             await to_thread.run_sync(self._cache.discard, name)
         except FileNotFoundError:
@@ -204,6 +209,12 @@ def _bytes(kept: bytes | str) -> int:
         return len(kept) if isinstance(kept, bytes) else Path(kept).stat().st_size
     except OSError:
         return 0
+
+
+def _kept_as(name: str, request: Request) -> str:
+    """Return the name under which the cache has an answer: that of an owner is no name of an answer, and so nobody else's."""
+    owner = caller_of(request).owner
+    return f"{owner}-{name}" if owner else name
 
 
 def _not_kept(name: str) -> Refused:

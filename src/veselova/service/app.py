@@ -27,6 +27,7 @@ from veselova.service.job_service import JobService
 from veselova.service.keys import open_keys
 from veselova.service.metrics import Metrics
 from veselova.service.openapi import openapi_document
+from veselova.service.private_folder import require_own
 from veselova.service.problem_details import Refused, problem_code, problem_response
 from veselova.service.readiness import missing_parts
 from veselova.service.reading import Reader
@@ -50,15 +51,17 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     """Return the application; settings come from the environment when none are given.
 
     ``loopback`` says that nobody but this machine can connect; clients need no API key then, unless the settings require one.
-    Raises Refused where keys are required and their database cannot be opened.
+    Raises Refused where keys are required and their database cannot be opened, InvalidInput for a folder that others may write.
     """
     limits = settings or Settings()
     metrics = Metrics()
-    workers = Workers(limits, metrics)
+    require_own(limits.data_dir)
+    requires_keys = Policy.requires_keys(limits, loopback)
+    workers = Workers(limits, metrics, shared=requires_keys)
     reader = Reader(limits, workers)
     answers = Answers(limits, workers, reader, metrics)
-    keys = open_keys(limits) if Policy.requires_keys(limits, loopback) else None
-    if keys is not None and not any(key.revoked_at is None for key in keys.list()):
+    keys = open_keys(limits) if requires_keys else None
+    if keys is not None and not any(key.state == "valid" for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")
     jobs = JobService(limits)
     metrics.gauges("veselova_jobs", "Sweeps by state", "state", jobs.counts)

@@ -27,6 +27,7 @@ class JobDocument(BaseModel):
     created_at: str
     finished_at: str | None
     request: dict[str, Any] | None = Field(description="the request, its defaults filled in; null in listings and events")
+    owner: str | None = Field(description="of the key that asked for it; null where no key is shown")
     links: dict[str, str]
 
 
@@ -60,6 +61,7 @@ def job_document(job: JobStatus, progress: Progress | None, trajectories: bool) 
         created_at=job.created_at.isoformat(),
         finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
         request=None,
+        owner=job.owner or None,
         links=links,
     ).model_dump()
     if (request := getattr(job, "request", None)) is not None:

@@ -14,6 +14,7 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.admission import require_acceptable
+from veselova.service.caller import ADMIN, caller_of
 from veselova.service.download import MEDIA_TYPES
 from veselova.service.job_document import JobDocument, JobList, job_document
 from veselova.service.job_service import JobService
@@ -60,6 +61,7 @@ _ARCHIVE: dict[int | str, dict[str, Any]] = {
 }
 
 _Key = Annotated[str | None, Header(description="a request that comes again with its key never makes a second job")]
+_All = Annotated[bool, Query(alias="all", description="those of everybody; for keys of scope admin")]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
 
@@ -111,29 +113,34 @@ class _JobRoutes:
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")
         asked = await self._reader.asked("sweep", request)
-        job = await self._service.ask(lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key))
+        owner = caller_of(request).owner
+        job = await self._service.ask(lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key, owner))
         if not job.ended:
             (await self._service.sweeps()).begin(job.id)
-        return _json(await self._document(job.id, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
+        return _json(await self._document(job.id, request, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
 
-    async def listed(self) -> Response:
-        """List the last jobs."""
-        found = await self._service.ask(lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest()])
+    async def listed(self, request: Request, everybody: _All = False) -> Response:
+        """List the last jobs of the caller, or of all."""
+        caller = caller_of(request)
+        if everybody and not caller.may(ADMIN):
+            raise Refused("insufficient-scope", f"The jobs of all: required a key of scope {ADMIN}; given {caller.scope}.")
+        owner = None if everybody else caller.owner
+        found = await self._service.ask(lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest(owner)])
         sweeps = await self._service.sweeps()
         return _json({"jobs": [job_document(job, sweeps.progress(job.id), kept) for job, kept in found]})
 
-    async def job(self, job_id: str) -> Response:
+    async def job(self, job_id: str, request: Request) -> Response:
         """Tell all of a job, its request included."""
-        return _json(await self._document(job_id))
+        return _json(await self._document(job_id, request))
 
-    async def require(self, job_id: str) -> None:
-        """Raise Refused unless there is such a job."""
-        await self._service.ask(lambda jobs: jobs.status(job_id))
+    async def require(self, job_id: str, request: Request) -> None:
+        """Raise Refused unless the caller has such a job: that of another is as good as absent."""
+        await self._status(job_id, request)
 
-    async def events(self, job_id: str) -> AsyncIterator[ServerSentEvent]:
+    async def events(self, job_id: str, request: Request) -> AsyncIterator[ServerSentEvent]:
         """Tell how far a job is until it has ended."""
         while True:
-            document = await self._document(job_id, whole=False)
+            document = await self._document(job_id, request, whole=False)
             yield ServerSentEvent(data=document, event=document["state"])
             if document["finished_at"] is not None:
                 return
@@ -142,7 +149,7 @@ class _JobRoutes:
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
         media_type = accepted_type(request.headers.get("accept"), list(_TABLES))
-        await self._require_finished(job_id)
+        await self._require_finished(job_id, request)
         path: Path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
         if not path.is_file():
             raise Refused("no-such-resource", "The files of this job are gone; POST its request again.")
@@ -154,32 +161,38 @@ class _JobRoutes:
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return StreamingResponse(table_stream(path, _TABLES[media_type]), media_type=media_type, headers=headers)
 
-    async def trajectories(self, job_id: str) -> Response:
+    async def trajectories(self, job_id: str, request: Request) -> Response:
         """Give the Zarr store of a finished job in one file."""
-        await self._require_finished(job_id)
+        await self._require_finished(job_id, request)
         path: Path = await self._service.ask(lambda jobs: jobs.packed_path(job_id))
         if not path.is_file():
             raise Refused("no-such-resource", "The sweep did not ask for its trajectories to be kept, or none could be computed.")
         return FileResponse(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
 
-    async def end(self, job_id: str, remove: _Remove = False) -> Response:
+    async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
         """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
-        await self.require(job_id)
+        await self.require(job_id, request)
         await (await self._service.sweeps()).cancel(job_id)
         if not remove:
-            return _json(await self._document(job_id, whole=False))
+            return _json(await self._document(job_id, request, whole=False))
         await self._service.ask(lambda jobs: jobs.remove(job_id))
         return Response(status_code=204)
 
-    async def _document(self, job_id: str, whole: bool = True) -> dict[str, Any]:
+    async def _status(self, job_id: str, request: Request) -> JobStatus:
+        owner = caller_of(request).seen
+        return await self._service.ask(lambda jobs: jobs.status(job_id, owner))
+
+    async def _document(self, job_id: str, request: Request, whole: bool = True) -> dict[str, Any]:
+        owner = caller_of(request).seen
+
         def asked(jobs: Jobs) -> tuple[JobStatus, bool]:
-            return (jobs.get if whole else jobs.status)(job_id), jobs.packed_path(job_id).exists()
+            return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(job_id).exists()
 
         job, kept = await self._service.ask(asked)
         return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
 
-    async def _require_finished(self, job_id: str) -> None:
-        found = await self._service.ask(lambda jobs: jobs.status(job_id))
+    async def _require_finished(self, job_id: str, request: Request) -> None:
+        found = await self._status(job_id, request)
         if found.state != "finished":
             raise Refused("not-finished", f"The job is {found.state}; its result is there when it has finished.", retry_after=2)
 

@@ -9,11 +9,11 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 import anyio
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.exc import DataError, SQLAlchemyError
 
-from veselova.mechanics.errors import BackendMissing, install_extra
-from veselova.service.database import reason_of
-from veselova.service.problem_details import Refused
+from veselova.mechanics.errors import BackendMissing, InvalidInput, install_extra
+from veselova.service.database import is_outage, reason_of
+from veselova.service.problem_details import Refused, problem_code
 from veselova.service.settings import Settings
 
 if TYPE_CHECKING:
@@ -75,18 +75,33 @@ class JobService:
             sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
             await sweeps.resume()
             self._watching = asyncio.create_task(sweeps.watch())
+        except (Refused, InvalidInput) as error:  # which names a file, and what is to be done by whoever runs the server
+            if self.failure != str(error):
+                _LOG.error("no sweeps: %s", error)
+            self.failure = str(error)
+            detail = f"Jobs cannot be stored at present: {problem_code(error)}."
+            raise Refused("storage-unavailable", detail, retry_after=30) from None
         except (OSError, SQLAlchemyError) as error:
+            if not is_outage(error):
+                raise
             self.failure = reason_of(error)
             raise Refused("storage-unavailable", f"Jobs cannot be stored at present: {self.failure}.", retry_after=30) from None
         self.failure = ""
         return sweeps
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
-        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or the database refuse."""
+        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or the database refuse.
+
+        Values that the database cannot hold are InvalidInput. What it says of our statements is no outage, and is raised.
+        """
         sweeps = await self.sweeps()
         try:
             return await anyio.to_thread.run_sync(call, sweeps.jobs)
+        except DataError:
+            raise InvalidInput((), "values that the database can hold", "others") from None
         except (OSError, SQLAlchemyError) as error:
+            if not is_outage(error):
+                raise
             _LOG.warning("the storage of jobs failed: %s", reason_of(error))
             detail = f"Jobs cannot be stored or read at present: {reason_of(error)}."
             raise Refused("storage-unavailable", detail, retry_after=30) from None

@@ -1,31 +1,32 @@
-"""Jobs as they are kept: what was asked, what is done, and the files of the finished chunks."""
+"""Jobs as they are kept: what was asked, by whom, what is done, and the files of the finished chunks."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
-import shutil
+import re
+from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import orjson
 import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
 
-from veselova.mechanics.errors import InvalidInput
-from veselova.service.database import chunks, connect, idempotency_keys, in_utc, jobs
+from veselova.mechanics.errors import InvalidInput, VeselovaError
+from veselova.service.database import chunks, connect, idempotency_keys, in_utc, jobs, writing
+from veselova.service.job_admission import ENDED, promised_bytes, require_room
+from veselova.service.job_files import JobFiles, write_whole
 from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.settings import Settings
+from veselova.service.sqlite_file import vacuum
 from veselova.service.sweep_request import SweepPlan, SweepRequest
-from veselova.service.whole_file import whole_file
 
-__all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs"]
+__all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs", "job_id_of"]
 
-#: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
-ENDED = ("finished", "failed", "cancelled")
+#: What the id of a job looks like; no other text is looked for.
+_ID = re.compile(r"[0-9a-f]{32}")
 
 #: Jobs in one listing.
 _LISTED = 100
@@ -47,6 +48,8 @@ class JobStatus:
     chunk_rows: int
     created_at: datetime
     finished_at: datetime | None
+    owner: str
+    bytes: int
     done: int
 
     @property
@@ -80,81 +83,60 @@ class JobEnded(Exception):
     """A job that goes on no more: it was cancelled or removed, perhaps by another server, while this one worked at it."""
 
 
-class Jobs:
-    """The jobs of one database and one folder. A chunk counts when its file is on the disk and its hash in the database."""
+class Jobs(JobFiles):
+    """The jobs of one database and one folder. A chunk counts when its file is on the disk and its hash in the database.
+
+    Where an ``owner`` is asked for, jobs of another are as good as absent; None stands for all of them.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._engine = connect(settings)
-        self.folder = settings.data_dir / "jobs"
-        self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        super().__init__(settings.data_dir / "jobs")
+        self._count_uncounted()
 
     def close(self) -> None:
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(self, sweep: SweepPlan | SweepRequest, key: str | None = None) -> Job:
-        """Return the job of a sweep: a new one, or the one that the same request made, which goes on if it had been stopped,
-        and is run again if its results were lost.
+    def submit(self, sweep: SweepPlan | SweepRequest, key: str | None = None, owner: str = "") -> Job:
+        """Return the owner's job of a sweep: a new one, or the one that the same request made, which goes on if it had been
+        stopped, and is run again if its results were lost.
 
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or beyond the limits of the settings,
         Refused (``too-many-jobs``, ``storage-full``) while others take the room.
         """
-        try:
-            self._submit(sweep, key)
-        except sa.exc.IntegrityError:  # another asked for the same at the same moment: by now the job, or the key, is there
-            self._submit(sweep, key)
-        return self.get(sweep.id)
-
-    def _submit(self, sweep: SweepPlan | SweepRequest, key: str | None) -> None:
-        with self._engine.begin() as connection:
+        job_id, size = job_id_of(sweep, owner), promised_bytes(sweep)
+        with writing(self._engine, "submissions") as connection:
             if key is not None:
-                self._claim(connection, key, sweep)
-            state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == sweep.id)).scalar()
+                _claim(connection, {"owner": owner, "key": key, "job_id": job_id, "created_at": datetime.now(UTC)})
+            state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
             if state is None:
-                self._admit(connection, sweep)
-                connection.execute(sa.insert(jobs).values(_new(sweep)))
-            elif state in ("failed", "cancelled") or (state == "finished" and not self.result_path(sweep.id).exists()):
-                again = {"state": "queued", "detail": "", "finished_at": None}
-                connection.execute(sa.update(jobs).where(jobs.c.id == sweep.id).values(again))
-            if key is not None and not _job_of(connection, key):
-                connection.execute(sa.insert(idempotency_keys).values(key=key, job_id=sweep.id))
+                require_room(connection, sweep, job_id, owner, self._settings)
+                connection.execute(sa.insert(jobs).values({**_new(sweep), "id": job_id, "owner": owner, "bytes": size}))
+            elif state in ("failed", "cancelled") or (state == "finished" and not self.result_path(job_id).exists()):
+                require_room(connection, sweep, job_id, owner, self._settings)
+                again = {"state": "queued", "detail": "", "finished_at": None, "bytes": size}
+                connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(again))
+        return self.get(job_id)
 
-    def _claim(self, connection: sa.Connection, key: str, sweep: SweepPlan | SweepRequest) -> None:
-        if _job_of(connection, key) not in (None, sweep.id):
-            raise InvalidInput(("Idempotency-Key",), "a key of its own for every request", "one that came with another request")
-
-    def _admit(self, connection: sa.Connection, sweep: SweepPlan | SweepRequest) -> None:
-        """Refuse a sweep that is beyond the limits, before anything of it is stored."""
-        limits, size = self._settings, sweep.total * sweep.row_values * 8
-        if sweep.total > limits.max_sweep_problems:
-            raise InvalidInput(("vary",), f"at most {limits.max_sweep_problems} problems on this server", str(sweep.total))
-        if size > limits.max_sweep_bytes:
-            room = f"at most {limits.max_sweep_bytes} bytes of results on this server"
-            raise InvalidInput(("trajectories" if sweep.trajectories else "vary",), room, f"about {size}")
-        waiting = connection.execute(sa.select(sa.func.count()).where(jobs.c.state.not_in(ENDED))).scalar_one()
-        if waiting >= limits.max_jobs:
-            raise Refused("too-many-jobs", f"{waiting} jobs are waiting or running; try again later.", retry_after=30)
-        if size + self.stored_bytes() > limits.max_stored_bytes:
-            detail = (
-                "The results of earlier jobs take the room that this server has for them; remove some (DELETE …?remove=true)."
-            )
-            raise Refused("storage-full", detail)
-
-    def get(self, job_id: str) -> Job:
+    def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
-        row = self._row(_STATUS.add_columns(jobs.c.request).where(jobs.c.id == job_id), job_id)
+        row = self._row(_STATUS.add_columns(jobs.c.request), job_id, owner)
         return Job(**_status(row), request=row["request"].encode())
 
-    def status(self, job_id: str) -> JobStatus:
+    def status(self, job_id: str, owner: str | None = None) -> JobStatus:
         """Return how far a job is; raises Refused (``no-such-job``)."""
-        return JobStatus(**_status(self._row(_STATUS.where(jobs.c.id == job_id), job_id)))
+        return JobStatus(**_status(self._row(_STATUS, job_id, owner)))
 
-    def _row(self, query: sa.Select[Any], job_id: str) -> sa.RowMapping:
-        with self._engine.connect() as connection:
-            found = connection.execute(query).mappings().first()
+    def _row(self, query: sa.Select[Any], job_id: str, owner: str | None) -> sa.RowMapping:
+        found = None
+        if _ID.fullmatch(job_id):
+            with self._engine.connect() as connection:
+                found = connection.execute(_of(query.where(jobs.c.id == job_id), owner)).mappings().first()
         if found is None:
-            raise Refused("no-such-job", f"There is no job {job_id[:40]}.")
+            shown = job_id[:40].encode("utf-8", "replace").decode()
+            raise Refused("no-such-job", f"There is no job {shown}.")
         return found
 
     def unfinished(self) -> list[str]:
@@ -163,16 +145,16 @@ class Jobs:
             query = sa.select(jobs.c.id).where(jobs.c.state.not_in(ENDED)).order_by(jobs.c.created_at, jobs.c.id)
             return list(connection.execute(query).scalars())
 
-    def newest(self) -> list[JobStatus]:
+    def newest(self, owner: str | None = None) -> list[JobStatus]:
         """Return the jobs that were made last, newest first."""
-        query = _STATUS.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
+        query = _of(_STATUS, owner).order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
         with self._engine.connect() as connection:
             return [JobStatus(**_status(row)) for row in connection.execute(query).mappings()]
 
     def require_writable(self) -> None:
         """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless the folder can."""
         write_whole(self.folder / "probe", bytes(4096))
-        with self._engine.begin() as connection:
+        with writing(self._engine) as connection:
             connection.execute(sa.update(jobs).where(jobs.c.id == "").values(detail=""))
 
     def counts(self) -> dict[str, int]:
@@ -182,21 +164,25 @@ class Jobs:
             return {str(state): int(count) for state, count in connection.execute(query).all()}
 
     def advance(self, job_id: str, state: str, detail: str = "") -> bool:
-        """Put a job into a state, unless it has ended already; return whether it is there now."""
-        changed: dict[str, Any] = {"state": state, "detail": detail[:2000]}
+        """Put a job into a state, unless it has ended already; return whether it is there now.
+
+        An ended job has the bytes that it takes in place of those which were promised to it.
+        """
+        # Neither half of a surrogate pair nor, on PostgreSQL, a NUL can be stored.
+        changed: dict[str, Any] = {"state": state, "detail": detail[:2000].encode("utf-8", "replace").decode().replace("\0", "")}
         if state in ENDED:
-            changed["finished_at"] = datetime.now(UTC)
-        with self._engine.begin() as connection:
+            changed |= {"finished_at": datetime.now(UTC), "bytes": self.size(job_id) + sa.func.length(jobs.c.request)}
+        with writing(self._engine) as connection:
             query = sa.update(jobs).where(jobs.c.id == job_id, jobs.c.state.not_in(ENDED)).values(changed)
             return connection.execute(query).rowcount > 0
 
     def remove(self, job_id: str) -> None:
         """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on, asked for again meanwhile."""
-        with self._engine.begin() as connection:
+        with writing(self._engine) as connection:
             removed = connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED))).rowcount
         if not removed:
             raise Refused("not-finished", "The job has been asked for again and goes on; cancel it first.", retry_after=2)
-        shutil.rmtree(self.folder / job_id, ignore_errors=True)
+        self.remove_files(job_id)
 
     def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
         """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises JobEnded for a job that has ended."""
@@ -206,55 +192,68 @@ class Jobs:
             raise JobEnded(f"the job is {state or 'removed'}")
         write_whole(self.chunk_path(job_id, position), table)
         values = {"job_id": job_id, "position": position, "rows": rows, "sha256": hashlib.sha256(table).hexdigest()}
-        with self._engine.begin() as connection:
+        with writing(self._engine) as connection:
             connection.execute(sa.delete(chunks).where(chunks.c.job_id == job_id, chunks.c.position == position))
             connection.execute(sa.insert(chunks).values(values))
 
     def missing(self, job: Job) -> list[int]:
         """Return the chunks that are still to be computed; those whose file is lost or damaged are forgotten first."""
-        for path in (self.folder / job.id).rglob("*.part"):  # of a process that died
-            path.unlink(missing_ok=True)
+        self.remove_parts(job.id)
         if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
             return []
         with self._engine.connect() as connection:
             query = sa.select(chunks.c.position, chunks.c.sha256).where(chunks.c.job_id == job.id)
             stored = {int(position): str(digest) for position, digest in connection.execute(query).all()}
-        damaged = [position for position, digest in stored.items() if self._digest(job.id, position) != digest]
-        with self._engine.begin() as connection:
-            for position in damaged:
-                connection.execute(sa.delete(chunks).where(chunks.c.job_id == job.id, chunks.c.position == position))
+        damaged = [position for position, digest in stored.items() if self.digest(job.id, position) != digest]
+        if damaged:
+            with writing(self._engine) as connection:
+                which = (chunks.c.job_id == job.id) & chunks.c.position.in_(damaged)
+                connection.execute(sa.delete(chunks).where(which))
         return [position for position in range(job.chunk_count) if position not in stored or position in damaged]
 
-    def _digest(self, job_id: str, position: int) -> str:
-        try:
-            return hashlib.sha256(self.chunk_path(job_id, position).read_bytes()).hexdigest()
-        except OSError:
-            return ""
+    def remove_old(self, now: datetime) -> int:
+        """Forget the jobs that ended, and the idempotency keys that came, longer ago than the settings say; return how many jobs.
 
-    def chunk_path(self, job_id: str, position: int) -> Path:
-        """Return where the table of a chunk is kept."""
-        return self.folder / job_id / "chunks" / f"{position:06d}.parquet"
+        The room that they took goes back to the disk.
+        """
+        removed = 0
+        if days := self._settings.retain_jobs_days:
+            with self._engine.connect() as connection:
+                old = (jobs.c.finished_at < now - timedelta(days=days)) & jobs.c.state.in_(ENDED)
+                found = list(connection.execute(sa.select(jobs.c.id).where(old)).scalars())
+            for job_id in found:
+                with writing(self._engine) as connection:
+                    gone = connection.execute(sa.delete(jobs).where(old, jobs.c.id == job_id)).rowcount
+                if gone:
+                    removed += 1
+                    self.remove_files(job_id)
+        if days := self._settings.retain_idempotency_days:
+            with writing(self._engine) as connection:
+                connection.execute(sa.delete(idempotency_keys).where(idempotency_keys.c.created_at < now - timedelta(days=days)))
+        vacuum(self._engine)
+        return removed
 
-    def result_path(self, job_id: str) -> Path:
-        """Return where the table of a finished job is kept."""
-        return self.folder / job_id / "summaries.parquet"
+    def _count_uncounted(self) -> None:
+        """Count the bytes of jobs that were made before bytes were counted."""
+        uncounted = jobs.c.bytes == 0
+        with self._engine.connect() as connection:
+            found = connection.execute(sa.select(jobs.c.id, jobs.c.state).where(uncounted)).all()
+        for job_id, state in found:
+            size = self.size(job_id) + len(self.get(job_id).request)
+            if state not in ENDED:
+                with suppress(VeselovaError):  # of a version whose requests were others: it will fail when it is run
+                    size = promised_bytes(self.get(job_id).sweep)
+            with writing(self._engine) as connection:
+                connection.execute(sa.update(jobs).where(jobs.c.id == job_id, uncounted).values(bytes=size))
 
-    def trajectories_path(self, job_id: str) -> Path:
-        """Return where the Zarr store of a running job is kept."""
-        return self.folder / job_id / "trajectories.zarr"
 
-    def packed_path(self, job_id: str) -> Path:
-        """Return where the Zarr store of a finished job is kept, in one file."""
-        return self.folder / job_id / "trajectories.zarr.zip"
+def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
+    """Return the id of an owner's job of a sweep: the same request of another owner is another job."""
+    return sweep.id if not owner else hashlib.sha256(f"{owner} {sweep.id}".encode()).hexdigest()[:32]
 
-    def stored_bytes(self) -> int:
-        """Return how many bytes all jobs have on the disk."""
-        total = 0
-        for folder, _, names in os.walk(self.folder):
-            for name in names:
-                with contextlib.suppress(FileNotFoundError):  # a part that was finished, or a job that was removed, meanwhile
-                    total += (Path(folder) / name).stat().st_size
-        return total
+
+def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
+    return query if owner is None else query.where(jobs.c.owner == owner)
 
 
 def _status(row: sa.RowMapping) -> dict[str, Any]:
@@ -264,7 +263,6 @@ def _status(row: sa.RowMapping) -> dict[str, Any]:
 
 def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
     return {
-        "id": sweep.id,
         "request": sweep.canonical.decode(),
         "state": "queued",
         "total": sweep.total,
@@ -273,13 +271,13 @@ def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
     }
 
 
-def _job_of(connection: sa.Connection, key: str) -> str | None:
-    query = sa.select(idempotency_keys.c.job_id).where(idempotency_keys.c.key == key)
-    return connection.execute(query).scalar()
+def _claim(connection: sa.Connection, row: dict[str, Any]) -> None:
+    """Write which job an Idempotency-Key stands for, and raise InvalidInput where it stands for another.
 
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that a death of the process or the machine leaves it whole or absent."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as part:
-        part.write_bytes(content)
+    The row comes before the job: of two requests at once the primary key lets one in, and the other finds what it wrote.
+    """
+    dialect: Any = postgresql if connection.dialect.name == "postgresql" else sqlite
+    connection.execute(dialect.insert(idempotency_keys).values(row).on_conflict_do_nothing())
+    same = (idempotency_keys.c.owner == row["owner"]) & (idempotency_keys.c.key == row["key"])
+    if connection.execute(sa.select(idempotency_keys.c.job_id).where(same)).scalar() != row["job_id"]:
+        raise InvalidInput(("Idempotency-Key",), "a key of its own for every request", "one that came with another request")

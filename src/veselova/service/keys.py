@@ -18,13 +18,15 @@ from datetime import UTC, datetime
 import sqlalchemy as sa
 
 from veselova.mechanics.errors import InvalidInput, shown
-from veselova.service.database import api_keys, connect, in_utc
+from veselova.service.caller import SCOPES, SOLVE
+from veselova.service.database import api_keys, connect, in_utc, is_outage, writing
 from veselova.service.problem_details import Refused
 from veselova.service.settings import Settings
 
 __all__ = ["Key", "Keys", "open_keys"]
 
 _FORM = re.compile(r"vsl_([0-9a-f]{12})_([A-Za-z0-9_-]{43})")
+_ID = re.compile(r"[0-9a-f]{12}")
 _LONGEST_NAME = 100
 
 #: Compared with where there is no such key, so that an answer takes as long whether or not the id exists.
@@ -33,17 +35,34 @@ _NO_DIGEST = "0" * 64
 
 @dataclass(frozen=True)
 class Key:
-    """What is known of a key: everything but the key."""
+    """What is known of a key: everything but the key.
+
+    ``scope`` is what it allows; ``owner`` has the jobs and answers that it makes, which other keys of this owner see.
+    """
 
     id: str
     name: str
     created_at: datetime
     revoked_at: datetime | None
+    scope: str
+    owner: str
+    expires_at: datetime | None
+
+    @property
+    def expired(self) -> bool:
+        """Return whether the key's time is over."""
+        return self.expires_at is not None and self.expires_at <= datetime.now(UTC)
+
+    @property
+    def state(self) -> str:
+        """Return whether the key is ``valid``, ``expired`` or ``revoked``."""
+        return "revoked" if self.revoked_at else "expired" if self.expired else "valid"
 
     def as_dict(self) -> dict[str, str | None]:
         """Return the key as JSON."""
-        revoked = self.revoked_at.isoformat() if self.revoked_at else None
-        return {"id": self.id, "name": self.name, "created_at": self.created_at.isoformat(), "revoked_at": revoked}
+        names = ("id", "name", "scope", "owner", "state", "created_at", "expires_at", "revoked_at")
+        values = ((name, getattr(self, name)) for name in names)
+        return {name: value.isoformat() if isinstance(value, datetime) else value for name, value in values}
 
 
 class Keys:
@@ -52,46 +71,62 @@ class Keys:
     def __init__(self, database: sa.Engine) -> None:
         self._database = database
 
-    def create(self, name: str) -> tuple[Key, str]:
-        """Return a new key and its text, which is kept nowhere."""
+    def create(
+        self, name: str, scope: str = SOLVE, expires_at: datetime | None = None, same_as: str | None = None
+    ) -> tuple[Key, str]:
+        """Return a new key and its text, which is kept nowhere.
+
+        ``same_as``: the id of a key whose owner the new one shares. Raises InvalidInput.
+        """
         if not 0 < len(name) <= _LONGEST_NAME or not name.isprintable():
             raise InvalidInput(("NAME",), f"1 to {_LONGEST_NAME} printable characters", shown(name))
-        key = Key(secrets.token_hex(6), name, datetime.now(UTC), None)
+        if scope not in SCOPES:
+            raise InvalidInput(("--scope",), f"one of {', '.join(SCOPES)}", shown(scope))
+        key_id = secrets.token_hex(6)
+        owner = key_id if same_as is None else self._existing(same_as, "--same-owner-as").owner
+        key = Key(key_id, name, datetime.now(UTC), None, scope, owner, expires_at)
         text = f"vsl_{key.id}_{secrets.token_urlsafe(32)}"
         row = {"id": key.id, "name": name, "sha256": _digest(text), "created_at": key.created_at}
-        with self._connection() as connection:
-            connection.execute(sa.insert(api_keys).values(row))
+        with self._writing() as connection:
+            connection.execute(sa.insert(api_keys).values(**row, scope=scope, owner=owner, expires_at=expires_at))
         return key, text
 
     def list(self) -> list[Key]:
         """Return all keys, the oldest first, revoked ones too."""
-        with self._connection() as connection:
+        with self._reading() as connection:
             return [_key(row) for row in connection.execute(sa.select(api_keys).order_by(api_keys.c.created_at))]
 
     def revoke(self, key_id: str) -> Key:
         """Return the key of this id, which nobody can use from now on; raises InvalidInput where there is none."""
+        self._existing(key_id, "ID")
         at = datetime.now(UTC)
-        with self._connection() as connection:
+        with self._writing() as connection:
             still = (api_keys.c.id == key_id) & api_keys.c.revoked_at.is_(None)
             connection.execute(sa.update(api_keys).where(still).values(revoked_at=at))
-            row = connection.execute(sa.select(api_keys).where(api_keys.c.id == key_id)).one_or_none()
+        return self._existing(key_id, "ID")
+
+    def _existing(self, key_id: str, field: str) -> Key:
+        row = None
+        if _ID.fullmatch(key_id):
+            with self._reading() as connection:
+                row = connection.execute(sa.select(api_keys).where(api_keys.c.id == key_id)).one_or_none()
         if row is None:
-            raise InvalidInput(("ID",), "the id of a key (veselova keys list)", shown(key_id))
+            raise InvalidInput((field,), "the id of a key (veselova keys list)", shown(key_id))
         return _key(row)
 
     def holder(self, text: str) -> Key | None:
-        """Return the key that a client showed, None where it is not one that may be used."""
+        """Return the key that a client showed, expired or not; None where it is not one of these, or revoked."""
         form = _FORM.fullmatch(text)
         if form is None:
             return None
-        with self._connection() as connection:
+        with self._reading() as connection:
             row = connection.execute(sa.select(api_keys).where(api_keys.c.id == form[1])).one_or_none()
         same = hmac.compare_digest(_digest(text), _NO_DIGEST if row is None else row.sha256)
         return _key(row) if row is not None and same and row.revoked_at is None else None
 
     def require(self) -> None:
         """Raise Refused unless the keys can be read."""
-        with self._connection() as connection:
+        with self._reading() as connection:
             connection.execute(sa.select(api_keys.c.id).limit(1)).all()
 
     def close(self) -> None:
@@ -99,20 +134,33 @@ class Keys:
         self._database.dispose()
 
     @contextmanager
-    def _connection(self) -> Iterator[sa.Connection]:
-        try:
-            with self._database.begin() as connection:
-                yield connection
-        except sa.exc.SQLAlchemyError as error:
-            raise _unavailable(error) from error
+    def _reading(self) -> Iterator[sa.Connection]:
+        with _named_outages(), self._database.connect() as connection:
+            yield connection
+
+    @contextmanager
+    def _writing(self) -> Iterator[sa.Connection]:
+        with _named_outages(), writing(self._database) as connection:
+            yield connection
+
+
+@contextmanager
+def _named_outages() -> Iterator[None]:
+    try:
+        yield
+    except (OSError, sa.exc.SQLAlchemyError) as error:
+        if not is_outage(error):
+            raise
+        raise _unavailable(error) from error
 
 
 def open_keys(settings: Settings) -> Keys:
-    """Return the keys of the service's database; raises Refused ``database-unavailable`` where it cannot be opened."""
-    try:
+    """Return the keys of the service's database.
+
+    Raises Refused: ``database-unavailable`` where it cannot be opened, ``database-damaged``, ``database-newer``.
+    """
+    with _named_outages():
         return Keys(connect(settings))
-    except (OSError, sa.exc.SQLAlchemyError) as error:
-        raise _unavailable(error) from error
 
 
 def _unavailable(error: Exception) -> Refused:
@@ -126,4 +174,5 @@ def _digest(text: str) -> str:
 
 
 def _key(row: sa.Row[tuple[object, ...]]) -> Key:
-    return Key(row.id, row.name, in_utc(row.created_at), in_utc(row.revoked_at) if row.revoked_at else None)
+    created, revoked, expires = (moment and in_utc(moment) for moment in (row.created_at, row.revoked_at, row.expires_at))
+    return Key(row.id, row.name, created, revoked, row.scope, row.owner, expires)

@@ -15,6 +15,7 @@ from anyio.from_thread import start_blocking_portal
 
 from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved, install_extra, shown
 from veselova.mechanics.problem import Problem
+from veselova.service.problem_details import Refused
 from veselova.service.schemas import read_request
 from veselova.service.script_guard import unguarded
 from veselova.service.serving import settings_of_environment
@@ -99,9 +100,13 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
 def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tuple[Job, Jobs]:
     """Run a sweep to its end and return its job, with the store in which its results are.
 
-    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra ``sweeps``.
+    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra ``sweeps``, InvalidInput for a
+    folder that others may write, Refused where its storage fails or is damaged.
     """
     try:
+        from sqlalchemy.exc import SQLAlchemyError
+
+        from veselova.service.database import reason_of
         from veselova.service.jobs import Jobs
         from veselova.service.sweeps import Sweeps
     except ImportError as error:
@@ -109,7 +114,10 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise RuntimeError(f"{_UNGUARDED}; it ran into the sweep of the process that started it")
-    jobs = Jobs(settings)
+    try:
+        jobs = Jobs(settings)
+    except (OSError, SQLAlchemyError) as error:
+        raise Refused("storage-unavailable", f"{settings.data_dir} cannot keep the sweep: {reason_of(error)}.") from error
 
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)

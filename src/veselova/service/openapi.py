@@ -21,6 +21,7 @@ __all__ = ["openapi_document"]
 _REFUSALS = {
     400: "Not JSON",
     401: "No API key of this server, where it requires one",
+    403: "The scope of the API key does not allow it",
     406: "No acceptable representation",
     413: "Body too large",
     415: "Not application/json",
@@ -35,18 +36,21 @@ _REFUSALS = {
 
 #: Refusals of one path alone, and what a GET of a kept trajectory can be refused for.
 _PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
-_KEPT_REFUSALS = {404: "Not kept, or not any more", **{status: _REFUSALS[status] for status in (406, 500, 503, 504, 507)}}
+_KEPT_REFUSALS = {
+    404: "Not kept, or not any more",
+    **{status: _REFUSALS[status] for status in (401, 403, 406, 429, 500, 503, 504, 507)},
+}
 
 #: Refusals of the resources of jobs, and of those that every other path has.
 _JOB_REFUSALS = {
-    **{status: _REFUSALS[status] for status in (401, 422, 429, 500, 501)},
+    **{status: _REFUSALS[status] for status in (401, 403, 422, 429, 500, 501)},
     404: "No such job",
     406: "No acceptable representation",
     409: "The job has not finished",
     503: "Jobs cannot be stored or read at present; see Retry-After",
 }
-_SWEEP_REFUSALS = {status: _REFUSALS[status] for status in (400, 401, 406, 413, 415, 422, 429, 500, 501, 503, 507)}
-_COMMON_REFUSALS = {status: _REFUSALS[status] for status in (401, 429, 500, 503)}
+_SWEEP_REFUSALS = {status: _REFUSALS[status] for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)}
+_COMMON_REFUSALS = {status: _REFUSALS[status] for status in (401, 403, 429, 500, 503)}
 _SCHEMA_REFUSALS = {404: "No schema of this name", **_COMMON_REFUSALS}
 
 _TEXT = {"schema": {"type": "string"}}

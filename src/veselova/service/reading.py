@@ -14,6 +14,7 @@ from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.decimals import FEWEST_DIGITS
 from veselova.service.admission import admit, require_modest
+from veselova.service.caller import caller_of
 from veselova.service.identity import identity
 from veselova.service.json_text import decoded
 from veselova.service.problem_details import Refused
@@ -72,7 +73,8 @@ class Reader:
             if kind == "sweep":  # problems of which are made, in a tenth of a second
                 return await to_thread.run_sync(_read, kind, body, self._settings)
             return _read(kind, body, self._settings)
-        return await self._workers.run(_read, kind, body, self._settings, budget_s=self._settings.max_budget_s)
+        caller, budget_s = caller_of(request).name, self._settings.max_budget_s
+        return await self._workers.run(_read, kind, body, self._settings, budget_s=budget_s, caller=caller)
 
     async def _body(self, request: Request) -> bytes:
         _require_json(request)

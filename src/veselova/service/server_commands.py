@@ -41,26 +41,44 @@ keys = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Create, li
 
 
 @keys.command()
-def create(name: Annotated[str, typer.Argument(metavar="NAME", help="whose key it is")], json: _Json = False) -> None:
+def create(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="whose key it is")],
+    scope: Annotated[str, typer.Option(help="read, solve (and read) or admin (all)")] = "solve",
+    expires: Annotated[
+        str | None, typer.Option(metavar="WHEN", help="90d, 12h, 4w or a date such as 2030-01-31; never when left out")
+    ] = None,
+    same_owner_as: Annotated[
+        str | None, typer.Option(metavar="ID", help="a key whose jobs and answers the new one sees, to take its place")
+    ] = None,
+    json: _Json = False,
+) -> None:
     """Create an API key and print it; it is stored nowhere and cannot be shown again."""
-    key, text = _keys().create(name)
+    from datetime import UTC, datetime
+
+    from veselova.service.expiry import expiry
+
+    expires_at = expiry(expires, datetime.now(UTC))
+    key, text = _keys().create(name, scope, expires_at, same_owner_as)
     if json:
         print(json_text.dumps({**key.as_dict(), "key": text}))
         return
     print(text)
-    typer.echo(f"The key of {name}, id {key.id}. Keep it now: only its hash is stored.", err=True)
+    until = f", until {key.expires_at:%Y-%m-%d %H:%M} UTC" if key.expires_at else ""
+    typer.echo(f"The key of {name}, id {key.id}, scope {key.scope}{until}. Keep it now: only its hash is stored.", err=True)
 
 
 @keys.command("list")
 def list_keys(json: _Json = False) -> None:
-    """List the API keys by id and name; the keys themselves are known to their holders alone."""
+    """List the API keys by id, scope, expiry and name; the keys themselves are known to their holders alone."""
     found = _keys().list()
     if json:
         print(json_text.dumps([key.as_dict() for key in found]))
         return
     for key in found:
-        state = f"revoked {key.revoked_at:%Y-%m-%d %H:%M}" if key.revoked_at else "valid"
-        print(f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {state:24}  {key.name}")
+        ends = key.revoked_at or key.expires_at
+        state = f"{key.state} {ends:%Y-%m-%d %H:%M}" if key.state != "valid" and ends else "valid"
+        until = f"until {key.expires_at:%Y-%m-%d}" if key.expires_at else "no expiry"
+        print(f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {key.scope:5}  {until:16}  {state:24}  {key.name}")
 
 
 @keys.command()

@@ -40,6 +40,7 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
     _drain_when_hung_up()
     # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.umask(0o077)  # what the server and its workers write is this account's alone
     limits = settings_of_environment(**stated)
     if settings_only:
         for name, value in limits.model_dump().items():

@@ -23,7 +23,7 @@ def _state_folder() -> Path:
     try:
         return Path(stated or Path.home() / ".local" / "state") / "veselova"
     except RuntimeError:  # an account without a home
-        return Path(tempfile.gettempdir()) / "veselova"
+        return Path(tempfile.gettempdir()) / f"veselova-{os.getuid()}"  # which is refused where another account made it
 
 
 class Settings(BaseSettings):
@@ -33,6 +33,12 @@ class Settings(BaseSettings):
 
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes")
     max_waiting: int = Field(default=64, ge=0, description="requests that may wait for a worker before others are refused")
+    max_waiting_per_caller: int = Field(
+        default=0, ge=0, description="of them, those of one key or address; 0: a quarter where keys are required, else all"
+    )
+    max_workers_per_caller: int = Field(
+        default=0, ge=0, description="workers for one key or address at a time; 0: all but one where keys are required, else all"
+    )
     max_budget_s: float = Field(default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds")
     shutdown_grace_s: int = Field(default=10, ge=0, description="seconds that requests in flight get after SIGTERM")
     estimate_slack: float = Field(
@@ -86,7 +92,24 @@ class Settings(BaseSettings):
     max_jobs: int = Field(default=100, ge=1, description="jobs that may wait or run before others are refused")
     max_sweep_problems: int = Field(default=1_000_000, ge=1, description="most problems in one sweep")
     max_sweep_bytes: int = Field(default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated")
-    max_stored_bytes: int = Field(default=20_000_000_000, ge=1000, description="largest results of all jobs together")
+    max_stored_bytes: int = Field(
+        default=20_000_000_000,
+        ge=1000,
+        description="largest results of all jobs together, counted as promised until a job has ended",
+    )
+    max_jobs_per_key: int = Field(default=20, ge=1, description="jobs of the owner of a key that may wait or run")
+    max_stored_bytes_per_key: int = Field(
+        default=5_000_000_000, ge=1000, description="largest results of all jobs of the owner of a key together"
+    )
+    retain_jobs_days: float = Field(
+        default=30, ge=0, le=36_525, description="days after which ended jobs are forgotten; 0: never"
+    )
+    retain_idempotency_days: float = Field(
+        default=7,
+        ge=0,
+        le=36_525,
+        description="days after which an Idempotency-Key may come with another request; 0: with its job",
+    )
 
     keys: Literal["auto", "required", "off"] = Field(
         default="auto", description="whether clients must show an API key; auto: unless the server binds to loopback"

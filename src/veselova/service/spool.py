@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import shutil
+import stat
 import tempfile
 import time
 import uuid
@@ -16,6 +17,9 @@ from typing import BinaryIO
 from anyio import to_thread
 from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
+
+from veselova.mechanics.errors import InvalidInput
+from veselova.service.private_folder import own_folder
 
 __all__ = ["Spool", "SpooledResponse"]
 
@@ -41,12 +45,13 @@ class Spool:
         """Make the folder below its parent, or below the system's temporary folder where that cannot be written."""
         for parent in (self._parent, Path(tempfile.gettempdir())):
             try:
-                parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                if parent == self._parent:
+                    own_folder(parent)
                 _remove_orphans(parent)
                 self._folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
                 self._lock = _locked(self._folder)
-            except OSError as error:
-                _LOG.warning("%s cannot hold large answers on their way: %s", parent, error.strerror)
+            except (OSError, InvalidInput) as error:
+                _LOG.warning("%s cannot hold large answers on their way: %s", parent, getattr(error, "strerror", None) or error)
             else:
                 return
 
@@ -63,10 +68,13 @@ class Spool:
 
 
 def _remove_orphans(parent: Path) -> None:
-    """Remove the folders of servers that were killed: their locks went with them."""
+    """Remove the folders of servers of this account that were killed: their locks went with them."""
     for folder in parent.glob(f"{_PREFIX}*"):
         with suppress(OSError):
-            if time.time() - folder.stat().st_mtime > _NEW_S and (lock := _locked(folder)) is not None:
+            state = folder.lstat()
+            if not stat.S_ISDIR(state.st_mode) or (hasattr(os, "geteuid") and state.st_uid != os.geteuid()):
+                continue
+            if time.time() - state.st_mtime > _NEW_S and (lock := _locked(folder)) is not None:
                 shutil.rmtree(folder, ignore_errors=True)
                 os.close(lock)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,11 +17,13 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.cluster import open_cluster
-from veselova.service.database import reason_of
+from veselova.service.database import is_outage, reason_of
 from veselova.service.dispatch import ChunkFailed, answers
 from veselova.service.jobs import Job, JobEnded, Jobs
+from veselova.service.progress import Progress
 from veselova.service.results import Result
 from veselova.service.settings import Settings
+from veselova.service.shares import Shares
 from veselova.service.summaries import OtherVersion
 
 __all__ = ["Progress", "Sweeps"]
@@ -43,23 +46,10 @@ _NO_WORKER = "a worker of the cluster"
 #: Seconds between two looks at what other servers have left.
 _WATCH_S = 30.0
 
+#: Seconds between two removals of old jobs.
+_TIDY_S = 3600.0
+
 T = TypeVar("T")
-
-
-@dataclass
-class Progress:
-    """How far a running job is: problems done before this process took it, and since; what it waits for, if anything."""
-
-    began: float
-    before: int
-    done: int
-    waits_for: str = ""
-
-    @property
-    def rate(self) -> float:
-        """Return problems per second since this process took the job."""
-        passed = time.monotonic() - self.began
-        return (self.done - self.before) / passed if passed > 0 else 0.0
 
 
 class _NoCluster(Exception):
@@ -82,7 +72,8 @@ class Sweeps:
         self._again: set[str] = set()
         self._progress: dict[str, Progress] = {}
         self._changed = asyncio.Condition()
-        self._turns = asyncio.Semaphore(settings.max_running_jobs)
+        #: An owner's first job never waits for those of others, which may take hours.
+        self._turns = Shares(settings.max_running_jobs, settings.max_running_jobs, first_free=True)
         self._opening = asyncio.Lock()
         self._stack = AsyncExitStack()
         self._cluster: Any = None
@@ -104,13 +95,18 @@ class Sweeps:
                 self.begin(job_id)
 
     async def watch(self) -> None:
-        """Take up, for ever, what another server begins or leaves unfinished."""
+        """Take up, for ever, what another server begins or leaves unfinished, and forget what ended long ago."""
+        tidied = -math.inf
         while True:
             await asyncio.sleep(_WATCH_S)
             try:
                 await self.resume()
+                if time.monotonic() - tidied > _TIDY_S:
+                    tidied = time.monotonic()
+                    if removed := await anyio.to_thread.run_sync(self.jobs.remove_old, datetime.now(UTC)):
+                        _LOG.info("%d jobs that ended long ago were removed", removed)
             except (OSError, SQLAlchemyError) as error:
-                _LOG.warning("the unfinished jobs could not be read: %s", error)
+                _LOG.warning("the jobs could not be read: %s", error)
 
     def begin(self, job_id: str) -> None:
         """Run a job; one that runs already is looked at again at its end, for it may be stopping just now."""
@@ -157,7 +153,8 @@ class Sweeps:
 
     async def _run(self, job_id: str) -> None:
         lock = FileLock(self.jobs.folder / job_id / "lock", timeout=0, thread_local=False)
-        async with self._turns:
+        owner = (await self._persist(job_id, self.jobs.status, job_id)).owner
+        async with self._turns.place(owner):
             try:
                 if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
@@ -216,7 +213,9 @@ class Sweeps:
                 progress = self._progress[job.id]
                 if not workers or progress.waits_for == _NO_WORKER:
                     progress.waits_for = "" if workers else _NO_WORKER
-                room = _AHEAD * max(1, workers) - len(at_work)
+                # The jobs of one owner have together what one of another's has.
+                share = max(1, _AHEAD * max(1, workers) // max(1, self._turns.held_by(job.owner)))
+                room = share - len(at_work)
                 for _ in range(min(room, len(waiting))):
                     at_work.add(asyncio.create_task(self._chunk(client, job, result, waiting.pop())))
                 finished, at_work = await asyncio.wait(at_work, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED)
@@ -268,6 +267,8 @@ class Sweeps:
                 await asyncio.wait([calling])
                 raise
             except (OSError, SQLAlchemyError) as error:
+                if not is_outage(error):
+                    raise
                 reason = reason_of(error)
                 _LOG.warning("job %s waits for its storage: %s", job_id, reason)
                 if progress := self._progress.get(job_id):
@@ -283,7 +284,7 @@ class Sweeps:
 
 def _taken(lock: FileLock) -> bool:
     """Take the lock of a job, whose folder is made first; return whether no other process holds it."""
-    Path(lock.lock_file).parent.mkdir(parents=True, exist_ok=True)
+    Path(lock.lock_file).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     try:
         lock.acquire()
     except Timeout:

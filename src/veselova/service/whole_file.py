@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files of this account alone that appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
     try:
         yield part
+        part.chmod(0o600)
         with part.open("rb") as file:
             os.fsync(file.fileno())
         part.replace(path)

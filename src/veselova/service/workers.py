@@ -10,12 +10,12 @@ from contextlib import asynccontextmanager
 from typing import Any, TypeVar
 
 import anyio
-from anyio import CapacityLimiter, CapacityLimiterStatistics
 from anyio.abc import TaskGroup
 
 from veselova.service.metrics import Metrics
 from veselova.service.problem_details import Refused
 from veselova.service.settings import MEGABYTE, Settings
+from veselova.service.shares import Shares
 from veselova.service.tasks import warm_up
 from veselova.service.worker import Worker, WorkerLost
 from veselova.service.worker_process import message
@@ -40,27 +40,26 @@ T = TypeVar("T")
 class Workers:
     """The worker processes of one server. Threads, and pools of the standard library, go on burning after a timeout."""
 
-    def __init__(self, settings: Settings, metrics: Metrics) -> None:
+    def __init__(self, settings: Settings, metrics: Metrics, shared: bool = False) -> None:
+        """``shared`` says whether callers are told apart, so that none may take all workers, or fill the queue."""
         self._metrics = metrics
-        self._limiter = CapacityLimiter(settings.workers)
-        self._max_waiting = settings.max_waiting
+        number, waiting = settings.workers, settings.max_waiting
+        most = settings.max_workers_per_caller or (max(1, number - 1) if shared else number)
+        self._shares = Shares(number, min(most, number))
+        self._max_waiting = waiting
+        self._max_waiting_each = settings.max_waiting_per_caller or (math.ceil(waiting / 4) if shared else waiting)
         self._memory_mb = settings.worker_memory_mb
         self._warm: set[Worker] = set()
         self._resting: deque[tuple[Worker, float]] = deque()
         self._tasks: TaskGroup | None = None
         self._starting = False
-        metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self.load.total_tokens)
+        metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self._shares.places)
         metrics.gauge("veselova_workers_busy", "Worker processes at work", self._busy)
-        metrics.gauge("veselova_queue_length", "Requests that wait for a worker", lambda: self.load.tasks_waiting)
-
-    @property
-    def load(self) -> CapacityLimiterStatistics:
-        """Return how many workers there may be, how many are at work, and how many requests wait for one."""
-        return self._limiter.statistics()
+        metrics.gauge("veselova_queue_length", "Requests that wait for a worker", lambda: self._shares.waiting)
 
     def _busy(self) -> int:
         """Return how many workers are at work for requests: one that is being started is not."""
-        return max(0, self.load.borrowed_tokens - self._starting)
+        return max(0, self._shares.held - self._starting)
 
     @property
     def warm(self) -> list[int]:
@@ -94,33 +93,40 @@ class Workers:
             while self._resting:
                 await self._resting.popleft()[0].end()
 
-    async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
-        """Return what a task gives within the budget, waiting for a worker included.
+    async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = "") -> T:
+        """Return what a task gives within the budget, waiting for a worker included; ``caller`` is whose share it takes.
 
         Raises Refused: ``overloaded`` when too many requests wait, ``over-budget`` when time is up (the process is killed),
         ``worker-memory`` when the task needs more of it, ``worker-lost`` when the process died. What the engines raise comes
         through.
         """
-        load = self.load
-        # A request may wait for the worker that is just being started besides.
-        if load.borrowed_tokens >= load.total_tokens and load.tasks_waiting >= self._max_waiting + self._starting:
-            raise Refused("overloaded", f"{self._max_waiting} requests are waiting for a worker; try again later.", retry_after=2)
+        self._require_room(caller)
         try:
-            return await self._answer(task, *arguments, budget_s=budget_s)
+            return await self._answer(task, *arguments, budget_s=budget_s, caller=caller)
         except BaseException:  # among them the cancellation of a request whose client has gone, which kills its worker
             self._replace()
             raise
 
-    async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
+    def _require_room(self, caller: str) -> None:
+        """Raise Refused where a request would have to wait, and too many do already."""
+        if self._shares.has_place_for(caller):
+            return
+        # A request may wait for the worker that is just being started besides.
+        for waiting, most, whose in (
+            (self._shares.waiting, self._max_waiting, ""),
+            (self._shares.waiting_of(caller), self._max_waiting_each, " of yours"),
+        ):
+            if waiting >= most + self._starting:
+                detail = f"{most} requests{whose} are waiting for a worker; try again later."
+                raise Refused("overloaded", detail, retry_after=2)
+
+    async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = "") -> T:
         call = message((task, arguments, budget_s))
         try:
             with anyio.fail_after(budget_s):
-                await self._acquire()
-                try:
+                async with self._shares.place(caller):
                     answer: T = await self._asked(call)
                     return answer
-                finally:
-                    self._limiter.release()
         except TimeoutError:
             raise Refused("over-budget", f"The work was stopped after its budget of {budget_s:g} s.") from None
         except WorkerLost:
@@ -128,13 +134,6 @@ class Workers:
         except MemoryError:
             detail = f"The work needs more than the {self._memory_mb} MB of memory that a worker of this server has"
             raise Refused("worker-memory", f"{detail}; ask for fewer times.") from None
-
-    async def _acquire(self) -> None:
-        """Wait for a place; where one is free, without giving way to other tasks first."""
-        try:
-            self._limiter.acquire_nowait()
-        except anyio.WouldBlock:
-            await self._limiter.acquire()
 
     async def _asked(self, call: bytes) -> Any:
         """Return what a worker answers: the one that rests since the shortest time, or a new one."""
@@ -156,9 +155,9 @@ class Workers:
 
     def _replace(self, pause_s: float = _SETTLED_S) -> None:
         """Start a worker in the background, unless one is idle, or all are at work, or requests wait, which start their own."""
-        load = self.load
-        room = load.borrowed_tokens < load.total_tokens and not load.tasks_waiting
-        if self._tasks is not None and room and not self._starting and len(self.warm) <= load.borrowed_tokens:
+        held = self._shares.held
+        room = held < self._shares.places and not self._shares.waiting
+        if self._tasks is not None and room and not self._starting and len(self.warm) <= held:
             self._starting = True
             self._tasks.start_soon(self._start, pause_s)
 
