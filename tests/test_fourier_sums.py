@@ -11,7 +11,7 @@ import pytest
 
 import veselova as vs
 from test_many_digits import in_rationals
-from veselova.analytic import enclosed_clock, enclosed_fourier, enclosed_solution, enclosed_waves
+from veselova.analytic import enclosed_clock, enclosed_fourier, enclosed_waves, time_map_balls
 from veselova.analytic.balls import Balls, balls
 from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
 from veselova.analytic.fixed_point import Fixed
@@ -173,7 +173,7 @@ def test_many_times_far_out_are_those_of_each() -> None:
 def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) -> None:
     body = vs.Veselova(["2.1", "2"], ["0.6", "0.8"], ["0.8", "-0.6"], normalize=True)
     by_modes = vs.solve(body, ["20"], digits=350)
-    monkeypatch.setattr(enclosed_solution, "MOST_MODES", 0)
+    monkeypatch.setattr(time_map_balls, "MOST_MODES", 0)
     by_panels = vs.solve(body, ["20"], digits=350)
     assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
     assert by_panels.decimals is not None

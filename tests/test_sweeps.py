@@ -711,6 +711,8 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
         raise failure
 
     monkeypatch.setattr("veselova.service.dispatch.computed_chunk", failing)
+    monkeypatch.setattr("veselova.service.local_sweep._FEW", 0)  # so that the sweep goes to a worker
+    monkeypatch.setattr("veselova.service.this_process.seconds_of", lambda *_: 1e9)
     with pytest.raises(Unsolved, match=f"a worker could not compute the problems 0 to 14: {failure.strerror or failure}"):
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
