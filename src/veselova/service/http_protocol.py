@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import Any, cast
 
 import h11
@@ -241,9 +242,10 @@ class _Ending:
             return
         self._closing = True
         if self._protocol.linger() and self._transport.can_write_eof():
-            self._transport.write_eof()
-        else:
-            self._transport.close()
+            with suppress(OSError):  # the client has gone already
+                self._transport.write_eof()
+                return
+        self._transport.close()
 
 
 #: Reasons of the statuses that connections themselves answer with.
