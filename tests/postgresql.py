@@ -7,12 +7,16 @@ import pwd
 import shutil
 import subprocess
 import tempfile
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import psycopg
 import pytest
+from pydantic import SecretStr
+
+from veselova.service.settings import Settings
 
 #: Where Debian has the programs of each version.
 _DEBIAN = Path("/usr/lib/postgresql")
@@ -71,3 +75,11 @@ def _account() -> pwd.struct_passwd | None:
         return None
     known = {entry.pw_name: entry for entry in pwd.getpwall()}
     return next((known[name] for name in _ACCOUNTS if name in known), None)
+
+
+def settings_in(folder: Path, request: pytest.FixtureRequest) -> Settings:
+    """Return settings with a folder and a database, SQLite or PostgreSQL as the fixture's parameter says."""
+    if request.param == "sqlite":
+        return Settings(data_dir=folder)
+    address = new_database(request.getfixturevalue("postgresql"), uuid.uuid4().hex)
+    return Settings(data_dir=folder, database_url=SecretStr(address))

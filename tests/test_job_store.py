@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
@@ -14,9 +13,8 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 import zarr
-from pydantic import SecretStr
 
-from postgresql import new_database, postgresql_server
+from postgresql import postgresql_server, settings_in
 from test_sweeps import request as sweep_request
 from veselova.mechanics.errors import InvalidInput
 from veselova.service.database import connect, schema_differences
@@ -38,10 +36,7 @@ def postgresql() -> Iterator[str]:
 @pytest.fixture(params=["sqlite", "postgresql"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
     """Settings with a folder and a database of their own."""
-    if request.param == "sqlite":
-        return Settings(data_dir=tmp_path)
-    address = new_database(request.getfixturevalue("postgresql"), uuid.uuid4().hex)
-    return Settings(data_dir=tmp_path, database_url=SecretStr(address))
+    return settings_in(tmp_path, request)
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
@@ -22,11 +21,10 @@ import anyio
 import httpx2
 import pytest
 import sqlalchemy as sa
-from pydantic import SecretStr
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
-from postgresql import new_database, postgresql_server
+from postgresql import postgresql_server, settings_in
 from test_access import keys, new_key
 from test_http import ENDLESS, JSON, is_problem
 from test_sweeps import request as sweep_request
@@ -56,10 +54,7 @@ def postgresql() -> Iterator[str]:
 @pytest.fixture(params=["sqlite", "postgresql"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
     """Settings with a folder and a database of their own."""
-    if request.param == "sqlite":
-        return Settings(data_dir=tmp_path / "data")
-    address = new_database(request.getfixturevalue("postgresql"), uuid.uuid4().hex)
-    return Settings(data_dir=tmp_path / "data", database_url=SecretStr(address))
+    return settings_in(tmp_path / "data", request)
 
 
 def changed(store: Settings, **values: Any) -> Settings:
@@ -159,6 +154,7 @@ for size in range(0, 400_000, 8192):
 
 def test_first_starts_that_race_all_succeed(store: Settings, tmp_path: Path) -> None:
     body = f"""
+from pydantic import SecretStr
 settings = Settings(data_dir=folder, database_url=SecretStr({store.database_url.get_secret_value()!r}))
 begin = time.time() + 0.5
 def start():
