@@ -18,6 +18,8 @@ from veselova.analytic.motion import Motion
 from veselova.analytic.panel_integral import integrated
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart, drawn_apart
+from veselova.analytic.steepness import Steepness
+from veselova.analytic.survey import BETWEEN
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import exact_number, exact_vector
 from veselova.mechanics.problem import Series
@@ -63,15 +65,18 @@ class BodyMotion(Motion[VeselovaSO3]):
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         clock = orbit.clock(grid.doubles)
         tau, z = clock.tau1(grid.doubles, grid.remainders)
-        largest = float(np.max(np.abs(motion.turning(inversion.invert(orbit.sample)))))
+        slopes, largest = self._turning
         low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
-        panels = integrated(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest)
+        # Rounding of the phases is in the values, and near a separatrix these turn fast.
+        noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
+        panels = integrated(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise)
         at, velocity = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
-        error, along = orbit.error(tau, clock, self._turning_steepness)
+        error, lag = orbit.error(tau, clock, self._steepness)
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the mean.
-        error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * along
+        error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
+        error = error + orbit.integral_error(tau, slopes)
         error = orbit.require_digit(error, grid.doubles)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(clock)
@@ -92,11 +97,14 @@ class BodyMotion(Motion[VeselovaSO3]):
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
-    def _turning_steepness(self) -> Array:
-        """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), doubled for what lies between the samples."""
+    def _steepness(self) -> Steepness:
+        return self._orbit.steepness(lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2))
+
+    @cached_property
+    def _turning(self) -> tuple[Array, float]:
+        """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), and its largest value, over the samples."""
         orbit, motion = self._orbit, self._orbit.motion
         here = motion.turning(orbit.inversion.invert(orbit.sample))
         steps = _STEP * np.eye(motion.periods.genus)
         moves = [motion.turning(orbit.inversion.invert(orbit.sample + step)) - here for step in steps]
-        largest = np.array([np.max(np.abs(move)) for move in moves]) / _STEP
-        return np.asarray(2 * largest / np.min(np.abs(orbit.in_tau.rates)))
+        return BETWEEN * np.array([np.max(np.abs(move)) for move in moves]) / _STEP, float(np.max(np.abs(here)))

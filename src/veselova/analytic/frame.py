@@ -114,8 +114,12 @@ class Differences:
 
     def slopes(self, at: Attitude) -> Values:
         """Return the derivatives of all frame entries, shape (N, n², d), from the attitudes at the ends."""
+        return self.quotients(np.concatenate([at.q[:, :, None], at.normals], axis=2))
+
+    def quotients(self, values: Values) -> Values:
+        """Return the derivatives of K numbers, shape (N, K, d), from their values at the ends, shape ((1+d)N, …)."""
         count, _, number = self.directions.shape
-        entries = np.concatenate([at.q[:, :, None], at.normals], axis=2).reshape(1 + number, count, -1)
+        entries = values.reshape(1 + number, count, -1)
         return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
 
 

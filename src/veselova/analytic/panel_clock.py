@@ -86,7 +86,11 @@ class PanelClock(Clock):
         rates = np.abs(self.in_tau1.rates)
         slow = _HIGHEST * (rates.sum() - rates) >= rates
         if slow.any():
-            error += _TURN * self._drift(tau1) * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
+            # Nor do they lead farther than the time elapsed, where little of it passes at first.
+            elapsed = np.abs(np.interp(tau1, panels.borders, panels.values)) / self._mean
+            error += (
+                _TURN * np.minimum(self._drift(tau1), elapsed) * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
+            )
         return np.asarray(error), _SHARED_ROUNDING
 
     def _drift(self, tau1: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panels import TAIL, Panels, are_settled
 from veselova.analytic.precision import DOUBLE
-from veselova.mechanics.errors import InternalContradiction
+from veselova.mechanics.errors import Unsolved
 
 __all__ = ["integrated"]
 
@@ -38,12 +38,20 @@ _MOST_HALVINGS = 30
 _BLOCK = 4096
 
 
-def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: float, high: float, floor: float = 0.0) -> Panels:
+def integrated(
+    integrand: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> Panels:
     """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high, and a margin.
 
     ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean, or of ``floor`` where that is
-    larger: an integrand that changes sign has means near zero. Panels that are not are halved, each for itself. An end at zero,
-    where the integral is known, has no margin.
+    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the rounding of the values may be.
+    Panels that are not resolved are halved, each for itself. An end at zero, where the integral is known, has no margin.
+    Raises Unsolved (``narrow-gap``) where a spike is too short for that.
     """
     panels = _Panels(integrand, in_tau1, floor, _FEW_NODES, 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))))
     if (high - low) / panels.length >= _MANY_PANELS:
@@ -54,7 +62,7 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = panels.series(lefts, length)
         # A spike may be shorter than its phases are exact, and its series never end; a short one needs no more than a long panel.
-        settled = are_settled(tails, before, _NOISE_TAIL) | (tails * sizes * length <= TAIL * floor * panels.length)
+        settled = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (tails * sizes * length <= TAIL * floor * panels.length)
         lengths = np.full(lefts.size, length)
         done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
         if np.all(settled):
@@ -62,7 +70,7 @@ def integrated(integrand: Callable[[Array], Array], in_tau1: LinearFlow, low: fl
         length /= 2
         lefts = (lefts[~settled][:, None] + np.array([0.0, length])).ravel()
         before = np.repeat(tails[~settled], 2)
-    raise InternalContradiction("a panel along the orbit was not resolved")
+    raise Unsolved("narrow-gap", "a spike along the orbit is shorter than phases in doubles are exact; integrate numerically")
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,8 @@ class Panels:
 
     borders (P+1,) in τ₁, zero among them · lengths (P,)
     integrals (P, 2, N+1), coefficients of the integral from the left border, and of its derivative in x, −1 … 1 on a panel
-    values (P+1,) of the integral at the borders · tails (P+1,), what series leave out of them · mean_size of f over τ₁
+    values (P+1,) of the integral at the borders · tails (P+1,), what series and rounding leave out of them
+    mean_size of f over τ₁
     """
 
     borders: Array
@@ -50,7 +51,9 @@ class Panels:
         integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
         integrals[:, 0], integrals[:, 1, :-1] = _integrated(slopes), slopes
         over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
-        left_out = np.maximum(tails[order], TAIL) * sizes * lengths
+        # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the mean.
+        count = slopes.shape[1]
+        left_out = (np.maximum(tails[order], TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
         values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
         return cls(borders, lengths, integrals, values, tails_from_zero, float(sizes @ lengths / np.sum(lengths)))
 

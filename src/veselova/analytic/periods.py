@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -19,15 +20,21 @@ from veselova.analytic.angle_series import AngleSeries
 from veselova.analytic.curve import Curve
 from veselova.analytic.interval import Interval
 from veselova.analytic.precision import DOUBLE, Arithmetic, Values
+from veselova.analytic.reduction import Moving
+from veselova.analytic.spectrum import COINCIDE, Resolved, resolved
 from veselova.mechanics.errors import Unsolved
 
-__all__ = ["Periods"]
+__all__ = ["Periods", "resolved_periods"]
 
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
 #: Entries at one node of the forms of intervals that are evaluated side by side: with all nodes they stay in the cache.
 _BLOCK = 10_000
+
+#: Branch points nearer than 10 to minus this count as one where two narrower intervals are neighbours: their widths then have a
+#: product, as moduli ask for.
+_COINCIDE_BESIDE = 140
 
 #: Nodes of an interval in balls: a minute.
 _MOST_NODES = 100_000
@@ -216,3 +223,16 @@ class Periods(AngleSeries):
         """Return T, symmetric, with Riemann matrix τ = iT."""
         raw = self.inverse_cycles @ self.conjugate_cycles
         return np.asarray((raw + np.swapaxes(raw, -1, -2)) / 2)
+
+
+def resolved_periods(moving: Moving, distance: Fraction | None) -> tuple[Resolved, Periods]:
+    """Return the spectrum of what moves, and the periods of its curve in doubles, whose moduli are doubles too.
+
+    ``distance`` is that of ``resolved``.
+    """
+    for coincide in (COINCIDE, _COINCIDE_BESIDE):
+        found = resolved(moving, DOUBLE.digits, distance, coincide=coincide)
+        periods = Periods(Curve.of(found.spectrum, DOUBLE))
+        if periods.has_moduli:
+            break
+    return found, periods

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from veselova.analytic.motion import Motion
 from veselova.analytic.separable_orbit import SeparableOrbit
 from veselova.analytic.separated_curve import SeparableStart, drawn_apart
+from veselova.analytic.steepness import Steepness
 from veselova.mechanics.problem import Series
 from veselova.mechanics.separable_veselova import SeparableVeselova
 from veselova.mechanics.times import TimeGrid
@@ -39,6 +40,10 @@ class PointMotion(Motion[SeparableVeselova]):
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
         return SeparableOrbit(SeparableStart(drawn_apart(inverse), q, v, self.problem.polynomial, walls, size))
 
+    @cached_property
+    def _steepness(self) -> Steepness:
+        return self._orbit.steepness(lambda at: at.q)
+
     def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         clock = orbit.clock(grid.doubles)
@@ -46,5 +51,5 @@ class PointMotion(Motion[SeparableVeselova]):
         at, velocity = orbit.states(z)
         series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
-        error = orbit.require_digit(orbit.error(tau, clock)[0], grid.doubles)
+        error = orbit.require_digit(orbit.error(tau, clock, self._steepness)[0], grid.doubles)
         return series, error, "angles", orbit.details(clock)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 
 from veselova.analytic.clock import Clock
 from veselova.analytic.fourier_clock import FourierClock
-from veselova.analytic.frame import Attitude, slopes
+from veselova.analytic.frame import Attitude, Differences
 from veselova.analytic.orbit import LinearFlow
 from veselova.analytic.panel_clock import PanelClock
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.separable import SeparableMotion, SeparatedRate
 from veselova.analytic.separated_curve import SeparableStart
+from veselova.analytic.steepness import Steepness
+from veselova.analytic.survey import BETWEEN
 from veselova.mechanics.errors import Unsolved
 
 __all__ = ["SeparableOrbit"]
@@ -30,10 +33,10 @@ _MOST_CYCLES = 5e4
 _NO_DIGIT = 0.1
 
 #: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
-_EVALUATION, _PHASE, _RATE = 32.0, 16.0, 8.0
+_EVALUATION, _PHASE, _RATE = 16.0, 8.0, 4.0
 
-#: Points at which steepness is sampled; it is doubled for what lies between them.
-_SAMPLES, _BETWEEN = 48, 2.0
+#: Points at which steepness is sampled.
+_SAMPLES = 48
 
 
 class SeparableOrbit:
@@ -94,22 +97,32 @@ class SeparableOrbit:
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
-    @cached_property
-    def steepness(self) -> Array:
-        """Return the largest |∂/∂z_k| of q and the coordinate lines, shape (g,)."""
-
-        def moved(z: Array) -> Any:
-            return self.motion.attitude(self.inversion.invert(z))
-
+    def steepness(self, values: Callable[[Attitude], Array]) -> Steepness:
+        """Return how fast numbers (N, …) of the attitudes change with the phases, and more between the sampled points."""
         genus = self.motion.periods.genus
-        directions = np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus))
-        return np.asarray(_BETWEEN * np.max(np.abs(slopes(moved, self.sample, directions)), axis=(0, 1)))
+        differences = Differences(self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus)))
+        at = self.motion.attitude(self.inversion.invert(differences.ends))
+        return Steepness.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
 
-    def error(self, tau: Array, clock: Clock, further: Array | float = 0.0) -> tuple[Array, Array]:
-        """Return a bound on the error of q and the lines, (N,), and that of τ; ``further`` is added to the steepness."""
+    @cached_property
+    def start_rounding(self) -> Array:
+        """Return the rounding of the phases at the start, (g,)."""
+        return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
+
+    def error(self, tau: Array, clock: Clock, steepness: Steepness) -> tuple[Array, Array]:
+        """Return a bound on the error of numbers of that steepness, (N,), and that of τ."""
+        rates, elapsed, rounding = np.abs(self.in_tau.rates), np.abs(tau), _RATE * DOUBLE.epsilon
+        of_clock, drift = clock.error(tau, self.start_rounding, rounding * rates)
+        lag = (rounding + drift) * elapsed + of_clock
+        at_once = _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * steepness.together
+        return np.asarray(at_once + rounding * steepness.by_rates * elapsed + lag * steepness.along_flow), np.asarray(lag)
+
+    def integral_error(self, tau: Array, slopes: Array) -> Array:
+        """Return how far errors of the phases move an integral along the orbit, (N,), from its integrand's slopes in them, (g,).
+
+        They act in one sense for as long as the slowest phase takes for a radian, at most.
+        """
         rates, elapsed = np.abs(self.in_tau.rates), np.abs(tau)
-        start = _PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation
-        of_clock, drift = clock.error(tau, start, _RATE * DOUBLE.epsilon * rates)
-        along = (_RATE * DOUBLE.epsilon + drift) * elapsed + of_clock
-        phase = start + along[:, None] * rates
-        return np.asarray(_EVALUATION * DOUBLE.epsilon + phase @ (self.steepness + further)), np.asarray(along)
+        acting = np.minimum(elapsed, 1 / np.min(rates))
+        moved = float(self.start_rounding @ slopes) + _RATE * DOUBLE.epsilon * float(rates @ slopes) * elapsed
+        return np.asarray(acting * moved)

@@ -177,22 +177,23 @@ class SeparatedCut:
         below, above = self.points.roots(psi)
         return below * below, above * above
 
-    def _factors(self, psi: Array) -> tuple[Array, Array]:
-        """Return |λ−r| for the neighbours, multiplied, and for all other roots."""
+    def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
+        """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of many may be no float."""
         below, above = (x[..., None] for x in self.point(psi))
-        left, right = below + self.left, above + self.right
+        left, right = np.sqrt(below + self.left), np.sqrt(above + self.right)
         far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)
-        complex_ones = np.prod((below + self.pairs[:, 0]) ** 2 + self.pairs[:, 1] ** 2, axis=-1)
-        return left[..., -1] * (right[..., 0] if self.right.size else 1.0), self.leading * far * complex_ones
+        complex_ones = np.prod(np.hypot(below + self.pairs[:, 0], self.pairs[:, 1]), axis=-1)
+        near = left[..., -1] * (right[..., 0] if self.right.size else 1.0)
+        return near, np.sqrt(self.leading) * far * complex_ones
 
     def outer_root(self, psi: Array) -> Array:
         """Return √(R/((λ−a)(b−λ))) at angles ψ."""
-        near, far = self._factors(psi)
-        return np.asarray(np.sqrt(near * far))
+        near, far = self._roots_of_factors(psi)
+        return np.asarray(near * far)
 
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
-        return np.asarray(np.sqrt(self._factors(psi)[1]) / (2 * self.points.density))
+        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
 
 
 def drawn_apart(values: Sequence[Fraction]) -> tuple[Fraction, ...]:

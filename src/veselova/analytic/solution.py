@@ -16,16 +16,15 @@ from veselova.analytic.clock import STRETCH_POWERS, ClockRate, clock_rate
 from veselova.analytic.costs import expected_modes
 from veselova.analytic.curve import Curve
 from veselova.analytic.fourier_clock import FourierClock
-from veselova.analytic.frame import Attitude, Frame
+from veselova.analytic.frame import Attitude, Differences, Frame
 from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.periods import Periods
+from veselova.analytic.periods import resolved_periods
 from veselova.analytic.precision import DOUBLE
 from veselova.analytic.quotients import ThetaQuotients
 from veselova.analytic.reduction import moving_part
-from veselova.analytic.spectrum import COINCIDE, Resolved, resolved
 from veselova.analytic.start import Start, start
 from veselova.analytic.steepness import Steepness
-from veselova.analytic.survey import FEW, Survey, drawn_phases
+from veselova.analytic.survey import BETWEEN, FEW, Survey, drawn_phases
 from veselova.analytic.transforms import Transforms
 from veselova.mechanics.errors import Unsolved
 from veselova.mechanics.exact import to_float
@@ -55,10 +54,6 @@ _NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
 #: By how much dt/dτ₁ may vary for a Fourier clock.
 WIDEST_RATE = 1e10
 
-#: Branch points nearer than 10 to minus this count as one where two narrower intervals are neighbours: their widths then have a
-#: product, as moduli ask for.
-_COINCIDE_BESIDE = 140
-
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
@@ -73,8 +68,8 @@ class Solution:
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
         if not problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found, self.periods = _periods(problem, distance)
-        self.curve = self.periods.curve
+        found, self.periods = resolved_periods(moving_part(problem), distance)
+        self.curve: Curve = self.periods.curve
         self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
@@ -185,21 +180,46 @@ class Solution:
     @cached_property
     def _survey(self) -> Survey:
         half_periods, steep = self.default_method() == "theta", not self.near_separatrix
-        return Survey(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep)
+        point = self.point if self.problem.time == "s" else None
+        return Survey(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep, point)
+
+    def point(self, q: Array) -> Array:
+        """Return the points Aq/√(q,Aq) of the ellipsoid with unit normals q (N, m), along the moving directions."""
+        A = float(self.moving.unit) * to_float(self.moving.A)
+        return np.asarray(A * q / np.sqrt((q * q) @ A)[:, None])
 
     @cached_property
     def steepness(self) -> Steepness:
-        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points."""
+        """Return how fast the frame turns with the phases, and more for what lies between the sampled points."""
         if self._survey.steepness is not None:
             return self._survey.steepness
-        return self.steepness_at(np.concatenate([drawn_phases(self.curve.genus), self._origin[None, :]]))
+        return self.steepness_at(self._drawn)
+
+    @cached_property
+    def steepness_of_point(self) -> Steepness:
+        """Return how fast the point of a geodesic moves with the phases, in the same way."""
+        if self._survey.steepness_of_point is not None:
+            return self._survey.steepness_of_point
+        return self._steepness_between(self._drawn)[1]
+
+    @property
+    def _drawn(self) -> Array:
+        return np.concatenate([drawn_phases(self.curve.genus), self._origin[None, :]])
 
     def steepness_at(self, z: Array) -> Steepness:
-        """Return the same at phases z (N, g), doubled too."""
-        if self.near_separatrix:
-            return Steepness.of(2 * self.quotients.slopes(z), self.in_tau1.rates)
-        psi = self.inversion.invert(z)
-        return Steepness.of(2 * self.frame.slopes(psi, np.linalg.inv(self.inversion.jacobian(psi))), self.in_tau1.rates)
+        """Return how fast the frame turns at phases z (N, g), and more; doubled near a separatrix, where it varies most."""
+        return self._steepness_between(z)[0]
+
+    def _steepness_between(self, z: Array) -> tuple[Steepness, Steepness]:
+        """Return how fast the frame turns, and the point of a geodesic moves, at phases z (N, g)."""
+        near, rates = self.near_separatrix, self.in_tau1.rates
+        points = z if near else self.inversion.invert(z)
+        along = np.broadcast_to(np.eye(rates.size), (*z.shape, rates.size))
+        ends = Differences(points, along if near else np.linalg.inv(self.inversion.jacobian(points)))
+        attitude: Callable[[Array], Attitude] = self.quotients.at if near else self.frame.at
+        at, between = attitude(ends.ends), 2.0 if near else BETWEEN
+        of_frame, of_point = ends.slopes(at), ends.quotients(self.point(at.q))
+        return Steepness.of(between * of_frame, rates), Steepness.of(between * of_point, rates)
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
@@ -272,14 +292,3 @@ class Solution:
         """Return the λ's of all directions, from an attitude that has those of the moving ones."""
         frozen = np.tile(1 / to_float(self.moving.frozen), (attitude.q.shape[0], 1))
         return np.sort(np.concatenate([attitude.spheroconic / float(self.moving.unit), frozen], axis=1), axis=1)
-
-
-def _periods(problem: TorusProblem, distance: Fraction | None) -> tuple[Resolved, Periods]:
-    """Return the spectrum of what moves and the periods of its curve, whose moduli are doubles."""
-    moving = moving_part(problem)
-    for coincide in (COINCIDE, _COINCIDE_BESIDE):
-        found = resolved(moving, DOUBLE.digits, distance, coincide=coincide)
-        periods = Periods(Curve.of(found.spectrum, DOUBLE))
-        if periods.has_moduli:
-            break
-    return found, periods

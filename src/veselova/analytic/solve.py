@@ -161,7 +161,8 @@ class _TorusMotion(Motion[TorusProblem]):
         clock = horizon.clock(self.clock)
         along, error = route.along(horizon, clock)
         if self._departure is not None:
-            error = np.maximum(error, self._departure.at(grid.doubles))
+            apart = self._departure.at(grid.doubles)
+            error = np.maximum(error, self.problem.bound({"frame": along.series[1]}, apart))
         if not error.max() <= _NO_DIGIT:  # or it is no number
             lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
@@ -179,8 +180,7 @@ class _TorusMotion(Motion[TorusProblem]):
             "theta_terms": route.terms,
         }
         states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
-        series = self.problem.completed(dict(zip(_SERIES, states, strict=False)))
-        return series, self.problem.bound(series, error), route.method, details
+        return self.problem.completed(dict(zip(_SERIES, states, strict=False))), error, route.method, details
 
 
 def _frames(routes: Sequence[Route], clock: str | None, instants: Array) -> list[Array]:

@@ -14,16 +14,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Steepness:
-    """The largest |∂(frame entry)/∂z_k|, shape (g,), and |d(frame entry)/dτ₁| along the flow."""
+    """The largest derivatives of numbers x of a state, such as the entries of its frame, over points of the torus.
+
+    by_phase (g,) |∂x/∂z_k| · along_flow |dx/dτ₁| · together √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k ∂x/∂z_k|
+    """
 
     by_phase: Array
     along_flow: float
+    together: float
+    by_rates: float
 
     @classmethod
     def of(cls, slopes: Array, rates: Array) -> Steepness:
-        """Return it from derivatives in every phase, shape (N, n², g)."""
-        return cls(np.max(np.abs(slopes), axis=(0, 1)), float(np.max(np.abs(slopes @ rates))))
+        """Return it from derivatives in every phase, shape (N, K, g)."""
+        sizes = np.abs(slopes)
+        together, by_rates = np.max(np.sum(sizes * sizes, axis=2)), np.max(sizes @ np.abs(rates))
+        along_flow = float(np.max(np.abs(slopes @ rates)))
+        return cls(np.max(sizes, axis=(0, 1)), along_flow, float(np.sqrt(together)), float(by_rates))
 
     def joined(self, other: Steepness) -> Steepness:
         """Return the larger of both."""
-        return Steepness(np.maximum(self.by_phase, other.by_phase), max(self.along_flow, other.along_flow))
+        return Steepness(
+            np.maximum(self.by_phase, other.by_phase),
+            max(self.along_flow, other.along_flow),
+            max(self.together, other.together),
+            max(self.by_rates, other.by_rates),
+        )

@@ -6,6 +6,7 @@ quotients that say how steep the frame is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -17,12 +18,16 @@ from veselova.analytic.frame import Attitude, Differences, Frame
 from veselova.analytic.periods import Periods
 from veselova.analytic.steepness import Steepness
 
-__all__ = ["FEW", "Survey", "drawn_phases"]
+__all__ = ["BETWEEN", "FEW", "Survey", "drawn_phases"]
 
 Array = NDArray[np.float64]
 
 #: Points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer points in as many directions.
 _SAMPLES, FEW, _FEW_SAMPLES = 48, 16, 4
+
+
+#: By how much the steepness between the sampled points may be larger than at them.
+BETWEEN = 1.25
 
 
 @lru_cache
@@ -44,7 +49,7 @@ class Survey:
     """The frame around a torus, from the angles (g,) of its start.
 
     rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half periods, and the steepness, are
-    wanted
+    wanted · point: what the positions q (N, m) are normals at, the point of a geodesic; None for other motions
     """
 
     frame: Frame
@@ -53,16 +58,20 @@ class Survey:
     rates: Array
     half_periods: bool
     steep: bool
+    point: Callable[[Array], Array] | None = None
 
     @cached_property
-    def _found(self) -> tuple[Attitude, Attitude | None, Steepness | None]:
+    def _found(self) -> tuple[Attitude, Attitude | None, Steepness | None, Steepness | None]:
         start = self.angles[None, :]
         differences = self._differences() if self.steep else None
         half_periods = np.pi * self.frame.half_periods if self.half_periods else start[:0]
         ends = start[:0] if differences is None else differences.ends
         at_start, at_half_periods, at_ends = self.frame.at_each(start, half_periods, ends)
-        steepness = None if differences is None else self._steepness(2 * differences.slopes(at_ends))
-        return at_start, at_half_periods if self.half_periods else None, steepness
+        steepness = None if differences is None else self._steepness(BETWEEN * differences.slopes(at_ends))
+        of_point = None
+        if differences is not None and self.point is not None:
+            of_point = self._steepness(BETWEEN * differences.quotients(self.point(at_ends.q)))
+        return at_start, at_half_periods if self.half_periods else None, steepness, of_point
 
     @property
     def start(self) -> Attitude:
@@ -76,8 +85,13 @@ class Survey:
 
     @property
     def steepness(self) -> Steepness | None:
-        """Return how fast the frame turns with the phases, doubled for what lies between the sampled points; None as above."""
+        """Return how fast the frame turns with the phases, and more for what lies between the sampled points; None as above."""
         return self._found[2]
+
+    @property
+    def steepness_of_point(self) -> Steepness | None:
+        """Return how fast the point of ``point`` moves with the phases, in the same way; None where there is none."""
+        return self._found[3]
 
     def _differences(self) -> Differences:
         genus = self.rates.size
@@ -94,4 +108,5 @@ class Survey:
             return Steepness.of(slopes, self.rates)
         # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
         spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
-        return Steepness(np.full(genus, spread / np.sqrt(genus)), float(np.max(np.abs(slopes[:, :, -1]))))
+        by_phase = np.full(genus, spread / np.sqrt(genus))
+        return Steepness(by_phase, float(np.max(np.abs(slopes[:, :, -1]))), spread, float(np.abs(self.rates) @ by_phase))
