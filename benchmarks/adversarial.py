@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
-from veselova.mechanics.problem import Problem
+from veselova.mechanics.core.problem import Problem
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 

@@ -21,8 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.solution import Solution
-from veselova.mechanics.integrals import neumann_velocity
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity
 
 
 def neumann(A: Any, q: Any, v: Any, tau1: Any) -> Any:

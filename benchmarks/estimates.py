@@ -4,7 +4,7 @@
 
 For random bodies (A from 1 to 3, unit speed) the least of two runs over two numbers of times, in one process: the seconds for
 each time and n² in both engines, by n; and beyond double precision those, and of the set-up, by digits too. The last column is
-measured over estimated (``veselova.service.estimates.cost``), which has no business below 1 on the machine of the figures.
+measured over estimated (``workers.cost_floor.cost``), which has no business below 1 on the machine of the figures.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.service.estimates import cost
-from veselova.service.schemas import TrajectoryRequest, read_request
+from veselova.service.api.request_models import TrajectoryRequest, read_request
+from veselova.service.workers.cost_floor import cost
 
 
 def request_of(n: int, count: int, **options: Any) -> TrajectoryRequest:

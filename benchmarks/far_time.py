@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
 from veselova.numeric.heyoka_peer import HeyokaPeer
 
 FAR = 1e6

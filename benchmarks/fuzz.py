@@ -19,11 +19,11 @@ import warnings
 from collections import Counter
 from typing import Any
 
-from veselova.mechanics.errors import VeselovaError
-from veselova.service.json_text import decoded
-from veselova.service.problem_details import Refused, problem_document
-from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
-from veselova.service.sweep_request import SweepRequest
+from veselova.mechanics.core.errors import VeselovaError
+from veselova.service.api.json_text import decoded
+from veselova.service.api.problem_details import Refused, problem_document
+from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.sweep_request import SweepRequest
 
 V3 = {"system": "veselova", "A": [3, "3/2", 1], "q": [0.6, 0, "0.8"], "q_dot": [0, 1, 0]}
 PROBLEMS: list[dict[str, Any]] = [

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import random_problem
 from veselova import solve
-from veselova.mechanics.integrals import moser_eigenvalues
+from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues
 
 RUNS, STATES = 3, 40
 

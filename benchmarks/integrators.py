@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from veselova import Veselova, solve
-from veselova.mechanics.reduced_flow import ReducedFlow
+from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.numeric import heyoka_peer
 from veselova.numeric.dop853 import Dop853
 from veselova.numeric.integrator import Integrator

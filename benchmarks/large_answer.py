@@ -21,8 +21,8 @@ from pathlib import Path
 
 import httpx2
 
-from veselova.service.download import MEDIA_TYPES
-from veselova.service.examples import BODY4_PROBLEM
+from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.client.download import MEDIA_TYPES
 
 
 def peak_megabytes(pid: int) -> float:

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.filling import Filling
-from veselova.analytic.horizon import Horizon
-from veselova.analytic.solution import Solution
+from veselova.analytic.dense_output.output_array import Filling
+from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.torus_solution import Solution
 
 
 def problem(n: int) -> vs.Veselova:

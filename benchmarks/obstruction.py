@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from veselova.mechanics.multiplier import ChaplyginMultiplier
+from veselova.mechanics.paper.chaplygin_multiplier import ChaplyginMultiplier
 
 POINTS = 200
 

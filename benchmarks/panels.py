@@ -22,8 +22,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import random_problem
-from veselova.analytic.panel_clock import PanelClock
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.time_map.panels import PanelClock
 
 RUNS, CYCLES, PHASES = 3, 60, 200
 

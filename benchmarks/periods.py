@@ -21,10 +21,10 @@ import numpy as np
 from flint import acb, arb, arb_mat, ctx
 
 from veselova import Veselova
-from veselova.analytic.curve import Curve
-from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE
-from veselova.analytic.solution import Solution
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.motion.torus_solution import Solution
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem

@@ -25,9 +25,9 @@ import numpy as np
 from nufft import best, problem
 
 import veselova as vs
-from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import RADIUS, lattice_points, small_norm
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.theta.lattice import RADIUS, lattice_points, small_norm
 
 #: Points at which functions are summed one by one.
 _SCATTERED = 20_000

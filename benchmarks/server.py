@@ -42,9 +42,9 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 
-from veselova.service.delivery import Wanted, solved
-from veselova.service.examples import BODY4_PROBLEM
-from veselova.service.tasks import warm_up
+from veselova.service.answers.rendering import Wanted, solved
+from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.workers.tasks import warm_up
 
 #: Requests of one kind before the turn of the next.
 _BLOCK = 10

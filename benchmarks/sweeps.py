@@ -24,10 +24,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from veselova.service.local_sweep import local_settings, run_sweep
-from veselova.service.schemas import read_request
-from veselova.service.summaries import computed_chunk
-from veselova.service.sweep_request import SweepRequest
+from veselova.service.api.request_models import read_request
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli.local_sweep import local_settings, run_sweep
+from veselova.service.sweeps.chunk import computed_chunk
 from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [1, 1, 1], "q": [1, 0, 0], "q_dot": [0, 1, 0], "normalize": True}

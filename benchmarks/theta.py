@@ -22,13 +22,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
-from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.clock import UniformClock
-from veselova.analytic.horizon import Horizon
-from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.solution import Solution
-from veselova.analytic.theta import Theta
-from veselova.analytic.windows import Windows
+from veselova.analytic.dense_output.interpolation import Windows
+from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.theta.riemann_theta import Theta
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.rate import UniformClock
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem, random_riemann_matrix

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from veselova import Veselova
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
 
 
 def near_unstable_circle(q_2: str, q_dot_2: str) -> Veselova:

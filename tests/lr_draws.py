@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veselova import LRSystem, MatrixGroup
-from veselova.mechanics.inertia import Inertia
+from veselova.mechanics.bodies.inertia_operator import Inertia
 
 #: (n, rank) of all D_r with n ≤ 6.
 RANKS = [(n, r) for n in range(2, 7) for r in range(1, n)]

@@ -16,7 +16,7 @@ import psycopg
 import pytest
 from pydantic import SecretStr
 
-from veselova.service.settings import Settings
+from veselova.service.api.settings import Settings
 
 #: Where Debian has the programs of each version.
 _DEBIAN = Path("/usr/lib/postgresql")
@@ -57,7 +57,7 @@ def postgresql_server() -> Iterator[str]:
         options = f"-k {folder} -c listen_addresses= -c fsync=off"
         run("pg_ctl", "-w", "-l", str(folder / "log"), "-o", options, "start")
         try:
-            yield f"postgresql://veselova@/{{name}}?host={folder}"
+            yield f"postgresql://veselova./{{name}}?host={folder}"
         finally:
             run("pg_ctl", "-w", "-m", "immediate", "stop")
 

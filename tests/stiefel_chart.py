@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.body_inertia import BodyInertia
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.stiefel_geometry import admissible_basis, momentum_map, product
+from veselova.mechanics.bodies.stiefel_inertia import BodyInertia
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.geometry.stiefel import admissible_basis, momentum_map, product
 
 #: Step of central differences: truncation and rounding are both about 1e-10 here.
 STEP = 2e-5

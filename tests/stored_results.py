@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veselova import EllipsoidGeodesic, NeumannSystem, SeparableVeselova, Veselova, VeselovaSO3, solve
-from veselova.mechanics.problem import Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.version import __version__
 
 __all__ = ["FILE", "TIMES", "differences", "problems", "results", "text"]

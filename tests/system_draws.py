@@ -10,7 +10,7 @@ import numpy as np
 
 from draws import CLASSES, adversarial_data
 from veselova import EllipsoidGeodesic, NeumannSystem, SeparableVeselova, VeselovaSO3
-from veselova.mechanics.problem import Problem
+from veselova.mechanics.core.problem import Problem
 
 __all__ = ["CLASSES_OF", "adversarial_system"]
 

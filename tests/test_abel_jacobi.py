@@ -9,17 +9,17 @@ import pytest
 
 from draws import adversarial_start, random_problem
 from problems import tagged
-from veselova.analytic.abel_jacobi import AbelJacobi
-from veselova.analytic.balls import balls
-from veselova.analytic.curve import Curve
-from veselova.analytic.frame import Frame
-from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE
-from veselova.analytic.reduction import moving_part
-from veselova.analytic.solution import Solution
-from veselova.analytic.spectrum import spectrum
-from veselova.analytic.start import start
-from veselova.mechanics.integrals import neumann_velocity
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.attitude.frame import Frame
+from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.initial_angles import start
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.spectrum.branch_points import spectrum
+from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity
 
 DIMENSIONS = range(2, 9)
 

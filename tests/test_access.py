@@ -23,8 +23,8 @@ from conftest import PATIENCE, Server, running_server
 from hostile import GOOD
 from test_http import is_problem
 from veselova import Client, InvalidInput, ProblemResponse, Veselova
-from veselova.service import rates
-from veselova.service.rates import network_of, rate_of
+from veselova.service.api import rate_limits as rates
+from veselova.service.api.rate_limits import network_of, rate_of
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 

@@ -12,11 +12,11 @@ import pytest
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
-from veselova.mechanics.errors import InvalidInput
-from veselova.service.estimates import cost, require_hope
-from veselova.service.examples import BODY4_PROBLEM
-from veselova.service.schemas import ComparisonRequest, TrajectoryRequest, read_request
-from veselova.service.settings import Settings
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest, read_request
+from veselova.service.api.settings import Settings
+from veselova.service.workers.cost_floor import cost, require_hope
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "engine": "numeric"}
 
@@ -86,7 +86,7 @@ def test_every_limit_is_a_setting(
 ) -> None:
     from fastapi.testclient import TestClient
 
-    from veselova.service.app import create_app
+    from veselova.service.http.app import create_app
 
     ((name, value),) = limit.items()
     monkeypatch.setenv(f"VESELOVA_{name.upper()}", value)

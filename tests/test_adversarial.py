@@ -13,7 +13,7 @@ from conftest import Server
 from system_draws import CLASSES_OF, adversarial_system
 from verdict import against_truth, time_unit
 from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Unsolved, compare, solve, torus
-from veselova.mechanics.torus_problem import TorusProblem
+from veselova.mechanics.systems.torus_problem import TorusProblem
 
 #: Starts of each system in every check, and in the slow one.
 FEW, MANY = 15, 150

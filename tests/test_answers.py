@@ -19,9 +19,9 @@ from conftest import PATIENCE, Server, running_server, slow, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova import Trajectory, Veselova, solve
-from veselova.service.formats import FORMATS
-from veselova.service.negotiation import accepted_coding, accepted_type
-from veselova.service.problem_details import Refused
+from veselova.service.api.content_negotiation import accepted_coding, accepted_type
+from veselova.service.api.media_types import FORMATS
+from veselova.service.api.problem_details import Refused
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TYPES = {name: entry.media_type for name, entry in FORMATS.items()}

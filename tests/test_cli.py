@@ -21,8 +21,8 @@ import pytest
 from conftest import PATIENCE, wait_until
 from hostile import BUDGET_S, GOOD, INVALID, MALFORMED
 from veselova import __version__, solve
-from veselova.service.cli import main
-from veselova.service.examples import BODY4
+from veselova.service.api.examples import BODY4
+from veselova.service.cli.main import main
 
 BODY4_FILE = Path(__file__).parent.parent / "examples" / "body4.json"
 

@@ -31,9 +31,9 @@ from veselova import (
     solve,
     torus,
 )
-from veselova.service import dispatch
-from veselova.service.download import MEDIA_TYPES
-from veselova.service.formats import FORMATS
+from veselova.service.api.media_types import FORMATS
+from veselova.service.client.download import MEDIA_TYPES
+from veselova.service.sweeps import chunk_dispatch as dispatch
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TIMES = np.linspace(-1, 2, 7)
@@ -43,7 +43,7 @@ TIMES = np.linspace(-1, 2, 7)
 def fast_retries(monkeypatch: pytest.MonkeyPatch) -> None:
     """Retries without pauses, as many as asked for."""
     for name in ("_FIRST_WAIT_S", "_JITTER_S", "_LONGEST_PAUSE_S"):
-        monkeypatch.setattr(f"veselova.service.client.{name}", 0.0)
+        monkeypatch.setattr(f"veselova.service.client.client.{name}", 0.0)
 
 
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
@@ -207,9 +207,9 @@ def test_a_late_answer_or_a_wrong_address_is_not_asked_for_again(failure: Any) -
 
 
 def test_the_pause_that_a_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("veselova.service.client._LONGEST_PAUSE_S", 30.0)
+    monkeypatch.setattr("veselova.service.client.client._LONGEST_PAUSE_S", 30.0)
     pauses: list[float] = []
-    monkeypatch.setattr("veselova.service.client.time.sleep", pauses.append)
+    monkeypatch.setattr("veselova.service.client.client.time.sleep", pauses.append)
     for header in ("3", "999", "Wed, 21 Oct 2026 07:28:00 GMT"):
         assert ask(Script(503, 200, retry_after=header), False).n == 3
     assert pauses == [3.0, 30.0, 0.0]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from veselova.mechanics.closed_form_schema import SCHEMA
+from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent / "examples" / "closed_form"
 

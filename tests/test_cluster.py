@@ -14,12 +14,12 @@ import pytest
 import trustme
 
 from conftest import PATIENCE, free_port
-from veselova.mechanics.errors import InvalidInput
-from veselova.service.cluster import open_cluster
-from veselova.service.local_sweep import run_sweep
-from veselova.service.schemas import read_request
-from veselova.service.settings import Settings
-from veselova.service.sweep_request import SweepRequest
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.api.request_models import read_request
+from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli.local_sweep import run_sweep
+from veselova.service.sweeps.cluster import open_cluster
 
 BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
 
@@ -66,7 +66,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
 def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
     cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
     sweep = read_request(SweepRequest, {"problem": BASE, "vary": vary, "samples": 10, "times": [0, 1]})
     job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
@@ -99,7 +99,7 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     asyncio.run(connect(cluster))
     with pytest.raises(OSError, match="TLS certificate does not match"):
         asyncio.run(connect(stranger))
-    monkeypatch.setattr("veselova.service.cluster._CONNECT_S", 3)
+    monkeypatch.setattr("veselova.service.sweeps.cluster._CONNECT_S", 3)
     with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
         asyncio.run(connect(plain))
 

@@ -12,10 +12,10 @@ import pytest
 import veselova as vs
 from conftest import slow
 from truth import true_motion
-from veselova.analytic.balls import balls
-from veselova.analytic.drift import Drift, expected_growth
-from veselova.analytic.reduction import moving_part
-from veselova.analytic.spectrum import resolved
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.motion.drift_bound import Drift, expected_growth
+from veselova.analytic.spectrum.branch_points import resolved
+from veselova.analytic.spectrum.moving_part import moving_part
 
 SYMMETRIC = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
 FRAMED = vs.Veselova(

@@ -14,13 +14,13 @@ from conftest import slow
 from draws import random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova
-from veselova.analytic.curve import Curve
-from veselova.analytic.interval import Interval
-from veselova.analytic.periods import Periods
-from veselova.analytic.precision import DOUBLE, Decimals, Extended
-from veselova.analytic.reduction import moving_part
-from veselova.analytic.secular import zeros_between_poles
-from veselova.analytic.spectrum import Spectrum, spectrum
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals, Extended
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.interval import Interval
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
+from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.spectrum.secular_equation import zeros_between_poles
 
 DIMENSIONS = range(2, 9)
 

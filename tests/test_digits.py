@@ -20,22 +20,22 @@ from conftest import Server, slow
 from draws import near_unstable_circle, random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
-from veselova.analytic.abel_jacobi import AbelJacobi
-from veselova.analytic.balls import balls
-from veselova.analytic.curve import Curve
-from veselova.analytic.enclosed_clock import EnclosedClock
-from veselova.analytic.enclosed_fourier import EnclosedFourier
-from veselova.analytic.enclosed_frame import orthonormal
-from veselova.analytic.enclosed_solution import EnclosedSolution
-from veselova.analytic.enclosure import enclosed
-from veselova.analytic.interval import Interval
-from veselova.analytic.reduction import moving_part
-from veselova.analytic.solution import Solution
-from veselova.analytic.spectrum import resolved
-from veselova.mechanics.archive import read_archive
-from veselova.mechanics.decimals import Decimals
-from veselova.mechanics.times import TimeGrid
-from veselova.service.documents import encoded, trajectory_document, trajectory_of
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.attitude.frame_balls import orthonormal
+from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.interval import Interval
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
+from veselova.analytic.spectrum.branch_points import resolved
+from veselova.analytic.spectrum.branch_points_balls import enclosed
+from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.time_map.fourier_balls import EnclosedFourier
+from veselova.analytic.time_map.panels_balls import EnclosedClock
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.npz import read_archive
+from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
 

@@ -18,11 +18,11 @@ from conftest import Server
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
 from test_cli import run
-from veselova.analytic.enclosed_solution import EnclosedSolution
-from veselova.analytic.solution import Solution
-from veselova.mechanics.archive import read_archive
-from veselova.mechanics.decimals import Decimals
-from veselova.service.documents import encoded, trajectory_document, trajectory_of
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.results.npz import read_archive
+from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
 
 #: Points on the unit sphere and tangents, exactly; F_0 is not zero.
 POINTS = {

@@ -10,9 +10,9 @@ import pytest
 from conftest import slow
 from truth import true_geodesic
 from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Veselova, solve
-from veselova.mechanics.ellipsoid import normal_velocity
-from veselova.mechanics.integrals import clock_rate
-from veselova.mechanics.moser import contacts, lax_matrix, lax_partner
+from veselova.mechanics.geometry.confocal_quadrics import contacts, lax_matrix, lax_partner
+from veselova.mechanics.geometry.integrals_of_motion import clock_rate
+from veselova.mechanics.systems.ellipsoid import normal_velocity
 
 Generator = np.random.Generator
 

@@ -8,8 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from veselova.analytic.elliptic import Jacobi
-from veselova.analytic.precision import DOUBLE, Extended
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Extended
+from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
 COMPLEMENTS = ["1", "0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
 ANGLES = [1e-8, 0.1, 0.5, 1.0, 1.5, 1.57, 2.0, 3.0, 3.1, 3.5, 5.0, 6.2, 7.0, 9.0, 11.0, 12.5, -1.0, -4.0]

@@ -15,7 +15,7 @@ from draws import adversarial_start, random_problem
 from problems import TABLE, Case, tagged
 from truth import true_motion
 from veselova import EulerPoisson, Unsolved, Veselova, compare, solve, torus
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 
 METHODS = [

@@ -13,16 +13,18 @@ from lr_draws import random_lr
 from stiefel_chart import Chart, slopes
 from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
-from veselova.analytic.solution import Solution
-from veselova.mechanics import integrals, measure, rank_one
-from veselova.mechanics.body_inertia import body_inertia
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.moser import lax_matrix, lax_partner
-from veselova.mechanics.multiplier import ChaplyginMultiplier
-from veselova.mechanics.reduction import ChaplyginReduction
-from veselova.mechanics.skew import coefficients, skew
-from veselova.mechanics.spheroconic import to_spheroconic
-from veselova.mechanics.stiefel_geometry import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.mechanics.bodies.stiefel_inertia import body_inertia
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.confocal_quadrics import lax_matrix, lax_partner
+from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.geometry.stiefel import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
+from veselova.mechanics.paper import invariant_measure as measure
+from veselova.mechanics.paper import rank_one
+from veselova.mechanics.paper.chaplygin_multiplier import ChaplyginMultiplier
+from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 
 @pytest.mark.parametrize("N", range(2, 7))

@@ -11,12 +11,15 @@ import pytest
 
 import veselova as vs
 from test_many_digits import in_rationals
-from veselova.analytic import enclosed_clock, enclosed_fourier, enclosed_waves, time_map_balls
-from veselova.analytic.balls import Balls, balls
-from veselova.analytic.enclosed_waves import SumsOverPoints, sums_over_modes
-from veselova.analytic.fixed_point import Fixed
-from veselova.analytic.interval import Interval
-from veselova.analytic.periods import Periods
+from veselova.analytic.arithmetic.balls import Balls, balls
+from veselova.analytic.arithmetic.fixed_point import Fixed
+from veselova.analytic.curve.interval import Interval
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.motion import time_map_balls
+from veselova.analytic.numerics import fourier_sums_balls as enclosed_waves
+from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.time_map import fourier_balls as enclosed_fourier
+from veselova.analytic.time_map import panels_balls as enclosed_clock
 
 KINDS: tuple[Literal["cosines"], Literal["sines"]] = ("cosines", "sines")
 SIZES = [Fraction(1, 10**120), 1, 10**120]

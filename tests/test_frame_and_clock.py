@@ -12,16 +12,16 @@ import pytest
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
 from veselova import EllipsoidGeodesic, Veselova, solve
-from veselova.analytic import fourier_clock
-from veselova.analytic.fourier_clock import ColumnsForModes, FourierClock
-from veselova.analytic.horizon import Horizon
-from veselova.analytic.increasing import increasing_root
-from veselova.analytic.modes import grown
-from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.panel_clock import PanelClock
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.numerics.monotone_root import increasing_root
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.mechanics.errors import InternalContradiction, Unsolved
+from veselova.analytic.time_map import fourier as fourier_clock
+from veselova.analytic.time_map.fourier import ColumnsForModes, FourierClock
+from veselova.analytic.time_map.fourier_modes import grown
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.panels import PanelClock
+from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 DIMENSIONS = range(2, 9)
 

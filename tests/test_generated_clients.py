@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from conftest import Server
-from veselova.service.examples import ANSWERS
-from veselova.service.systems import SYSTEMS
+from veselova.service.api.examples import ANSWERS
+from veselova.service.api.problem_models import SYSTEMS
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from lr_draws import GROUPS, group_named, random_inertia
 from veselova import InvalidInput, LRSystem, MatrixGroup
-from veselova.mechanics.inertia import Inertia
+from veselova.mechanics.bodies.inertia_operator import Inertia
 
 
 def hat(vector: Any) -> Any:

@@ -22,7 +22,7 @@ import pytest
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import BUDGET_S, GOOD, INVALID, MALFORMED, changed
 from veselova import Veselova, compare, solve, torus
-from veselova.service.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.api.examples import ANSWERS, BODY4_PROBLEM
 
 JSON = {"content-type": "application/json"}
 
@@ -379,7 +379,7 @@ def test_the_interrupt_of_a_terminal_finds_a_worker_that_still_starts(tmp_path: 
 def test_an_interrupt_that_workers_do_not_hear_wakes_the_main_thread() -> None:
     program = f"""
 import signal, time
-from veselova.service.interrupts import keep_from_children
+from veselova.service.workers.signals import keep_from_children
 signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may ignore it
 keep_from_children()
 try:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from conftest import PATIENCE, Server
-from veselova.service.examples import BODY4_PROBLEM
+from veselova.service.api.examples import BODY4_PROBLEM
 
 HOST = b"Host: localhost\r\n"
 HEALTH = b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n"

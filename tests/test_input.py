@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
-from veselova.mechanics.errors import VeselovaError, shown
-from veselova.mechanics.exact import exact_number, plain
-from veselova.mechanics.times import TimeGrid
+from veselova.mechanics.core.errors import VeselovaError, shown
+from veselova.mechanics.core.exact_input import exact_number, plain
+from veselova.mechanics.core.times import TimeGrid
 
 
 def test_numerals_given_as_texts_are_shown_as_texts() -> None:
@@ -199,7 +199,7 @@ def test_ratios_and_decimals_become_strings_in_json() -> None:
 def test_errors_survive_pickling() -> None:
     import pickle
 
-    from veselova.mechanics import errors
+    from veselova.mechanics.core import errors
 
     samples: list[VeselovaError] = [
         errors.InvalidInput(("A", 1), "a number", "x"),

@@ -16,15 +16,15 @@ import zarr
 
 from postgresql import postgresql_server, settings_in
 from test_sweeps import request as sweep_request
-from veselova.mechanics.errors import InvalidInput
-from veselova.service.database import connect, schema_differences
-from veselova.service.jobs import Job, JobEnded, Jobs
-from veselova.service.keys import open_keys
-from veselova.service.local_sweep import run_sweep
-from veselova.service.problem_details import Refused
-from veselova.service.results import Result
-from veselova.service.settings import Settings
-from veselova.service.summaries import Chunk
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access.database import connect, schema_differences
+from veselova.service.access.keys import open_keys
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+from veselova.service.cli.local_sweep import run_sweep
+from veselova.service.sweeps.chunk import Chunk
+from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
+from veselova.service.sweeps.result_files import Result
 
 
 @pytest.fixture(scope="module")

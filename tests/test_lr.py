@@ -16,8 +16,8 @@ from conftest import Server, slow
 from hostile import BUDGET_S
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on, random_potential
 from veselova import InvalidInput, LRSystem, MatrixGroup, Unsolved, Veselova, solve
-from veselova.mechanics.distribution import Distribution
-from veselova.mechanics.flow import FLOATS
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.groups.distribution import Distribution
 
 #: What issue 4 asks of every system over t = 100, by the default method, and by Taylor's.
 DRIFT, TAYLOR_DRIFT = 1e-12, 2e-14

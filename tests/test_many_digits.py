@@ -13,15 +13,15 @@ import pytest
 import veselova as vs
 from draws import random_riemann_matrix
 from test_theta import all_characteristics, as_flint_orders
-from veselova.analytic.balls import balls
-from veselova.analytic.enclosed_series import EnclosedSeries
-from veselova.analytic.enclosed_theta import EnclosedTheta
-from veselova.analytic.enclosed_windows import EnclosedWindows
-from veselova.analytic.enclosure import _quadratic_zeros, spheroconic
-from veselova.analytic.fixed_point import Fixed
-from veselova.analytic.precision import Arithmetic, Decimals, extended
-from veselova.analytic.secular import zeros_between_poles
-from veselova.mechanics.veselova import Veselova
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, extended
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.arithmetic.fixed_point import Fixed
+from veselova.analytic.dense_output.interpolation_balls import EnclosedWindows
+from veselova.analytic.numerics.chebyshev_balls import EnclosedSeries
+from veselova.analytic.spectrum.branch_points_balls import _quadratic_zeros, spheroconic
+from veselova.analytic.spectrum.secular_equation import zeros_between_poles
+from veselova.analytic.theta.riemann_theta_balls import EnclosedTheta
+from veselova.mechanics.systems.veselova import Veselova
 
 BODIES = {
     "three": Veselova([3, 2, "1.2"], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"]),

@@ -10,10 +10,10 @@ import pytest
 
 from lr_draws import GROUPS, RANKS, group_named, random_inertia, random_lr, random_lr_on
 from veselova import LRSystem, MatrixGroup
-from veselova.mechanics import measure
-from veselova.mechanics.distribution import Distribution
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.inertia import Inertia
+from veselova.mechanics.bodies.inertia_operator import Inertia
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.groups.distribution import Distribution
+from veselova.mechanics.paper import invariant_measure as measure
 
 #: Complex steps leave rounding: some 1e-16 for each of up to 150 coordinates.
 ZERO = 2e-14

@@ -10,9 +10,9 @@ import pytest
 
 from draws import random_problem
 from veselova import InvalidInput, Veselova
-from veselova.mechanics import integrals
-from veselova.mechanics.natural_frame import natural_frame, orthonormalized
-from veselova.mechanics.spheroconic import from_spheroconic, to_spheroconic
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalized
+from veselova.mechanics.geometry.spheroconic import from_spheroconic, to_spheroconic
 
 DIMENSIONS = range(2, 9)
 

@@ -11,14 +11,14 @@ import pytest
 from stiefel_chart import Chart, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Veselova, solve
-from veselova.mechanics.body_inertia import MatrixInertia, SpecialInertia, body_inertia
-from veselova.mechanics.multiplier import (
+from veselova.mechanics.bodies.stiefel_inertia import MatrixInertia, SpecialInertia, body_inertia
+from veselova.mechanics.geometry.stiefel import admissible_basis, angular_velocity, cotangent, product, tangent_part
+from veselova.mechanics.paper.chaplygin_multiplier import (
     ChaplyginMultiplier,
     gyroscopic_tensor,
     invariant_density,
     restricted_determinant,
 )
-from veselova.mechanics.stiefel_geometry import admissible_basis, angular_velocity, cotangent, product, tangent_part
 
 RANKS = [(n, r) for n in range(3, 6) for r in range(1, n)]
 

@@ -10,9 +10,9 @@ import pytest
 import veselova as vs
 from conftest import Server
 from test_http import is_problem, post
-from veselova.mechanics.errors import did_you_mean
-from veselova.service.examples import BODY4_PROBLEM
-from veselova.service.schemas import TrajectoryRequest, read_request
+from veselova.mechanics.core.errors import did_you_mean
+from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.api.request_models import TrajectoryRequest, read_request
 
 VARY = {"/A/0": {"start": 3, "stop": 4, "count": 3}}
 NAMES = [

@@ -27,13 +27,13 @@ from fastapi import FastAPI
 from conftest import PATIENCE, Server, running_server, samples, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
-from veselova.service.app import create_app
-from veselova.service.logs import line_formatter
-from veselova.service.metrics import Metrics
-from veselova.service.problem_details import Refused
-from veselova.service.settings import Settings
-from veselova.service.worker_process import SIZE, answered
-from veselova.service.workers import Workers
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+from veselova.service.http.app import create_app
+from veselova.service.observability.logs import line_formatter
+from veselova.service.observability.metrics import Metrics
+from veselova.service.workers.pool import Workers
+from veselova.service.workers.worker_process import SIZE, answered
 from veselova.version import __version__
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
@@ -313,8 +313,8 @@ from opentelemetry import trace
 from opentelemetry.sdk.trace import TracerProvider
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
-from veselova.service.app import create_app
-from veselova.service.settings import Settings
+from veselova.service.http.app import create_app
+from veselova.service.api.settings import Settings
 
 exporter, provider = InMemorySpanExporter(), TracerProvider()
 provider.add_span_processor(SimpleSpanProcessor(exporter))

@@ -9,11 +9,11 @@ import jsonschema_rs
 import pytest
 
 from conftest import Server
-from veselova.service.app import create_app
-from veselova.service.examples import BODY4, BODY4_PROBLEM
-from veselova.service.json_schemas import PREFIX, schema_document, schema_names
-from veselova.service.settings import Settings
-from veselova.service.systems import SYSTEMS
+from veselova.service.api.examples import BODY4, BODY4_PROBLEM
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.settings import Settings
+from veselova.service.http.app import create_app
+from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
 
 #: Names of functions in generated clients: programs of users call them, so that none may change or go.
 OPERATIONS = {

@@ -112,7 +112,7 @@ def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
     # What is imported at a call may be of any extra, or is named by the error that says that it is missing.
     declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"finufft", "sympy"}
-    for path in sorted((SOURCE / folder).glob("*.py")):
+    for path in sorted((SOURCE / folder).rglob("*.py")):
         for module in _third_party(path):
             names = {_name(name) for name in distributions.get(module, [module])}
             assert names & declared, f"{path.name} imports {module}, which no extra of pyproject.toml declares"
@@ -234,7 +234,9 @@ def test_the_client_needs_its_own_extra_alone() -> None:
 
 
 def test_the_server_needs_no_sweeps() -> None:
-    statement = "from veselova.service.app import create_app\nfrom veselova.service.settings import Settings\nprint(create_app)"
+    statement = (
+        "from veselova.service.http.app import create_app\nfrom veselova.service.api.settings import Settings\nprint(create_app)"
+    )
     answer = _without("service", statement)
     assert answer.returncode == 0, answer.stderr
 

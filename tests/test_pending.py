@@ -10,8 +10,8 @@ from typing import Any
 import anyio
 
 from conftest import PATIENCE
-from veselova.service.cache import Cache
-from veselova.service.pending import Pending
+from veselova.service.answers.cache import Cache
+from veselova.service.answers.write_behind import Pending
 
 
 class SlowCache(Cache):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from veselova import EulerPoisson, InvalidInput, VeselovaSO3
-from veselova.mechanics.laurent import LaurentPolynomial, monomials
-from veselova.mechanics.potential import Potential, duality_defect, family
+from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
+from veselova.mechanics.potentials.polynomial import Potential, duality_defect, family
 
 MOMENTS = np.array([1.0, 1.7, 2.6])
 INERTIA, INVERSE = np.diag(MOMENTS), np.diag(1 / MOMENTS)

@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 
 from draws import random_problem
 from veselova import InvalidInput, NeumannSystem, Veselova, solve
-from veselova.mechanics import integrals, rank_one
-from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.paper import rank_one
 
 DIMENSIONS = range(2, 8)
 

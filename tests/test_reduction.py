@@ -12,8 +12,8 @@ from scipy.linalg import expm, expm_frechet
 from conftest import slow
 from lr_draws import RANKS, random_lr, random_operator
 from veselova import InvalidInput, LRSystem, MatrixGroup, solve
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.reduction import ChaplyginReduction
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 #: A potential of e_1 alone, invariant under every H of (4.1).
 OF_E1 = [{"coefficient": 0.2, "powers": [[1, 1, 2]]}, {"coefficient": -0.1, "powers": [[1, 2, 1], [1, 3, 1]]}]

@@ -10,10 +10,10 @@ import pytest
 from conftest import slow
 from draws import near_resonance, random_problem
 from veselova import Veselova, VeselovaSO3, solve
-from veselova.analytic.fourier_clock import FourierClock
-from veselova.analytic.orbit import LinearFlow
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
+from veselova.analytic.time_map.fourier import FourierClock
+from veselova.analytic.time_map.linear_flow import LinearFlow
 
 #: With A_2 = 1.6 times this 2f_1 = f_2, nearly to rounding.
 RESONANT = 2.584309800104662

@@ -16,8 +16,8 @@ import veselova
 from problems import tagged
 from test_engines import METHODS
 from veselova import BackendMissing, Comparison, InvalidInput, StiefelFlow, Trajectory, Unsolved, compare, solve, torus
-from veselova.mechanics.archive import read_archive
-from veselova.mechanics.trajectory import Provenance
+from veselova.mechanics.results.npz import read_archive
+from veselova.mechanics.results.trajectory import Provenance
 
 TIMES = np.linspace(0, 5, 11)
 
@@ -185,7 +185,7 @@ def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(kind: str
     whole, blocks = io.BytesIO(), io.BytesIO()
     getattr(motion, f"to_{kind}")(whole, ["tau1", "frame"])
     for name in ("_TEXT_BLOCK", "_BINARY_BLOCK"):
-        monkeypatch.setattr(f"veselova.mechanics.table.{name}", 30)
+        monkeypatch.setattr(f"veselova.mechanics.results.table.{name}", 30)
     getattr(motion, f"to_{kind}")(blocks, ["tau1", "frame"])
     read = {
         "npz": lambda data: np.load(data)["frame"],

@@ -10,7 +10,7 @@ import pytest
 from flint import acb, acb_mat, ctx
 
 from veselova import InvalidInput, Unsolved, theta
-from veselova.analytic.siegel import reduce_lattice
+from veselova.analytic.theta.siegel_reduction import reduce_lattice
 
 
 def random_tau(random: np.random.Generator, genus: int) -> Any:

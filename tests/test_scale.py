@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 import veselova as vs
-from veselova.mechanics.errors import InvalidInput
-from veselova.service.cli import app
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.cli.main import app
 
 #: n = 4: h and p are multiples of A^(2−n), periods of A^(g + ½ − k).
 A = np.array([3.0, 2.0, 1.5, 1.0])

@@ -23,11 +23,11 @@ from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from hostile_bodies import hostile_bodies, hostile_sweeps
 from test_http import is_problem, post
-from veselova.service.connections import Connections
-from veselova.service.hosts import allowed_hosts
-from veselova.service.json_text import decoded
-from veselova.service.problem_details import Refused
-from veselova.service.settings import Settings
+from veselova.service.api.json_text import decoded
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+from veselova.service.http.connections import Connections
+from veselova.service.http.hosts import allowed_hosts
 
 #: The longest that a body may keep others waiting, in seconds.
 LONGEST_WAIT = 0.1

@@ -28,19 +28,20 @@ from postgresql import postgresql_server, settings_in
 from test_access import keys, new_key
 from test_http import ENDLESS, JSON, is_problem
 from test_sweeps import request as sweep_request
-from veselova.mechanics.errors import InvalidInput
-from veselova.service import private_folder, settings, spool
-from veselova.service.database import api_keys, connect, idempotency_keys, jobs, schema_differences, writing
-from veselova.service.expiry import expiry
-from veselova.service.job_admission import promised_bytes
-from veselova.service.job_service import JobService
-from veselova.service.jobs import Jobs, job_id_of
-from veselova.service.keys import open_keys
-from veselova.service.problem_details import Refused
-from veselova.service.settings import Settings
-from veselova.service.shares import Shares
-from veselova.service.sweeps import Sweeps
-from veselova.service.wal import wal_is_damaged
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access.database import api_keys, connect, idempotency_keys, jobs, schema_differences, writing
+from veselova.service.access.keys import open_keys
+from veselova.service.access.sqlite_wal import wal_is_damaged
+from veselova.service.answers import spool
+from veselova.service.api import private_folder, settings
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+from veselova.service.cli.key_expiry import expiry
+from veselova.service.http.job_service import JobService
+from veselova.service.sweeps.job_limits import promised_bytes
+from veselova.service.sweeps.job_store import Jobs, job_id_of
+from veselova.service.sweeps.runner import Sweeps
+from veselova.service.workers.fair_share import Shares
 
 NOW = datetime.now(UTC)
 

@@ -10,11 +10,11 @@ import pytest
 
 from conftest import slow
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
-from veselova.analytic.abel_jacobi import AbelJacobi
-from veselova.analytic.body_motion import BodyMotion
-from veselova.analytic.panel_integral import integrated
-from veselova.analytic.separable import SeparableMotion, SeparatedRate
-from veselova.analytic.separated_curve import SeparableStart
+from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.separable.body_motion import BodyMotion
+from veselova.analytic.separable.curve import SeparableStart
+from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
+from veselova.analytic.time_map.panel_quadrature import integrated
 
 Generator = np.random.Generator
 

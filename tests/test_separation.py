@@ -12,9 +12,10 @@ from scipy.integrate import solve_ivp
 from conftest import slow
 from draws import random_problem
 from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
-from veselova.mechanics import integrals, separation
-from veselova.mechanics.separation import SeparablePotential
-from veselova.mechanics.spheroconic import to_spheroconic
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.potentials import separable as separation
+from veselova.mechanics.potentials.separable import SeparablePotential
 
 MOMENTS = np.array([1.0, 1.7, 2.6])
 ALPHAS = {

@@ -10,13 +10,13 @@ import pytest
 
 from conftest import slow
 from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
-from veselova.mechanics import sphere_geodesics
-from veselova.mechanics.euler_poisson import dual
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.rigid_body import RigidBody
-from veselova.mechanics.rigid_body_flow import RigidBodyFlow
-from veselova.mechanics.veselova_so3 import multiplier
-from veselova.service.systems import SYSTEMS
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
+from veselova.mechanics.paper import sphere_geodesics
+from veselova.mechanics.systems.euler_poisson import dual
+from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.veselova_so3 import multiplier
+from veselova.service.api.problem_models import SYSTEMS
 
 #: Potentials by name; those of the family keep away from the planes.
 POTENTIALS: dict[str, Any] = {

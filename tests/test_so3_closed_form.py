@@ -12,8 +12,8 @@ import pytest
 import veselova as vs
 from conftest import Server
 from veselova import InvalidInput, Unsolved, VeselovaSO3
-from veselova.mechanics.decimals import Decimals
-from veselova.service.documents import encoded, trajectory_document, trajectory_of
+from veselova.mechanics.core.decimals import Decimals
+from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
 
 #: A body stated in decimals, and the same in doubles.
 TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])

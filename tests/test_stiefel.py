@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 from conftest import slow
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Unsolved, Veselova, solve
-from veselova.mechanics.body_inertia import BodyInertia, body_inertia
-from veselova.mechanics.cotangent_flow import CotangentFlow
-from veselova.mechanics.flow import FLOATS
-from veselova.mechanics.skew import coefficients, skew
-from veselova.mechanics.stiefel_geometry import (
+from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
+from veselova.mechanics.core.flow import FLOATS
+from veselova.mechanics.flows.cotangent_flow import CotangentFlow
+from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.stiefel import (
     ad_invariants,
     admissible_basis,
     admissible_part,
@@ -28,9 +28,9 @@ from veselova.mechanics.stiefel_geometry import (
     tangent_part,
     trace_integrals,
 )
-from veselova.service.documents import encoded, trajectory_of
-from veselova.service.systems import SYSTEMS
-from veselova.service.tasks import TASKS
+from veselova.service.api.json_documents import encoded, trajectory_of
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.workers.tasks import TASKS
 
 RANKS = [(n, r) for n in range(2, 6) for r in range(1, n + 1)]
 

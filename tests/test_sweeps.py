@@ -30,22 +30,22 @@ from pyarrow import parquet
 
 import veselova as vs
 from conftest import PATIENCE, wait_until
-from veselova.analytic.solution import Solution
-from veselova.mechanics.errors import InvalidRequest, Unsolved
-from veselova.service import dispatch
-from veselova.service import sweeps as running
-from veselova.service.cluster import open_cluster
-from veselova.service.dispatch import answers
-from veselova.service.jobs import Job, Jobs
-from veselova.service.local_sweep import local_settings, run_sweep
-from veselova.service.problem_details import Refused
-from veselova.service.results import Result
-from veselova.service.schemas import read_request
-from veselova.service.settings import Settings
-from veselova.service.summaries import OtherVersion, computed_chunk, lost_chunk
-from veselova.service.sweep_request import SweepRequest
-from veselova.service.time_limit import TimeIsUp, time_limit
-from veselova.service.torus_columns import columns_of_torus
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.mechanics.core.errors import InvalidRequest, Unsolved
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import read_request
+from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli.local_sweep import local_settings, run_sweep
+from veselova.service.sweeps import chunk_dispatch as dispatch
+from veselova.service.sweeps import runner as running
+from veselova.service.sweeps.chunk import OtherVersion, computed_chunk, lost_chunk
+from veselova.service.sweeps.chunk_dispatch import answers
+from veselova.service.sweeps.cluster import open_cluster
+from veselova.service.sweeps.job_store import Job, Jobs
+from veselova.service.sweeps.result_files import Result
+from veselova.service.sweeps.torus_columns import columns_of_torus
+from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
@@ -280,7 +280,7 @@ def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch:
     sweep = request(problem=plain, budget_s=5)
     expected = rows(sweep, 0, 2)
     for failure in (broken, endless):
-        monkeypatch.setattr("veselova.analytic.tori.tori", failure)
+        monkeypatch.setattr("veselova.analytic.motion.invariant_torus_batch.tori", failure)
         found = rows(sweep, 0, 2)
         assert [row["outcome"] for row in found] == ["solved"] * 2
         assert np.allclose([row["mean_rate"] for row in found], [row["mean_rate"] for row in expected], rtol=1e-14)
@@ -397,8 +397,8 @@ def test_a_place_varies_by_the_numbers_of_numpy(tmp_path: Path) -> None:
 def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One run in this process; another by two workers, which is interrupted and then goes on."""
     sweep = request(samples=20, times=[0, 1], outputs=["q"], trajectories=True)
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 4)
-    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 4)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
     job, undisturbed = run_sweep(sweep, local_settings(tmp_path / "one", 1), lambda done, total: None)
 
     class Interrupted(Exception):
@@ -408,8 +408,8 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
         if done >= 12:
             raise Interrupted
 
-    monkeypatch.setattr("veselova.service.local_sweep._FEW", 0)
-    monkeypatch.setattr("veselova.service.local_sweep._SOON_S", 0.0)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._SOON_S", 0.0)
     settings = local_settings(tmp_path / "two", 2)
     with pytest.raises(Interrupted):
         run_sweep(sweep, settings, interrupt)
@@ -425,7 +425,7 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
     monkeypatch.setattr(
         Jobs, "store", lambda self, job_id, position, *rest: calls.append(position) or store(self, job_id, position, *rest)
     )
-    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
     _, resumed = run_sweep(sweep, settings, lambda done, total: None)
     assert sorted(calls) == sorted([*missing, victim])
     for path in ("result_path", "packed_path"):
@@ -433,7 +433,7 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
 
 
 def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     monkeypatch.setattr(running, "_FIRST_PAUSE_S", 0.05)
     settings = local_settings(tmp_path, 1)
     read_only, refused = threading.Event(), threading.Event()
@@ -458,8 +458,8 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, mon
 
 @pytest.mark.parametrize("removed", [False, True])
 def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 5)
-    monkeypatch.setattr("veselova.service.local_sweep._FEW", 1000)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
     sweep, settings, stored, ended = request(samples=30), local_settings(tmp_path, 1), list[bool](), threading.Event()
     elsewhere, store = Jobs(settings), Jobs.store
 
@@ -623,7 +623,7 @@ def test_a_worker_whose_successor_cannot_be_started_is_replaced(tmp_path: Path, 
 def test_a_job_says_when_there_is_no_worker_and_sends_two_chunks_for_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 1)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 1)
     monkeypatch.setattr(running, "_LOOK_S", 0.02, raising=False)
     workers: dict[str, int] = {}
     sent: list[int] = []
@@ -710,9 +710,9 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
     def failing(*_: Any) -> Any:
         raise failure
 
-    monkeypatch.setattr("veselova.service.dispatch.computed_chunk", failing)
-    monkeypatch.setattr("veselova.service.local_sweep._FEW", 0)  # so that the sweep goes to a worker
-    monkeypatch.setattr("veselova.service.this_process.seconds_of", lambda *_: 1e9)
+    monkeypatch.setattr("veselova.service.sweeps.chunk_dispatch.computed_chunk", failing)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)  # so that the sweep goes to a worker
+    monkeypatch.setattr("veselova.service.sweeps.in_process_cluster.seconds_of", lambda *_: 1e9)
     with pytest.raises(Unsolved, match=f"a worker could not compute the problems 0 to 14: {failure.strerror or failure}"):
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
@@ -727,7 +727,7 @@ def test_a_value_that_is_a_text_may_come_in_a_later_chunk(tmp_path: Path, monkey
 
     expected = column("one chunk")
     assert expected[2] == "x"
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 1)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 1)
     assert column("three chunks") == expected
 
 
@@ -745,7 +745,7 @@ def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, 
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("veselova.service.results.shutil.rmtree", die)
+        patched.setattr("veselova.service.sweeps.result_files.shutil.rmtree", die)
         with pytest.raises(KeyboardInterrupt):
             result.finish()
     result.finish()
@@ -765,9 +765,9 @@ def test_a_sweep_does_not_notice_that_the_clock_is_changed(tmp_path: Path, monke
         def now(cls, tz: Any = None) -> datetime:
             return datetime.now(tz) + timedelta(days=next(days))
 
-    monkeypatch.setattr("veselova.service.jobs.datetime", Jumping)
+    monkeypatch.setattr("veselova.service.sweeps.job_store.datetime", Jumping)
     monkeypatch.setattr("distributed.scheduler.time", lambda: clock() + 86400 * next(days))
-    monkeypatch.setattr("veselova.service.sweep_request._CHUNK_ROWS", 3)
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 3)
     disturbed_job, disturbed = run_sweep(request(), local_settings(tmp_path / "two", 1), lambda done, total: None)
     assert disturbed_job.state == "finished"
     assert disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
@@ -851,7 +851,9 @@ print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
 """
 
 
-@pytest.mark.parametrize(("before", "warns"), [("", False), ("import veselova.service.local_sweep as l; l._SOON_S = 0.0", True)])
+@pytest.mark.parametrize(
+    ("before", "warns"), [("", False), ("import veselova.service.cli.local_sweep as l; l._SOON_S = 0.0", True)]
+)
 def test_a_sweep_in_a_plain_script_is_computed_in_its_process(before: str, warns: bool, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(PLAIN_SCRIPT.format(before=before, count=60, folder=str(tmp_path / "kept")))
@@ -873,7 +875,7 @@ def test_a_sweep_in_a_plain_script_is_computed_in_its_process(before: str, warns
 )
 def test_a_script_knows_whether_it_is_guarded(text: str, expected: str, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
-    script.write_text(f"from veselova.service.script_guard import unguarded\n{text}\n")
+    script.write_text(f"from veselova.service.cli.script_guard import unguarded\n{text}\n")
     command = [[sys.executable, str(script)], [sys.executable, "-c", script.read_text()]]
     answers = [subprocess.run(one, capture_output=True, text=True, check=True).stdout.strip() for one in command]
     assert answers == [expected, "False"]
@@ -883,7 +885,7 @@ def test_tori_of_a_second_start_no_process(tmp_path: Path, monkeypatch: pytest.M
     def refuse(*_: Any, **__: Any) -> Any:
         raise AssertionError("a process was started")
 
-    monkeypatch.setattr("veselova.service.cluster._machine", refuse)
+    monkeypatch.setattr("veselova.service.sweeps.cluster._machine", refuse)
     sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
     job, _ = run_sweep(sweep, local_settings(tmp_path, None), lambda done, total: None)
     assert (job.state, job.done) == ("finished", 601)

@@ -25,9 +25,9 @@ from veselova import (
     compare,
     solve,
 )
-from veselova.service.documents import encoded, trajectory_document, trajectory_of
-from veselova.service.schemas import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
-from veselova.service.systems import SYSTEMS
+from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 
 TIMES = [-1.0, 0.0, 0.5, 2.0]
 
@@ -194,7 +194,7 @@ def test_every_field_refuses_what_is_no_number(name: str) -> None:
     ],
 )
 def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], message: str) -> None:
-    from veselova.service.tasks import requested_trajectory
+    from veselova.service.workers.tasks import requested_trajectory
 
     with pytest.raises((InvalidInput, InvalidRequest)) as caught:
         requested_trajectory(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
@@ -202,7 +202,7 @@ def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], messag
 
 
 def test_a_system_of_one_engine_cannot_be_compared() -> None:
-    from veselova.service.tasks import requested_comparison
+    from veselova.service.workers.tasks import requested_comparison
 
     with pytest.raises(InvalidInput) as caught:
         requested_comparison(read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES}))

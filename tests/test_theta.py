@@ -12,11 +12,11 @@ from flint import acb, acb_mat, ctx
 from draws import random_problem, random_riemann_matrix
 from problems import tagged
 from veselova import EllipsoidGeodesic, solve
-from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.lattice import lattice_points
-from veselova.analytic.solution import Solution
-from veselova.analytic.theta import Theta
-from veselova.mechanics.errors import Unsolved
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.theta.lattice import lattice_points
+from veselova.analytic.theta.riemann_theta import Theta
+from veselova.mechanics.core.errors import Unsolved
 
 
 def all_characteristics(genus: int) -> list[Characteristic]:

@@ -17,13 +17,13 @@ from typer.testing import CliRunner
 
 import veselova as vs
 from conftest import Server
-from veselova.mechanics.archive import read_archive
-from veselova.mechanics.errors import InvalidInput
-from veselova.mechanics.exact import exact_number, plain
-from veselova.mechanics.remainders import split, split_grid
-from veselova.mechanics.times import TimeGrid, as_request
-from veselova.service.cli import app
-from veselova.service.entry import packed, unpacked
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import exact_number, plain
+from veselova.mechanics.core.remainders import split, split_grid
+from veselova.mechanics.core.times import TimeGrid, as_request
+from veselova.mechanics.results.npz import read_archive
+from veselova.service.answers.cache_entry import packed, unpacked
+from veselova.service.cli.main import app
 
 #: γ, q … at 10⁹ + 3/10, which is 4.8e-8 beyond the nearest double.
 FAR = "1000000000.3"
@@ -61,8 +61,8 @@ def test_every_method_takes_remainders(method: str, clock: str | None) -> None:
 
 
 def test_remainders_move_a_clock_by_panels() -> None:
-    from veselova.analytic.horizon import Horizon
-    from veselova.analytic.solution import Solution
+    from veselova.analytic.motion.evaluation_plan import Horizon
+    from veselova.analytic.motion.torus_solution import Solution
 
     times, remainders = np.array([20.0, 30.0]), np.array([1e-3, -2e-3])
     clock = Horizon(Solution(body()), np.array([0.0, 31.0])).clock("panels")

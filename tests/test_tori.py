@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from veselova import Veselova, torus
-from veselova.analytic.tori import Tori, tori
-from veselova.analytic.twofold import Twofold
+from veselova.analytic.arithmetic.double_double import Twofold
+from veselova.analytic.motion.invariant_torus_batch import Tori, tori
 
 Array = np.ndarray[Any, Any]
 

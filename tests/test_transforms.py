@@ -11,8 +11,8 @@ from draws import adversarial_start, random_problem
 from problems import TABLE, Case, near_separatrix, tagged
 from truth import true_motion
 from veselova import Trajectory, Unsolved, Veselova, solve
-from veselova.analytic import transforms
-from veselova.analytic.solution import Solution
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.theta import nufft as transforms
 
 MOVING = [case for case in TABLE if "at-rest" not in case.tags and case.problem().n <= 6]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from veselova.analytic.precision import DOUBLE, Arithmetic
-from veselova.analytic.waves import powers, turns, waves, waves_at
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic
+from veselova.analytic.arithmetic.trigonometric_sums import powers, turns, waves, waves_at
 
 
 def test_powers_are_as_exact_as_multiples_of_the_angle(rng: np.random.Generator) -> None:

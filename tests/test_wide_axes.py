@@ -11,7 +11,7 @@ import pytest
 
 import veselova as vs
 from veselova import Veselova, VeselovaSO3
-from veselova.mechanics.wide_axes import wide_axes
+from veselova.mechanics.bodies.wide_axes import wide_axes
 
 TIMES = [1, 1_000, 100_000]
 

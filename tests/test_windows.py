@@ -14,11 +14,12 @@ import pytest
 from draws import random_problem
 from problems import TABLE, Case, tagged
 from veselova import NeumannSystem, solve
-from veselova.analytic import pieces, track
-from veselova.analytic.costs import Costs, expected_modes
-from veselova.analytic.increasing import fourth_order_divisor
-from veselova.analytic.solution import Solution
+from veselova.analytic.dense_output import adjoining_windows as track
+from veselova.analytic.dense_output import piecewise_polynomial as pieces
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.numerics.monotone_root import fourth_order_divisor
 from veselova.analytic.solve import solve as solve_analytic
+from veselova.analytic.time_map.cost_model import Costs, expected_modes
 
 #: Fewer times than these are taken one by one.
 FEW = 100

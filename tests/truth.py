@@ -13,8 +13,8 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.ellipsoid import EllipsoidGeodesic
-from veselova.mechanics.torus_problem import TorusProblem
+from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
+from veselova.mechanics.systems.torus_problem import TorusProblem
 
 Array = NDArray[np.float64]
 

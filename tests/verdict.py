@@ -10,9 +10,9 @@ import numpy as np
 
 import veselova as vs
 from truth import true_motion
-from veselova.analytic.solution import Solution
-from veselova.mechanics.problem import Problem
-from veselova.mechanics.torus_problem import TorusProblem
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["against_truth", "time_unit"]
 

@@ -20,64 +20,64 @@ if TYPE_CHECKING:
     from veselova.engines import compare as compare
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
-    from veselova.mechanics.closed_form import ClosedForm as ClosedForm
-    from veselova.mechanics.comparison import Comparison as Comparison
-    from veselova.mechanics.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
-    from veselova.mechanics.errors import BackendMissing as BackendMissing
-    from veselova.mechanics.errors import InternalContradiction as InternalContradiction
-    from veselova.mechanics.errors import InvalidInput as InvalidInput
-    from veselova.mechanics.errors import InvalidRequest as InvalidRequest
-    from veselova.mechanics.errors import ProblemResponse as ProblemResponse
-    from veselova.mechanics.errors import ServiceError as ServiceError
-    from veselova.mechanics.errors import ServiceUnreachable as ServiceUnreachable
-    from veselova.mechanics.errors import Unsolved as Unsolved
-    from veselova.mechanics.errors import VeselovaError as VeselovaError
-    from veselova.mechanics.euler_poisson import EulerPoisson as EulerPoisson
-    from veselova.mechanics.group import MatrixGroup as MatrixGroup
-    from veselova.mechanics.lr_system import LRSystem as LRSystem
-    from veselova.mechanics.neumann import NeumannSystem as NeumannSystem
-    from veselova.mechanics.separable_veselova import SeparableVeselova as SeparableVeselova
-    from veselova.mechanics.stiefel import StiefelFlow as StiefelFlow
-    from veselova.mechanics.torus import Torus as Torus
-    from veselova.mechanics.trajectory import Provenance as Provenance
-    from veselova.mechanics.trajectory import Trajectory as Trajectory
-    from veselova.mechanics.veselova import Veselova as Veselova
-    from veselova.mechanics.veselova_so3 import VeselovaSO3 as VeselovaSO3
-    from veselova.service.client import AsyncClient as AsyncClient
-    from veselova.service.client import Client as Client
-    from veselova.service.local_sweep import sweep as sweep
+    from veselova.mechanics.core.errors import BackendMissing as BackendMissing
+    from veselova.mechanics.core.errors import InternalContradiction as InternalContradiction
+    from veselova.mechanics.core.errors import InvalidInput as InvalidInput
+    from veselova.mechanics.core.errors import InvalidRequest as InvalidRequest
+    from veselova.mechanics.core.errors import ProblemResponse as ProblemResponse
+    from veselova.mechanics.core.errors import ServiceError as ServiceError
+    from veselova.mechanics.core.errors import ServiceUnreachable as ServiceUnreachable
+    from veselova.mechanics.core.errors import Unsolved as Unsolved
+    from veselova.mechanics.core.errors import VeselovaError as VeselovaError
+    from veselova.mechanics.groups.matrix_group import MatrixGroup as MatrixGroup
+    from veselova.mechanics.results.closed_form import ClosedForm as ClosedForm
+    from veselova.mechanics.results.comparison import Comparison as Comparison
+    from veselova.mechanics.results.torus import Torus as Torus
+    from veselova.mechanics.results.trajectory import Provenance as Provenance
+    from veselova.mechanics.results.trajectory import Trajectory as Trajectory
+    from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
+    from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
+    from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
+    from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
+    from veselova.mechanics.systems.separable_veselova import SeparableVeselova as SeparableVeselova
+    from veselova.mechanics.systems.stiefel import StiefelFlow as StiefelFlow
+    from veselova.mechanics.systems.veselova import Veselova as Veselova
+    from veselova.mechanics.systems.veselova_so3 import VeselovaSO3 as VeselovaSO3
+    from veselova.service.cli.local_sweep import sweep as sweep
+    from veselova.service.client.client import AsyncClient as AsyncClient
+    from veselova.service.client.client import Client as Client
 
 #: Public name → the module that defines it.
 _HOMES = {
-    "AsyncClient": "veselova.service.client",
-    "BackendMissing": "veselova.mechanics.errors",
-    "Client": "veselova.service.client",
-    "ClosedForm": "veselova.mechanics.closed_form",
-    "Comparison": "veselova.mechanics.comparison",
-    "EllipsoidGeodesic": "veselova.mechanics.ellipsoid",
-    "EulerPoisson": "veselova.mechanics.euler_poisson",
-    "InternalContradiction": "veselova.mechanics.errors",
-    "InvalidInput": "veselova.mechanics.errors",
-    "InvalidRequest": "veselova.mechanics.errors",
-    "LRSystem": "veselova.mechanics.lr_system",
-    "MatrixGroup": "veselova.mechanics.group",
-    "NeumannSystem": "veselova.mechanics.neumann",
-    "ProblemResponse": "veselova.mechanics.errors",
-    "Provenance": "veselova.mechanics.trajectory",
-    "SeparableVeselova": "veselova.mechanics.separable_veselova",
-    "ServiceError": "veselova.mechanics.errors",
-    "ServiceUnreachable": "veselova.mechanics.errors",
-    "StiefelFlow": "veselova.mechanics.stiefel",
-    "Torus": "veselova.mechanics.torus",
-    "Trajectory": "veselova.mechanics.trajectory",
-    "Unsolved": "veselova.mechanics.errors",
-    "Veselova": "veselova.mechanics.veselova",
-    "VeselovaError": "veselova.mechanics.errors",
-    "VeselovaSO3": "veselova.mechanics.veselova_so3",
+    "AsyncClient": "veselova.service.client.client",
+    "BackendMissing": "veselova.mechanics.core.errors",
+    "Client": "veselova.service.client.client",
+    "ClosedForm": "veselova.mechanics.results.closed_form",
+    "Comparison": "veselova.mechanics.results.comparison",
+    "EllipsoidGeodesic": "veselova.mechanics.systems.ellipsoid",
+    "EulerPoisson": "veselova.mechanics.systems.euler_poisson",
+    "InternalContradiction": "veselova.mechanics.core.errors",
+    "InvalidInput": "veselova.mechanics.core.errors",
+    "InvalidRequest": "veselova.mechanics.core.errors",
+    "LRSystem": "veselova.mechanics.systems.lr_system",
+    "MatrixGroup": "veselova.mechanics.groups.matrix_group",
+    "NeumannSystem": "veselova.mechanics.systems.neumann",
+    "ProblemResponse": "veselova.mechanics.core.errors",
+    "Provenance": "veselova.mechanics.results.trajectory",
+    "SeparableVeselova": "veselova.mechanics.systems.separable_veselova",
+    "ServiceError": "veselova.mechanics.core.errors",
+    "ServiceUnreachable": "veselova.mechanics.core.errors",
+    "StiefelFlow": "veselova.mechanics.systems.stiefel",
+    "Torus": "veselova.mechanics.results.torus",
+    "Trajectory": "veselova.mechanics.results.trajectory",
+    "Unsolved": "veselova.mechanics.core.errors",
+    "Veselova": "veselova.mechanics.systems.veselova",
+    "VeselovaError": "veselova.mechanics.core.errors",
+    "VeselovaSO3": "veselova.mechanics.systems.veselova_so3",
     "closed_form": "veselova.engines",
     "compare": "veselova.engines",
     "solve": "veselova.engines",
-    "sweep": "veselova.service.local_sweep",
+    "sweep": "veselova.service.cli.local_sweep",
     "torus": "veselova.engines",
 }
 
@@ -88,7 +88,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         hint = ""
         if not name.startswith("_"):
-            from veselova.mechanics.errors import did_you_mean
+            from veselova.mechanics.core.errors import did_you_mean
 
             hint = did_you_mean(name, _HOMES)
         raise AttributeError(f"module 'veselova' has no attribute {name!r}{hint}")
@@ -109,7 +109,7 @@ def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
     library = (error.name or "").split(".")[0]
     if name not in _EXTRAS or library in ("", "veselova"):  # a fault of this package, or of the core
         return error
-    from veselova.mechanics.errors import BackendMissing, install_extra
+    from veselova.mechanics.core.errors import BackendMissing, install_extra
 
     return BackendMissing(library, f"veselova.{name}", install_extra(_EXTRAS[name]))
 

@@ -14,7 +14,7 @@ def main() -> None:
     """Run the command line; an interrupt while it is still loading ends it as quietly as one later."""
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
     try:
-        from veselova.service import cli
+        from veselova.service.cli import main as cli
     except ModuleNotFoundError as error:
         _refuse(error)
 
@@ -27,7 +27,7 @@ def _refuse(error: ModuleNotFoundError) -> NoReturn:
     library = (error.name or "").split(".")[0]
     if library in ("", "veselova"):  # a fault of this package
         raise error
-    from veselova.mechanics.errors import install_extra
+    from veselova.mechanics.core.errors import install_extra
 
     print(f"veselova: the command line needs {library}; install it with: {install_extra('service')}", file=sys.stderr)
     raise SystemExit(1)

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import VeselovaError
-from veselova.mechanics.exact import exact_number
-from veselova.mechanics.problem import Problem
-from veselova.mechanics.trajectory import Trajectory
+from veselova.mechanics.core.errors import VeselovaError
+from veselova.mechanics.core.exact_input import exact_number
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.trajectory import Trajectory
 
 __all__ = ["conditioning", "moved_by_roundings", "rounding_of"]
 

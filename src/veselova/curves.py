@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.analytic.characteristic import Characteristic
-from veselova.analytic.real_hyperelliptic import RealCurve
-from veselova.mechanics.errors import InvalidInput, shown
-from veselova.mechanics.exact import exact_vector
+from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.exact_input import exact_vector
 
 __all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
 

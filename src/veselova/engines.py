@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from veselova.mechanics.comparison import Comparison
-from veselova.mechanics.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.errors import Faults, InvalidInput, shown, unknown_name
-from veselova.mechanics.exact import require_truth_value
-from veselova.mechanics.problem import Problem
-from veselova.mechanics.times import TimeGrid
-from veselova.mechanics.trajectory import Trajectory
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
+from veselova.mechanics.core.errors import Faults, InvalidInput, shown, unknown_name
+from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from veselova.analytic.solution import Solution
-    from veselova.mechanics.closed_form import ClosedForm
-    from veselova.mechanics.torus import Torus
+    from veselova.analytic.motion.torus_solution import Solution
+    from veselova.mechanics.results.closed_form import ClosedForm
+    from veselova.mechanics.results.torus import Torus
 
 __all__ = ["ENGINES", "Prepared", "closed_form", "compare", "solve", "start_on_torus", "torus"]
 
@@ -95,7 +95,7 @@ class Prepared:
 
     @cached_property
     def _solution(self) -> Solution:
-        from veselova.analytic.solution import Solution
+        from veselova.analytic.motion.torus_solution import Solution
 
         return Solution(self.problem.on_torus())
 
@@ -154,7 +154,7 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
 
 def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the start (q, q̇) with given constants of motion and phases, for ``Veselova.from_torus``."""
-    return import_module("veselova.analytic.from_torus").start_on_torus(A, energy, constants, phases, signs)  # type: ignore[no-any-return]
+    return import_module("veselova.analytic.motion.start_from_torus").start_on_torus(A, energy, constants, phases, signs)  # type: ignore[no-any-return]
 
 
 def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
@@ -165,7 +165,7 @@ def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
     """
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    from veselova.analytic.closed_form import closed_form as closed_form_of
+    from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     return closed_form_of(problem, accuracy)
 
@@ -178,6 +178,6 @@ def torus(problem: Problem) -> Torus:
 def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
         raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
-    from veselova.analytic.torus import torus as torus_of
+    from veselova.analytic.motion.invariant_torus import torus as torus_of
 
     return torus_of(problem.on_torus(), solution)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.analytic.siegel_theta import SiegelTheta
-from veselova.mechanics.errors import InvalidInput, Unsolved, shown
+from veselova.analytic.theta.siegel_theta import SiegelTheta
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown
 
 __all__ = ["ScaledTheta", "riemann_theta", "scaled_riemann_theta", "siegel_reduce", "theta_constants"]
 

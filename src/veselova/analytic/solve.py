@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.body_motion import BodyMotion
-from veselova.analytic.motion import Motion
-from veselova.analytic.point_motion import PointMotion
-from veselova.analytic.rank_one_motion import motion_of_body
-from veselova.analytic.route import METHODS, Route
-from veselova.analytic.separatrix import DepartureBound
-from veselova.analytic.solution import Solution
-from veselova.mechanics.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.errors import InvalidInput, Unsolved, shown, unknown_name
-from veselova.mechanics.problem import Series
-from veselova.mechanics.separable_veselova import SeparableVeselova
-from veselova.mechanics.times import TimeGrid
-from veselova.mechanics.torus_problem import TorusProblem
-from veselova.mechanics.trajectory import Trajectory
-from veselova.mechanics.veselova_so3 import VeselovaSO3
+from veselova.analytic.motion.base import Motion
+from veselova.analytic.motion.evaluator import METHODS, Route
+from veselova.analytic.motion.rank_one_so3 import motion_of_body
+from veselova.analytic.motion.separatrix import DepartureBound
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.separable.body_motion import BodyMotion
+from veselova.analytic.separable.point_motion import PointMotion
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown, unknown_name
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.separable_veselova import SeparableVeselova
+from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["METHODS", "solve"]
 
@@ -90,7 +90,7 @@ def solve(
         raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", shown(method))
     if clock is not None:
         raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
-    from veselova.analytic.enclosed_motion import EnclosedMotion
+    from veselova.analytic.motion.motion_balls import EnclosedMotion
 
     return EnclosedMotion(problem, digits, certified, method)(grid)
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from veselova.mechanics.errors import Unsolved
-from veselova.mechanics.flow import Flow
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.flow import Flow
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["Dop853"]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.veselova import Veselova
+from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["HeyokaPeer"]
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.flow import Flow
+from veselova.mechanics.core.flow import Flow
 
 __all__ = ["Integrator"]
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import Unsolved, unknown_name
-from veselova.mechanics.flow import Flow
-from veselova.mechanics.problem import Problem, Series
-from veselova.mechanics.times import TimeGrid
-from veselova.mechanics.trajectory import Provenance, Trajectory
+from veselova.mechanics.core.errors import Unsolved, unknown_name
+from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.trajectory import Provenance, Trajectory
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["METHODS", "solve"]

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.errors import BackendMissing, InvalidInput, Unsolved
-from veselova.mechanics.flow import Flow, Operations
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
+from veselova.mechanics.core.flow import Flow, Operations
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["Taylor"]

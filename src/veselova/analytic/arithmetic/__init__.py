@@ -1,0 +1,1 @@
+"""Doubles, extended precision and balls behind one interface; double-double and fixed-point numbers."""

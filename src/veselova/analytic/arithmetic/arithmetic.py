@@ -1,0 +1,300 @@
+"""The one place that touches precision: the arithmetic in which the closed form is evaluated.
+
+The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are float64; in ``Extended`` they
+are multiprecision numbers of an mpmath context that belongs to the arithmetic alone, so nothing global changes.
+"""
+
+from __future__ import annotations
+
+import decimal
+import math
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from fractions import Fraction
+from functools import lru_cache, partial
+from typing import Any, ClassVar
+
+import mpmath
+import numpy as np
+from mpmath.libmp import from_rational
+from numpy.typing import NDArray
+from scipy.special import ellipkm1, elliprf
+
+from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
+
+__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
+
+#: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
+Values = NDArray[Any]
+
+#: A sum of waves as a function of angles.
+Sums = Callable[[Values], Values]
+
+#: Tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at most.
+_MOST_KEPT, _LARGEST_KEPT = 64, 256
+
+#: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is taken for what it leaves out
+#: where that is not bounded.
+LAST_COEFFICIENTS, _TAIL = 3, 4
+
+
+class Arithmetic(ABC):
+    """Elementary functions, constants and small linear algebra at one precision. Functions act entrywise on arrays."""
+
+    #: Whether numbers carry their own error, so that every truncation has to be added to it; whether that has to be a bound.
+    has_radii: ClassVar[bool] = False
+    certified: bool = False
+
+    digits: int
+    epsilon: Any
+    pi: Any
+    sqrt: Callable[[Any], Any]
+    exp: Callable[[Any], Any]
+    sinh: Callable[[Any], Any]
+    cosh: Callable[[Any], Any]
+    log: Callable[[Any], Any]
+    sin: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    floor: Callable[[Any], Any]
+
+    @abstractmethod
+    def number(self, value: Any) -> Any:
+        """Return one number (Fraction, float, or a number of another arithmetic), rounded to this precision."""
+
+    def array(self, values: Any) -> Values:
+        """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.size, dtype=object)
+        result[:] = [self.number(value) for value in given.ravel().tolist()]
+        return result.reshape(given.shape)
+
+    @abstractmethod
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+
+    @abstractmethod
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+
+    @abstractmethod
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+
+    @property
+    def nats(self) -> float:
+        """Return the natural logarithm of the precision, 10^digits."""
+        return self.digits * math.log(10)
+
+    def widened(self, values: Any, bound: Any) -> Any:
+        """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
+        return values
+
+    def nodes(self, count: int) -> Values:
+        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
+        return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
+
+    def sine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
+        orders = self.array(list(range(1, coefficients.shape[1] + 1)))
+        flat = coefficients.reshape(-1, coefficients.shape[2])
+        return lambda psi: np.asarray(self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat)
+
+    def cosine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for coefficients (g, M, K)."""
+        orders = self.array(list(range(coefficients.shape[1])))
+
+        def sums(psi: Values) -> Values:
+            waves = self.cos(psi[..., None] * orders)
+            return np.stack([waves[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2)
+
+        return sums
+
+    def cosine_series(self, values: Values) -> Values:
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
+        count = values.shape[-1]
+        coefficients = self.product(values, self._waves(count)) * 2 / count
+        coefficients[..., 0] = np.sum(values, axis=-1) / count
+        return np.asarray(coefficients)
+
+    def _waves(self, count: int) -> Values:
+        """Return cos mψ at the N nodes, shape (N, N)."""
+        table = self.cos(np.arange(4 * count) * (self.pi / (2 * count)))
+        return np.asarray(table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)])
+
+    @staticmethod
+    def bounded_tail(largest: Any, decay: Any, count: int) -> Any:
+        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the aliases in those, at any real ψ.
+
+        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤ 2Mρ^m.
+        """
+        return 6 * largest * decay**count / (1 - decay)
+
+    @staticmethod
+    def estimated_tail(series: Values) -> Values:
+        """Return what cosine series leave out judging by their last coefficients, shape (K,) for (K, N)."""
+        return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
+
+    def product(self, a: Values, b: Values) -> Values:
+        """Return the matrix product."""
+        return np.asarray(a @ b)
+
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``."""
+        return self.pi / 2 / self.agm(self.number(1), self.sqrt(complement))
+
+    def agm(self, a: Any, b: Any) -> Any:
+        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically from any ratio."""
+        while abs(a - b) > 4 * self.epsilon * abs(a):
+            a, b = (a + b) / 2, self.sqrt(a * b)
+        return (a + b) / 2
+
+
+class Double(Arithmetic):
+    """IEEE double precision through NumPy and SciPy."""
+
+    digits = 15
+    epsilon = float(np.finfo(float).eps)
+    pi = float(np.pi)
+    sqrt = staticmethod(np.sqrt)
+    exp = staticmethod(np.exp)
+    sinh = staticmethod(np.sinh)
+    cosh = staticmethod(np.cosh)
+    log = staticmethod(np.log)
+    sin = staticmethod(np.sin)
+    cos = staticmethod(np.cos)
+    floor = staticmethod(np.floor)
+    sine_sums = staticmethod(sine_sums)
+    cosine_sums = staticmethod(cosine_sums)
+
+    def _waves(self, count: int) -> Values:
+        return _kept_waves(count) if count <= _LARGEST_KEPT else super()._waves(count)
+
+    def number(self, value: Any) -> float:
+        """Return the nearest double."""
+        return float(value)
+
+    def array(self, values: Any) -> Values:
+        """Return a float64 array, entries correctly rounded."""
+        return np.array(values, dtype=np.float64)
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+        return elliprf(x, y, z)
+
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``, entrywise."""
+        return ellipkm1(complement)
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix, or of each of a stack."""
+        return np.asarray(np.linalg.inv(matrix))
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix, or of each of a stack."""
+        return np.linalg.det(matrix)
+
+
+#: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
+_GUARD = 6
+
+
+class Decimals:
+    """The four operations and square roots on decimals of the standard library, ten times as fast as those of mpmath.
+
+    Operators round to these digits ``with`` it only, in this thread.
+    """
+
+    def __init__(self, digits: int) -> None:
+        self.digits = digits
+        self.epsilon = decimal.Decimal((0, (1,), -digits))
+        trapped = [decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow]
+        self._context = decimal.Context(digits + _GUARD, "ROUND_HALF_EVEN", decimal.MIN_EMIN, decimal.MAX_EMAX, traps=trapped)
+        self._outer = decimal.Context()
+
+    def __enter__(self) -> Decimals:
+        self._outer = decimal.getcontext()
+        decimal.setcontext(self._context)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        decimal.setcontext(self._outer)
+
+    def number(self, value: Any) -> decimal.Decimal:
+        """Return one number (Fraction or int), rounded to this precision."""
+        numerator, denominator = Fraction(value).as_integer_ratio()
+        return self._context.divide(decimal.Decimal(numerator), decimal.Decimal(denominator))
+
+    def array(self, values: Any) -> Values:
+        """Return an array of decimals from a sequence of rationals or of decimals."""
+        result = np.empty(len(values), dtype=object)
+        result[:] = [x if isinstance(x, decimal.Decimal) else self.number(x) for x in values]
+        return result
+
+    def sqrt(self, value: Any) -> Any:
+        """Return square roots, entrywise."""
+        return _DECIMAL_SQRT(value)
+
+
+_DECIMAL_SQRT = np.frompyfunc(lambda x: x.sqrt(), 1, 1)
+
+
+class Extended(Arithmetic):
+    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least 20)."""
+
+    def __init__(self, digits: int) -> None:
+        self._context = mpmath.MPContext()
+        self._context.dps = digits + _GUARD
+        self.digits = digits
+        self.epsilon = self._context.mpf(10) ** -digits
+        self.pi = +self._context.pi
+        for name in ("sqrt", "exp", "sinh", "cosh", "log", "sin", "cos", "floor"):
+            setattr(self, name, self._entrywise(getattr(self._context, name), 1))
+        self._rf = self._entrywise(self._context.elliprf, 3)
+
+    @staticmethod
+    def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
+        ufunc: Callable[..., Any] = np.frompyfunc(function, arguments, 1)
+        return ufunc
+
+    def number(self, value: Any) -> Any:
+        """Return one number, rounded to this precision."""
+        if isinstance(value, (Fraction, decimal.Decimal)):
+            return self._context.make_mpf(from_rational(*value.as_integer_ratio(), self._context.prec, "n"))
+        return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+        return self._rf(x, y, z)
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+        return np.array(self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object)
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+        return self._context.det(self._context.matrix(matrix.tolist()))
+
+
+class _ExtendedOfThread(threading.local):
+    """The extended arithmetics of one thread: an mpmath context changes its own precision while it works."""
+
+    def __init__(self) -> None:
+        self.by_digits: dict[int, Extended] = {}
+
+
+_extended_of_thread = _ExtendedOfThread()
+
+
+def extended(digits: int) -> Extended:
+    """Return this thread's extended arithmetic of the given digits; making one costs a millisecond."""
+    known = _extended_of_thread.by_digits
+    if digits not in known:
+        known[digits] = Extended(digits)
+    return known[digits]
+
+
+#: The double-precision arithmetic; it has no state, so one serves all.
+DOUBLE = Double()
+
+_kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._waves, DOUBLE))

@@ -1,0 +1,296 @@
+"""Ball arithmetic: every number is an interval, midpoint ± radius, that holds the exact value.
+
+The numbers are Arb's, through python-flint, whose precision is one global of the process: this file alone touches it. Work
+in balls goes inside ``with balls(digits):``, which sets the precision, keeps other threads out, and nests.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import threading
+from collections.abc import Callable, Sequence
+from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from fractions import Fraction
+from functools import lru_cache, reduce
+from typing import Any, ClassVar
+
+import flint
+import numpy as np
+
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
+
+__all__ = ["Balls", "balls"]
+
+#: Guard digits within the working precision.
+_GUARD = 6
+
+#: Digits of quantities that only bound others, and terms beyond those that the decay of a series asks for.
+_COARSE_DIGITS, _EXTRA_TERMS = 20, 6
+
+#: Nodes from which series are formed by products of polynomials.
+_MANY_NODES = 300
+
+#: log10 √2: what a complex product of balls loses.
+_DIGITS_PER_TURN = 0.151
+
+#: Where midpoints are formed, and radii rounded, whatever the caller's context of decimals.
+_EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
+_UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
+
+#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero, and their power of ten.
+_UNASKED_DIGITS, _UNASKED = 5, 10**5
+_HALF, _ZERO = _UNASKED // 2, Decimal(0)
+
+_global = threading.RLock()
+
+
+def _entrywise(method: str) -> Any:
+    return np.frompyfunc(lambda x: getattr(flint.arb(x), method)(), 1, 1)
+
+
+class Balls(Arithmetic):
+    """Real balls with at least the given number of decimal digits; a function of a ball holds all its values there."""
+
+    has_radii: ClassVar[bool] = True
+    exp = staticmethod(_entrywise("exp"))
+    sinh = staticmethod(_entrywise("sinh"))
+    cosh = staticmethod(_entrywise("cosh"))
+    log = staticmethod(_entrywise("log"))
+    sin = staticmethod(_entrywise("sin"))
+    cos = staticmethod(_entrywise("cos"))
+    #: Radicands are known to be nonnegative; their balls may reach below zero.
+    sqrt = staticmethod(np.frompyfunc(lambda x: flint.arb(x).nonnegative_part().sqrt(), 1, 1))
+    #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
+    floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
+
+    def __init__(self, digits: int, certified: bool) -> None:
+        self.digits, self.certified = digits, certified
+        self._bits = math.ceil((digits + _GUARD) * math.log2(10))
+        self._before: list[int] = []
+        with self:
+            self.pi = flint.arb.pi()
+            self.epsilon = flint.arb(10) ** -digits
+
+    def __enter__(self) -> Balls:
+        _global.acquire()
+        self._before.append(flint.ctx.prec)
+        flint.ctx.prec = self._bits
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        flint.ctx.prec = self._before.pop()
+        _global.release()
+
+    def number(self, value: Any) -> Any:
+        """Return a ball that holds a rational or a decimal, that of a float or mpmath number exactly, or the given ball."""
+        if isinstance(value, (Fraction, Decimal)):
+            return flint.arb(flint.fmpq(*value.as_integer_ratio()))
+        if isinstance(value, np.generic):
+            value = value.item()
+        if hasattr(value, "man_exp") and not isinstance(value, flint.arb):  # an mpf
+            mantissa, exponent = value.man_exp  # of the absolute value
+            return flint.arb((-mantissa if value < 0 else mantissa, exponent))
+        return flint.arb(value)
+
+    def polynomial_roots(self, coefficients: Sequence[Fraction]) -> list[tuple[Fraction, Fraction, int]]:
+        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of a real one is 0."""
+        polynomial: Any = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in coefficients])
+        return [(self.rational(root.real), self.rational(root.imag), count) for root, count in polynomial.complex_roots()]
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z)."""
+        return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
+
+    def agm(self, a: Any, b: Any) -> Any:
+        """Return the arithmetic–geometric mean of two positive numbers."""
+        return flint.arb(a).agm(flint.arb(b))
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a singular one."""
+        return self._array(_matrix(matrix).inv())
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+        return _matrix(matrix).det()
+
+    def product(self, a: Values, b: Values) -> Values:
+        """Return the matrix product."""
+        return self._array(_matrix(a) * _matrix(b))
+
+    def widened(self, values: Any, bound: Any) -> Any:
+        """Return the balls with their radii enlarged by |bound|."""
+        return values + _around_zero(bound)
+
+    def at(self, digits: int) -> Balls:
+        """Return the ball arithmetic of other digits."""
+        return balls(digits, self.certified)
+
+    def around_zero(self, values: Values) -> Values:
+        """Return balls around zero that hold the values."""
+        return np.asarray(_around_zero(values))
+
+    def at_most(self, values: Values) -> Values:
+        """Return exact upper bounds of |values|."""
+        return np.asarray(_upper(values))
+
+    def at_least(self, values: Values) -> Values:
+        """Return exact lower bounds of positive values."""
+        return np.asarray(_lower(values))
+
+    def inside(self, inner: Values, outer: Values) -> Values:
+        """Return which balls lie in the interior of their partners."""
+        return np.asarray(_contained(inner, outer), dtype=bool)
+
+    def midpoints(self, values: Values) -> Values:
+        """Return the exact midpoints."""
+        return np.asarray(_midpoint(values))
+
+    def rational(self, value: Any) -> Fraction:
+        """Return the midpoint, exactly."""
+        mantissa, exponent = value.mid().man_exp()
+        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+    def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
+        """Return (midpoints rounded to so many significant digits, radii that cover the rounding), arrays of Decimal."""
+        pairs = np.frompyfunc(lambda x: _decimal(x, digits), 1, 2)(values)
+        return np.asarray(pairs[0], dtype=object), np.asarray(pairs[1], dtype=object)
+
+    def sine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K)."""
+        zero = np.zeros((coefficients.shape[0], 1, coefficients.shape[2]), dtype=object)
+        series = _Series(self, np.concatenate([zero, coefficients], axis=1))
+        return lambda psi: np.sum(series(psi, "imag"), axis=2)
+
+    def cosine_sums(self, coefficients: Values) -> Sums:
+        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g)."""
+        series = _Series(self, coefficients)
+        return lambda psi: series(psi, "real")
+
+    def cosine_series(self, values: Values) -> Values:
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values.
+
+        Many nodes take one product of polynomials a row (Bluestein): w^{m(2j+1)} = w^{m²+m} w^{j²} w^{−(m−j)²}, w = e^{iπ/2N}.
+        """
+        count = values.shape[-1]
+        if count < _MANY_NODES:
+            return super().cosine_series(values)
+        order = np.arange(count)
+        roots = self.turns(self.array(list(range(4 * count))) / (4 * count))
+        chirp, ends = roots[order**2 % (4 * count)], roots[(order**2 + order) % (4 * count)]
+        kernel = flint.acb_poly(_conjugate(chirp)[np.abs(np.arange(1 - count, count))].tolist())
+        result = np.empty((values.size // count, count), dtype=object)
+        for row, out in zip(values.reshape(-1, count), result, strict=True):
+            product = flint.acb_poly((row * chirp).tolist()) * kernel
+            out[:] = _real(np.array([product[m + count - 1] for m in order], dtype=object) * ends)
+        result = result * 2 / count
+        result[:, 0] = result[:, 0] / 2
+        return np.asarray(result.reshape(values.shape))
+
+    def turns(self, z: Values) -> Values:
+        """Return e^{2πiz}, complex balls."""
+        return np.asarray(_turn(2 * z))
+
+    def powers(self, exponents: Values, bases: Values) -> Values:
+        """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
+        return _products(exponents, bases, lambda w: 1 / w)
+
+    def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
+        """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
+
+        A power comes from up to log₂|m| products in a row, each of which loses up to half a bit.
+        """
+        products = _products(modes, turns, _conjugate)
+        return np.asarray(_real(products)), np.asarray(_imaginary(products))
+
+    @staticmethod
+    def _array(matrix: Any) -> Values:
+        entries = np.fromiter(matrix.entries(), dtype=object, count=matrix.nrows() * matrix.ncols())
+        return entries.reshape(matrix.nrows(), matrix.ncols())
+
+
+class _Series:
+    """The sums Σ_m c_smk e^{imψ_s}, m = 0…M−1, by Horner's rule.
+
+    Complex balls are rectangles, which grow by √2 with every turn: so midpoints alone go through the rule, with digits for
+    that growth, and the radii of ψ and of the coefficients enter by Σ|m c_m| and as they are. At a lower precision than the
+    coefficients', fewer terms are summed.
+    """
+
+    def __init__(self, arithmetic: Balls, coefficients: Values) -> None:
+        genus, self._terms, number = coefficients.shape
+        middle = _midpoint(coefficients)
+        self._arithmetic = arithmetic
+        self._polynomials = [[flint.acb_poly(middle[s, :, k].tolist()) for k in range(number)] for s in range(genus)]
+        with arithmetic.at(_COARSE_DIGITS):
+            size = np.abs(middle + flint.arb(0))
+            self._slack = np.sum(_around_zero(coefficients - middle), axis=1).T
+            self._steepness = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
+            self._beyond = _around_zero(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
+
+    def __call__(self, psi: Values, part: str) -> Values:
+        """Return the real or imaginary parts, shape (N, K, g)."""
+        genus, number = psi.shape[1], len(self._polynomials[0])
+        result = np.empty((psi.shape[0], number, genus), dtype=object)
+        centre = _midpoint(psi)
+        spread = _around_zero(psi - centre)
+        digits = math.ceil(flint.ctx.prec * math.log10(2))
+        terms = math.ceil(self._terms * digits / self._arithmetic.digits) + _EXTRA_TERMS
+        with self._arithmetic.at(digits + math.ceil(min(terms, self._terms) * _DIGITS_PER_TURN)):
+            for s in range(genus):
+                points = [flint.acb(x.cos(), x.sin()) for x in centre[:, s]]
+                for k, whole in enumerate(self._polynomials[s]):
+                    series = whole.truncate(terms) if terms < self._terms else whole
+                    result[:, k, s] = [getattr(series(point), part) for point in points]
+        result = result + self._slack + spread[:, None, :] * self._steepness
+        return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
+
+
+_lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
+_contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
+_upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
+_turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
+_conjugate = np.frompyfunc(flint.acb.conjugate, 1, 1)
+_real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
+_imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
+_around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
+_midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
+
+
+def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
+    """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many digits."""
+    if not isinstance(x, flint.arb):
+        x = flint.arb(x)
+    if not x.is_finite():
+        return _ZERO, Decimal("Infinity")
+    middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
+    rounded, rest = divmod(middle + _HALF, _UNASKED)
+    radius += abs(rest - _HALF)
+    shown = Decimal(rounded).scaleb(exponent + _UNASKED_DIGITS, _EXACT) if rounded else _ZERO
+    return shown, Decimal(radius).scaleb(exponent, _UPWARDS) if radius else _ZERO
+
+
+def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Values]) -> Values:
+    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g); w^m is w^{⌊m/2⌋} times the rest."""
+    factors = []
+    for column, base in zip(exponents.T, bases.T, strict=True):
+        powers = [1 + 0 * base, base]
+        for m in range(2, int(np.max(np.abs(column), initial=0)) + 1):
+            powers.append(powers[m // 2] * powers[m - m // 2])
+        # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
+        powers += [inverse(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
+        factors.append(np.stack(powers)[column.astype(np.int64)])
+    return np.asarray(reduce(operator.mul, factors))
+
+
+def _matrix(values: Values) -> Any:
+    return flint.arb_mat(values.shape[0], values.shape[1], values.ravel().tolist())
+
+
+@lru_cache(maxsize=64)
+def balls(digits: int, certified: bool = True) -> Balls:
+    """Return the ball arithmetic of the given digits; use it as a context manager around all work in it.
+
+    ``certified``: truncations are bounded, otherwise estimated from the last terms of each series, which takes half of them.
+    """
+    return Balls(digits, certified)

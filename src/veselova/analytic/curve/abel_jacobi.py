@@ -1,0 +1,207 @@
+"""The Abel–Jacobi map in real angles, both ways: ψ ↦ z = Σ_s G_s(ψ_s) and Newton's method back.
+
+ψ_s is the elliptic angle of λ_s on its cut. The map is a real-analytic diffeomorphism of the torus, z_k = ψ_k/2π plus a
+periodic part, so ψ = 2πz starts the iteration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Sums, Values
+from veselova.analytic.curve.angle_series import AngleSeries
+from veselova.mechanics.core.errors import InternalContradiction, Unsolved
+
+__all__ = ["NARROW_GAP", "AbelJacobi"]
+
+#: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches its neighbour.
+_MOST_STEPS = 100
+
+#: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near such a gap, phases hardly
+#: move with the angles.
+NARROW_GAP = 1e-6
+
+#: Digits of the angles from which an inversion in balls starts, and those that a doubling by Newton's method loses to the slopes.
+_COARSE_DIGITS = 12
+_LOST_DIGITS = 2
+
+#: A residual of this many ε per unit of z is rounding, and one of this many times that, which no step betters.
+_SETTLED, _STALLED = 8.0, 1e4
+
+#: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each of its stations.
+_FIRST_STRETCH, _LEAST_STRETCH = 0.25, 1e-9
+_NEAR_STEPS = 12
+
+
+P = TypeVar("P", bound=AngleSeries)
+
+
+@dataclass(frozen=True)
+class AbelJacobi(Generic[P]):
+    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls starts."""
+
+    periods: P
+    coarse: AbelJacobi[P] | None = None
+
+    @property
+    def arithmetic(self) -> Arithmetic:
+        """Return the arithmetic of the periods."""
+        return self.periods.arithmetic
+
+    @cached_property
+    def _sines(self) -> Sums:
+        """Return ψ ↦ z − ψ/2π, whose coefficients have the axes s, m, k."""
+        series = self.periods.angle_series[:, :, 1:]
+        orders = self.arithmetic.array(list(range(1, series.shape[2] + 1)))
+        return self.arithmetic.sine_sums(np.ascontiguousarray((series / orders).transpose(1, 2, 0)))
+
+    @cached_property
+    def _cosines(self) -> Sums:
+        """Return ψ ↦ ∂z_k/∂ψ_s, whose coefficients have the axes s, m, k."""
+        return self.arithmetic.cosine_sums(np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0)))
+
+    def map(self, psi: Values) -> Values:
+        """Return z for angles ψ of shape (N, g); ψ_s + 2π adds one to z_s."""
+        return np.asarray(psi / (2 * self.arithmetic.pi) + self._complete(self._sines(psi)))
+
+    def jacobian(self, psi: Values) -> Values:
+        """Return ∂z_k/∂ψ_s for angles of shape (N, g), shape (N, g, g) with k before s."""
+        return np.swapaxes(self._complete(np.swapaxes(self._cosines(psi), 1, 2)), 1, 2)
+
+    def _complete(self, sums: Values) -> Values:
+        """Return sums of series, last axis k, with what they leave out."""
+        return self.arithmetic.widened(sums, self.periods.series_truncation) if self.arithmetic.has_radii else sums
+
+    def invert(self, z: Values) -> Values:
+        """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
+
+        Raises Unsolved where the iteration does not settle for a gap that is too narrow (InternalContradiction otherwise).
+        """
+        xp = self.arithmetic
+        cycles = xp.floor(z)
+        reduced = z - cycles
+        psi = self._newton(reduced) if self.coarse is None else self._enclose(reduced, self.coarse)
+        return np.asarray(psi + 2 * xp.pi * cycles)
+
+    def _newton(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        psi = 2 * np.pi * z
+        residual = self.map(psi) - z
+        open_ = np.arange(z.shape[0])
+        step_fraction = np.ones(z.shape[0])
+        tolerance = _SETTLED * DOUBLE.epsilon
+        for _ in range(_MOST_STEPS):
+            size = np.max(np.abs(residual[open_]), axis=1)
+            open_ = open_[size > tolerance]
+            if open_.size == 0:
+                return psi
+            try:
+                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                break
+            trial = psi[open_] - step_fraction[open_, None] * step
+            trial_residual = self.map(trial) - z[open_]
+            better = np.max(np.abs(trial_residual), axis=1) < np.max(np.abs(residual[open_]), axis=1)
+            accepted = open_[better]
+            psi[accepted], residual[accepted] = trial[better], trial_residual[better]
+            step_fraction[accepted] = np.minimum(1.0, 4 * step_fraction[accepted])
+            step_fraction[open_[~better]] /= 4
+            # A full step that no longer improves has met the rounding of the sums, which grows with their length.
+            stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)]
+            open_ = np.setdiff1d(open_, stalled, assume_unique=True)
+        for i in open_:
+            psi[i] = self._continued(z[i])
+        return psi
+
+    def _continued(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angles of one point, led there along the line of phases from those of 2πz: the map is one-to-one.
+
+        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way. It serves in a
+        bent valley as narrow as the gap, which a tangent leaves at once: a cubic through the last two stations follows it.
+        """
+        psi = 2 * np.pi * z
+        begin, done, step = self.map(psi[None])[0], 0.0, _FIRST_STRETCH
+        stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
+        while done < 1 and step > _LEAST_STRETCH:
+            reached = min(1.0, done + step)
+            found = self._settled(_extrapolated(stations, reached) if len(stations) == 2 else psi, begin + reached * (z - begin))
+            if found is None:
+                step /= 4
+                continue
+            psi, done, step = found, reached, 2 * step
+            slope = np.linalg.lstsq(self.jacobian(psi[None])[0], z - begin, rcond=None)[0]
+            stations = [*stations[-1:], (done, psi, slope)]
+        if done == 1:
+            return psi
+        gap = self.periods.narrowest_gap
+        if gap < NARROW_GAP:
+            raise Unsolved(
+                "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
+            )
+        raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
+
+    def _settled(self, psi: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the angles to which plain Newton steps from nearby settle, None where they do not."""
+        tolerance, last = _SETTLED * DOUBLE.epsilon, np.inf
+        for _ in range(_NEAR_STEPS):
+            residual = self.map(psi[None])[0] - z
+            size = float(np.max(np.abs(residual)))
+            if size <= tolerance or (size >= last and size < _STALLED * tolerance):
+                return psi
+            if not size < last:
+                return None
+            last = size
+            try:
+                psi = psi - np.linalg.solve(self.jacobian(psi[None])[0], residual)
+            except np.linalg.LinAlgError:
+                return None
+        return None
+
+    def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
+        """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the map has but one."""
+        xp: Any = self.arithmetic
+        centre = xp.midpoints(z)
+        nearest = coarse.invert(DOUBLE.array(centre))
+        psi, inverses = xp.array(nearest), xp.array(np.linalg.inv(coarse.jacobian(nearest)))
+        digits = known = _COARSE_DIGITS  # of the angles, and of the inverse slopes
+        while 2 * digits < xp.digits + _LOST_DIGITS:
+            if digits >= 2 * known:
+                with xp.at(digits) as working:
+                    inverses, known = _inverses(self.jacobian(psi), working), digits
+            digits += known - _LOST_DIGITS
+            with xp.at(digits + _LOST_DIGITS) as working:
+                psi = working.midpoints(psi - _applied(inverses, self.map(psi) - centre))
+        excess = self.map(psi) - z
+        with xp.at(digits) as working:
+            reach = working.around_zero(2 * _applied(inverses, excess))
+            slopes = self.jacobian(psi + reach)
+            inverses = _inverses(slopes, working)
+            rest = _applied(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
+        step = rest - _applied(inverses, excess)
+        if not xp.inside(step, reach).all():
+            raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
+        return np.asarray(psi + step)
+
+
+def _extrapolated(stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float) -> NDArray[np.float64]:
+    """Return the value at ``reached`` of the cubic with the values and slopes of two stations (place, value, slope)."""
+    (first, early, rise), (second, late, climb) = stations
+    length = second - first
+    x = (reached - second) / length
+    chord = (late - early) / length
+    # The divided differences of Hermite's interpolation, at the second station twice, then at the first.
+    bend = climb - chord
+    twist = climb - 2 * chord + rise
+    return np.asarray(late + (reached - second) * (climb + x * (bend + (x + 1) * twist)))
+
+
+def _inverses(matrices: Values, arithmetic: Any) -> Values:
+    return np.stack([arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix))) for matrix in matrices])
+
+
+def _applied(matrices: Values, vectors: Values) -> Values:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -1,0 +1,1 @@
+"""Chebyshev interpolants of a motion in t, for many times at once."""

@@ -1,0 +1,186 @@
+"""A motion at many times from few: Chebyshev windows of time along its orbit.
+
+Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t − u and the phases there come
+from the clock, exact however far out, and no window hands its error to the next. A window takes one sum of the clock, at its
+start, and one evaluation of the motion at each of its nodes; on its pieces the series become polynomials in t (analytic.pieces).
+All times in it are sums of these, whatever the genus and the route.
+
+A clock by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time then, and t is the running sum of
+their dt/dτ₁ (analytic.track), as it is of panels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.dense_output.adjoining_windows import Track
+from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Cells, Evaluation, Trial
+from veselova.analytic.dense_output.output_array import AT_ONCE, Along, Filling
+from veselova.analytic.time_map.panels import PanelClock
+from veselova.analytic.time_map.rate import Clock
+
+__all__ = ["FEW_TIMES", "Windows"]
+
+Array = NDArray[np.float64]
+
+#: Times below which windows are not worth their overhead.
+FEW_TIMES = 500
+
+#: Cycles of the fastest phase in a window at first; lengths that are tried, and how many before they are halved.
+_CYCLES = 2.0
+_MOST_LENGTHS, _CLOSE_LENGTHS = 16, 6
+
+#: Pieces of a window, the fewest that serve.
+_PIECES = (6, 8, 16, 32)
+
+#: Lengths of a window from t = 0 at which times have too few bits left to lie densely in one.
+_FARTHEST = 2.0**32
+
+#: Windows tried before all of the same length.
+_FIRST_WINDOWS = 8
+
+#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them.
+_COVERED = 0.7
+
+
+@dataclass(frozen=True)
+class _Stretches:
+    """Where times lie densely: the first and the last one of each stretch; the windows in all of them, and the times."""
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+    windows: int
+    held: int
+
+
+_NONE = _Stretches(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), 0, 0)
+
+
+class Windows:
+    """The windows of one orbit at increasing times.
+
+    ``fastest`` is the most cycles that a phase makes in a unit of time, ``fewest`` the times that make a window worth its while.
+    ``remainders`` are what exact times are beyond the doubles.
+    """
+
+    def __init__(self, times: Array, fastest: float, fewest: int, remainders: Array | None = None) -> None:
+        self._times, self._fastest, self._fewest, self._remainders = times, fastest, fewest, remainders
+
+    @cached_property
+    def _length(self) -> float:
+        return _few_bits(_CYCLES / self._fastest)
+
+    @cached_property
+    def _stretches(self) -> _Stretches:
+        if self._times.size < FEW_TIMES:
+            return _NONE
+        times, length = self._times, self._length
+        low, high = np.floor(times[[0, -1]] / length)
+        if high - low < times.size:
+            keys = np.arange(low, high + 1)
+            borders = np.append(np.searchsorted(times, keys * length), times.size)
+        else:
+            keys = np.floor(times / length)
+            borders = np.concatenate([[0], np.flatnonzero(np.diff(keys)) + 1, [keys.size]])
+            keys = keys[borders[:-1]]
+        dense = (np.diff(borders) >= self._fewest) & (np.abs(keys) < _FARTHEST)
+        first, last, keys = borders[:-1][dense], borders[1:][dense] - 1, keys[dense]
+        begins = np.flatnonzero(np.diff(keys, prepend=-np.inf) > 1)
+        ends = np.flatnonzero(np.diff(keys, append=np.inf) > 1)
+        return _Stretches(first[begins], last[ends], int(keys.size), int(np.sum(last - first + 1)))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Return the stretch of time over which the clock will be asked."""
+        margin = 2 * self._length if self._stretches.windows else 0.0
+        return float(self._times[0]) - margin, float(self._times[-1]) + margin
+
+    @property
+    def inversions(self) -> int:
+        """Return how often the clock will be asked at least: at the starts of windows, and at times in none."""
+        return int(self._times.size) - self._stretches.held + self._stretches.windows
+
+    def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
+        """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
+        if not self._stretches.windows and self._times.size <= AT_ONCE:
+            tau1, z = clock.tau1(self._times, self._remainders)
+            return Along(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
+        filling = Filling(self._times, self._fewest, clock, rates, evaluation, self._remainders)
+        if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
+            cells, count = self._over_stretches(filling, clock)
+            for _ in range(MOST_HALVINGS):
+                cells = cells.left_by(lambda some: filling.by_windows(some, count)).halved()
+                if not len(cells):
+                    break
+        return filling.completed()
+
+    def _over_stretches(self, filling: Filling, clock: Clock) -> tuple[Cells, int]:
+        """Return windows of a length at which most are resolved, and in how many pieces."""
+        dense = self._times[np.stack([self._stretches.first, self._stretches.last])]
+        ends = clock.tau1(dense.ravel())[0].reshape(dense.shape) * clock.mean
+
+        def over(length: float, tail: float) -> Cells:
+            pairs = np.floor(ends / length) + np.array([[0.0], [1.0]])
+            starts = np.unique(np.concatenate([np.arange(*pair) for pair in pairs.T])) * length
+            return Cells(length, starts, np.full(starts.size, tail))
+
+        return _resolving(over, filling.trial, self._length)
+
+    def _tracked(self, filling: Filling, clock: PanelClock, evaluation: Evaluation) -> bool:
+        """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether that could be done."""
+        ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
+        if self._stretches.windows < _COVERED * float(np.ptp(ends)) / self._length:
+            return False
+        low, high = ends / clock.mean
+
+        def over(length: float, tail: float) -> Cells:
+            return Cells.untried(length, math.floor(low / length), math.ceil(high / length), tail)
+
+        track = Track(filling, evaluation, clock.in_tau1)
+        cells, count = _resolving(over, track.trial, _few_bits(self._length / clock.mean))
+        while len(cells):
+            if not track.extend(cells, count):
+                return False
+            panels = track.panels()
+            length, (first, last) = cells.length, np.rint(panels.borders[[0, -1]] / cells.length).astype(int).tolist()
+            more = max(1, (last - first) // 8)  # the ends were those of the mean clock
+            before = Cells.untried(length, first - more, first) if panels.values[0] > self._times[0] else cells[:0]
+            after = Cells.untried(length, last, last + more) if panels.values[-1] < self._times[-1] else cells[:0]
+            cells = Cells.joined([before, after])
+        clock.panels = panels
+        track.fill(self._times, panels)
+        return True
+
+
+def _resolving(over: Callable[[float, float], Cells], trial: Callable[[Cells], Trial], length: float) -> tuple[Cells, int]:
+    """Return the windows ``over`` all times of a length, the first tried or below, at which most are resolved, and in how many
+    pieces; ``over`` takes the length, and the tail of the ones before."""
+    tail, count = np.inf, _PIECES[-1]
+    for k in range(_MOST_LENGTHS):
+        cells = over(length, tail)
+        tried = trial(cells[np.unique(np.linspace(0, len(cells) - 1, _FIRST_WINDOWS).astype(int))])
+        enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
+        if np.mean(tried.settled(tried.tails)) >= enough:
+            for count in _PIECES:
+                if np.mean(tried.settled(tried.in_pieces(count)[1])) >= enough:
+                    return cells, count
+        tail, length = float(np.max(tried.tails)), _shorter(length) if k < _CLOSE_LENGTHS else length / 2
+    return cells, count
+
+
+def _few_bits(length: float) -> float:
+    """Return the next smaller number of three bits."""
+    mantissa, exponent = math.frexp(length)
+    return math.ldexp(math.floor(8 * mantissa) / 8, exponent)
+
+
+def _shorter(length: float) -> float:
+    """Return the next length of three bits."""
+    mantissa, exponent = math.frexp(length)
+    return math.ldexp(mantissa - 0.125, exponent) if mantissa > 0.5 else math.ldexp(0.875, exponent - 1)

@@ -1,0 +1,1 @@
+"""One problem from its torus to states at given times, with a bound of their error."""

@@ -1,0 +1,59 @@
+"""A motion in closed form that can be asked for times: what rest, provenance and pickling are for every kind of it."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.trajectory import Provenance, Trajectory
+
+__all__ = ["Motion"]
+
+Array = NDArray[np.float64]
+
+#: What bounds made of samples and of typical rounding may miss: with it the true error is at most the reported one. Largest true
+#: error over an error without it, in all draws of ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
+_SAFETY = 2.0
+
+P = TypeVar("P", bound=Problem)
+
+
+@dataclass(frozen=True)
+class Motion(ABC, Generic[P]):
+    """The motion of a problem; what was computed for it is kept, and made again where it was left behind by pickling."""
+
+    problem: P
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times."""
+        return self.along(TimeGrid.of(times))
+
+    def along(self, grid: TimeGrid) -> Trajectory:
+        """Return the trajectory at validated times, in the order in which they were asked for."""
+        began = time.perf_counter()
+        if self._rests:
+            provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
+            return Trajectory.at_rest(self.problem, grid, provenance, self)
+        series, error, method, details = self._evaluated(grid)
+        provenance = Provenance.since(began, "analytic", method, details)
+        return Trajectory.on_grid(self.problem, grid, _SAFETY * error, series, provenance, self)
+
+    @property
+    def _rests(self) -> bool:
+        """Return whether nothing moves by as much as the last digit of a double shows."""
+        return not self.problem.moves
+
+    @abstractmethod
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        """Return the series of a problem that moves, their error before the safety factor, the method and its details."""

@@ -1,0 +1,181 @@
+"""Motions to more digits than a double has, or with certified errors: digits are added until the answer has those asked for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.arithmetic.balls import Balls, balls
+from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.rest_balls import resting_series
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
+from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.time_map.rate import Clock
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later, Pair
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.version import __version__
+
+__all__ = ["EnclosedMotion"]
+
+#: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
+_SPARE = 8
+
+#: Digits added beyond those that were missing, and attempts.
+_MORE = 4
+_ATTEMPTS = 6
+
+#: Moving directions up to which theta sums are shorter than inversions.
+_THETA_SIZE = 3
+
+#: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
+_SHOWN = 3
+
+#: −x to the last digit, whatever the caller's context of decimals.
+_negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
+
+
+@dataclass(frozen=True)
+class EnclosedMotion:
+    """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
+
+    problem: TorusProblem
+    digits: int
+    certified: bool
+    method: str | None
+
+    def __post_init__(self) -> None:
+        if self.problem.axes is not None:
+            field = "digits" if self.digits > FEWEST_DIGITS else "certified"
+            raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
+        began, asked = time.perf_counter(), TimeGrid.of(times, exact=True)
+        exact, grid = asked.exact, asked.doubles
+        if not (any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)):
+            return self._resting(asked, began)
+        solution = Solution(self.problem)
+        horizon = Horizon(solution, grid)
+        clock = horizon.clock()
+        reach = float(np.max(np.abs(clock.tau1(grid[[0, -1]])[0])))
+        method = self.method or self._cheaper(solution)
+        working = self.digits + _SPARE + math.ceil(math.log10(1 + horizon.cycles))
+        if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
+            working += math.ceil(-math.log10(solution.curve.narrowest_gap))
+        for _ in range(_ATTEMPTS):
+            try:
+                found, details = self._attempt(solution, method, working, exact, clock, reach)
+            except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
+                working *= 2
+                continue
+            missing = found.missing(self.digits, working)
+            if missing <= 0:
+                details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
+                return self._trajectory(method, asked, found, details, began)
+            working += missing + _MORE
+        raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+
+    def _cheaper(self, coarse: Solution) -> str:
+        """Return the route that takes less: theta sums are short for n = 3, and near a separatrix at any n, but not bounded."""
+        size = moving_part(self.problem).size  # beside a direction that doubles do not see sums cancel
+        harmless = size == coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta"
+        short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
+        return "theta" if short and not self.certified else "angles"
+
+    def _resting(self, asked: TimeGrid, began: float) -> Trajectory:
+        working = 2 * self.digits + _SPARE
+        with balls(working, self.certified) as xp:
+            found = _Found.of(self.problem, resting_series(self.problem, asked.doubles.size, xp), xp)
+        details = {"regime": "rest", "working_digits": working, "certified": self.certified}
+        return self._trajectory("rest", asked, found, details, began)
+
+    def _trajectory(self, method: str, asked: TimeGrid, found: _Found, details: Mapping[str, Any], began: float) -> Trajectory:
+        if asked.places is not None:
+            found = found.at(asked.places)
+        decimals = found.decimals(self.digits, self.certified)
+        arrays = {name: found.rounded(name) for name in self.problem.stored}
+        error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
+        provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
+        return Trajectory(self.problem, asked.asked, error, arrays, provenance, self, decimals, asked.asked_remainders)
+
+    def _attempt(
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], clock: Clock, reach: float
+    ) -> tuple[_Found, Any]:
+        solution = EnclosedSolution(coarse, working, self.certified, method, reach)
+        with solution.arithmetic as xp:
+            series, details = solution.series(xp.array(exact), clock)
+            return _Found.of(self.problem, series, xp), details
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The series of a problem in balls of an arithmetic, and the largest radius of those that are bounded at each time, (N,)."""
+
+    problem: TorusProblem
+    arithmetic: Balls
+    series: Mapping[str, Values]
+    spread: Values
+
+    @classmethod
+    def of(cls, problem: TorusProblem, series: Mapping[str, Values], arithmetic: Balls) -> _Found:
+        """Return the series with their radii, infinite where nothing is known of a number."""
+        unknown = arithmetic.number(math.inf)
+        radius = np.frompyfunc(lambda x: x.rad() if x.is_finite() else unknown, 1, 1)
+        radii = [radius(series[name]).reshape(len(series[name]), -1) for name in problem.bounded]
+        return cls(problem, arithmetic, series, np.max(np.concatenate(radii, axis=1), axis=1))
+
+    def at(self, places: NDArray[np.intp]) -> _Found:
+        """Return the series at the times of these places."""
+        series = {name: values[places] for name, values in self.series.items()}
+        return _Found(self.problem, self.arithmetic, series, self.spread[places])
+
+    def missing(self, digits: int, working: int) -> int:
+        """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
+        if not all(radius.is_finite() for radius in self.spread):
+            return working
+        with self.arithmetic as xp:
+            (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
+        return digits + int(largest.adjusted()) + 1
+
+    def rounded(self, name: str) -> NDArray[np.float64]:
+        """Return the doubles nearest to the midpoints of a series."""
+        return self.series[name].astype(np.float64)
+
+    def decimals(self, digits: int, certified: bool) -> Decimals:
+        """Return the decimals, made when they are asked for."""
+        shown = digits + _SHOWN
+        pairs: dict[str, Pair | Callable[[], Pair]] = {
+            name: partial(self.arithmetic.decimals, values, shown) for name, values in self.series.items()
+        }
+        if "omega" in self.series:
+            pairs["omega"] = partial(_skew, self.arithmetic, self.series["omega"], shown)
+        return Decimals(digits, certified, Later(pairs, 0), Later(pairs, 1), self.problem.bounded)
+
+
+def _skew(arithmetic: Balls, omega: Values, digits: int) -> Pair:
+    """Return the decimals of skew matrices (N, n, n), of which the upper half is converted."""
+    upper = np.triu_indices(omega.shape[1], 1)
+    above, slack = arithmetic.decimals(omega[:, *upper], digits)
+    return _square(above, np.asarray(_negative(above)), upper), _square(slack, slack, upper)
+
+
+def _square(above: Values, below: Values, upper: tuple[Values, Values]) -> Values:
+    """Return matrices (N, n, n) with zero diagonals from what stands above and below, (N, n(n−1)/2)."""
+    size = int(upper[1][-1]) + 1
+    result = np.full((len(above), size, size), Decimal(0))
+    result[:, upper[0], upper[1]], result[:, upper[1], upper[0]] = above, below
+    return result

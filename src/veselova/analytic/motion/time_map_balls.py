@@ -1,0 +1,80 @@
+"""The time map in ball arithmetic that costs least at given times: Chebyshev panels, a Fourier series, or a change of units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
+from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
+from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.analytic.time_map.fourier_balls import MOST_MODES, EnclosedFourier
+from veselova.analytic.time_map.panels_balls import EnclosedClock, expected_nodes
+from veselova.mechanics.core.errors import Unsolved
+
+__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map"]
+
+#: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the last for all above: a node of
+#: panels; a mode of the Fourier clock at once, where no cut takes more than _NODES in doubles, and with every time, which costs
+#: more as the genus grows; and a time of that clock.
+_NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
+_MODE_AT_TIME, _TIME, _NODES = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1, 36
+
+#: The digits of those, by what power of them modes grow, whose sums are in balls for genus 1, and milliseconds beyond which modes
+#: are not begun: minutes.
+_DIGITS, _GROWTH, _LONGEST = 60, {1: 2.5, 2: 1.5, 3: 1.5, 4: 1.5}, 120_000
+
+
+class UniformTimeMap:
+    """The time map of a motion whose time is Neumann's, in its own unit: τ₁ is the time times dτ₁/d(time)."""
+
+    name = "uniform"
+
+    def __init__(self, orbit: Orbit) -> None:
+        self._rate = orbit.rate.inversion.arithmetic.number(orbit.spectrum.clock_rate)
+
+    @property
+    def size(self) -> int:
+        """Return 0: it has neither nodes nor modes."""
+        return 0
+
+    def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
+        """Return τ₁ at times (N,), given exactly."""
+        return np.asarray(times * self._rate)
+
+
+TimeMap: TypeAlias = EnclosedClock | EnclosedFourier | UniformTimeMap
+
+
+def choose_time_map(orbit: Orbit, approximate: NDArray[np.float64], coarse: Solution, moving: Moving) -> TimeMap:
+    """Return the time map of an orbit for approximate Neumann times (N,): the cheaper, or the other where it has too many terms.
+
+    coarse: the solution in double precision · moving: what moves in balls. Only the truncation of panels is bounded.
+    Raises Unsolved where neither reaches as far.
+    """
+    if moving.time == "tau1":
+        return UniformTimeMap(orbit)
+    xp: Any = orbit.rate.inversion.arithmetic
+    genus, times = moving.size - 1, approximate.size
+    kind = min(genus, max(_NODE))
+    modes = coarse.modes * (xp.digits / DOUBLE.digits) ** genus
+    # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.
+    forming = modes * _MODE[kind] * max(1.0, max(coarse.rate.needed_nodes) / _NODES) ** 2
+    by_modes = forming + times * (modes * _MODE_AT_TIME[kind] + _TIME)
+    by_panels = expected_nodes(orbit, approximate) * _NODE[kind]
+    maps: list[Callable[[], EnclosedClock | EnclosedFourier]] = [partial(EnclosedClock, orbit, approximate, xp.certified)]
+    # Of a direction that doubles do not see they say nothing.
+    known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
+    growth = (xp.digits / _DIGITS) ** _GROWTH[kind]
+    if known and modes <= MOST_MODES and forming * growth <= _LONGEST and not xp.certified:
+        maps.insert(int(by_panels < by_modes), partial(EnclosedFourier, orbit))
+    for time_map in maps[:-1]:
+        with suppress(Unsolved):
+            return time_map()
+    return maps[-1]()

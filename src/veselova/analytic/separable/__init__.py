@@ -1,0 +1,1 @@
+"""Motions in separable potentials, by inversion of their quadratures."""

@@ -1,0 +1,128 @@
+"""One orbit of a separable motion: its clock, phases, and what rounding of them does to positions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.attitude.frame import Attitude, Differences
+from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
+from veselova.analytic.separable.curve import SeparableStart
+from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
+from veselova.analytic.time_map.fourier import FourierClock
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.panels import PanelClock
+from veselova.analytic.time_map.rate import Clock
+from veselova.mechanics.core.errors import Unsolved
+
+__all__ = ["SeparableOrbit"]
+
+Array = NDArray[np.float64]
+
+#: Cycles from which the Fourier clock is cheaper, to genus three; and those that panels are willing to cover.
+_FOURIER_FROM, _FOURIER_GENUS = 10.0, 3
+_MOST_CYCLES = 5e4
+
+#: An error above this leaves no digit.
+_NO_DIGIT = 0.1
+
+#: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
+_EVALUATION, _PHASE, _RATE = 16.0, 8.0, 4.0
+
+#: Points at which steepness is sampled.
+_SAMPLES = 48
+
+
+class SeparableOrbit:
+    """The orbit of a start. Raises Unsolved as SeparableMotion does."""
+
+    def __init__(self, start: SeparableStart) -> None:
+        self.motion = SeparableMotion(start)
+        self._degree = self.motion.start.degree
+        self.rate = SeparatedRate(self.motion.inversion)
+        self.inversion = self.motion.inversion
+        origin = self.inversion.map(self.motion.angles[None, :])[0]
+        self.in_tau = LinearFlow.of(origin, self.motion.periods.frequencies)
+
+    @cached_property
+    def in_time(self) -> LinearFlow:
+        """Return the uniform part of the phases in physical time."""
+        return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
+
+    def clock(self, grid: Array) -> Clock:
+        """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes too many panels."""
+        if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
+            return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
+        self.require_panels(grid)
+        return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+
+    def require_panels(self, grid: Array) -> None:
+        """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are made."""
+        cycles = self._cycles(grid)
+        if not cycles <= _MOST_CYCLES:
+            raise Unsolved(
+                "too-far", f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to {_MOST_CYCLES:.0e}"
+            )
+
+    def _cycles(self, grid: Array) -> float:
+        return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
+
+    def require_digit(self, error: Array, grid: Array) -> Array:
+        """Return the error; raises Unsolved (``no-digit-left``) where it leaves no digit."""
+        lost = grid[~(error <= _NO_DIGIT)]
+        if lost.size:
+            first = lost[np.argmin(np.abs(lost))]
+            raise Unsolved("no-digit-left", f"at t = {first:.6g} the error of phases in double precision reaches {_NO_DIGIT}")
+        return error
+
+    def states(self, z: Array) -> tuple[Attitude, Array]:
+        """Return positions and coordinate lines at phases (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
+        phi = self.inversion.invert(z)
+        at = self.motion.attitude(phi)
+        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[:, None]
+
+    def details(self, clock: Clock) -> dict[str, Any]:
+        """Return what a trajectory's provenance says of the orbit."""
+        return {"clock": clock.name, "clock_size": clock.size, "degree": self._degree}
+
+    @cached_property
+    def sample(self) -> Array:
+        """Return points of the torus at which steepness is looked at, phases modulo 2."""
+        genus = self.motion.periods.genus
+        return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
+
+    def steepness(self, values: Callable[[Attitude], Array]) -> Steepness:
+        """Return how fast numbers (N, …) of the attitudes change with the phases, and more between the sampled points."""
+        genus = self.motion.periods.genus
+        differences = Differences(self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus)))
+        at = self.motion.attitude(self.inversion.invert(differences.ends))
+        return Steepness.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
+
+    @cached_property
+    def start_rounding(self) -> Array:
+        """Return the rounding of the phases at the start, (g,)."""
+        return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
+
+    def error(self, tau: Array, clock: Clock, steepness: Steepness) -> tuple[Array, Array]:
+        """Return a bound on the error of numbers of that steepness, (N,), and that of τ."""
+        rates, elapsed, rounding = np.abs(self.in_tau.rates), np.abs(tau), _RATE * DOUBLE.epsilon
+        of_clock, drift = clock.error(tau, self.start_rounding, rounding * rates)
+        lag = (rounding + drift) * elapsed + of_clock
+        at_once = _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * steepness.together
+        return np.asarray(at_once + rounding * steepness.by_rates * elapsed + lag * steepness.along_flow), np.asarray(lag)
+
+    def integral_error(self, tau: Array, slopes: Array) -> Array:
+        """Return how far errors of the phases move an integral along the orbit, (N,), from its integrand's slopes in them, (g,).
+
+        They act in one sense for as long as the slowest phase takes for a radian, at most.
+        """
+        rates, elapsed = np.abs(self.in_tau.rates), np.abs(tau)
+        acting = np.minimum(elapsed, 1 / np.min(rates))
+        moved = float(self.start_rounding @ slopes) + _RATE * DOUBLE.epsilon * float(rates @ slopes) * elapsed
+        return np.asarray(acting * moved)

@@ -1,0 +1,55 @@
+"""The reduced rank-one system in a separable potential, any n, in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.motion.base import Motion
+from veselova.analytic.separable.curve import SeparableStart, drawn_apart
+from veselova.analytic.separable.orbit import SeparableOrbit
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.systems.separable_veselova import SeparableVeselova
+
+__all__ = ["PointMotion"]
+
+Array = NDArray[np.float64]
+
+
+class PointMotion(Motion[SeparableVeselova]):
+    """A motion that can be asked for times. Raises Unsolved as SeparableMotion does."""
+
+    @cached_property
+    def _order(self) -> NDArray[np.intp]:
+        """Return the axes by increasing I."""
+        return np.array(sorted(range(self.problem.n), key=lambda i: -self.problem.exact.A[i]))
+
+    @cached_property
+    def _orbit(self) -> SeparableOrbit:
+        exact, betas = self.problem.exact, self.problem.potential[2]
+        inverse, q, v, walls = (
+            tuple(values[i] for i in self._order) for values in ([1 / a for a in exact.A], exact.q, exact.tangent, betas)
+        )
+        size = sum((x * x for x in q), 0 * q[0])
+        # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
+        return SeparableOrbit(SeparableStart(drawn_apart(inverse), q, v, self.problem.polynomial, walls, size))
+
+    @cached_property
+    def _steepness(self) -> Steepness:
+        return self._orbit.steepness(lambda at: at.q)
+
+    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        orbit = self._orbit
+        clock = orbit.clock(grid.doubles)
+        tau, z = clock.tau1(grid.doubles, grid.remainders)
+        at, velocity = orbit.states(z)
+        series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
+        series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
+        error = orbit.require_digit(orbit.error(tau, clock, self._steepness)[0], grid.doubles)
+        return series, error, "angles", orbit.details(clock)

@@ -1,0 +1,1 @@
+"""Riemann theta functions, and the attitude as their quotients."""

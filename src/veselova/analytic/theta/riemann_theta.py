@@ -1,0 +1,308 @@
+"""Real theta functions with half-integer characteristics,
+
+    θ[ε;δ](z) = Σ_{m∈Z^g} exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ),   T symmetric, positive definite.
+
+Where T is small this sum cancels: θ(z) falls to e^(−π/4T) of θ(0). Poisson summation over some of the variables (set G, the
+rest being F) turns their waves into Gaussians. With y = z+δ, C = T_FG T_GG⁻¹ and S = T_FF − C T_GF,
+
+    θ[ε;δ](z) = det T_GG^{−1/2} Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} e^{−π xᵀSx − π dᵀT_GG⁻¹d} cos 2π[x·(y_F + Cd) + k·ε_G],   d = k−y_G.
+
+F is kept to directions where S is not small, so θ(z) = θ[0;0](z) is a sum without cancellation, and its values are accurate
+relative to themselves. F = everything is the defining series, G = everything a lattice sum of Gaussians. Coordinates are those in
+which the sum is short (analytic.lattice).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.theta.lattice import (
+    RADIUS,
+    Coordinates,
+    Member,
+    centred_points,
+    half_of,
+    largest_corner,
+    lattice_points,
+    schur,
+)
+from veselova.analytic.theta.theta_tables import SIGNS, Blocks, Family, Group, in_blocks
+
+__all__ = ["Theta"]
+
+Array = NDArray[np.float64]
+
+K = TypeVar("K")
+
+#: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
+_VANISHING = -630.0
+
+#: i^m.
+_QUARTER_TURNS = np.array([1, 1j, -1, -1j])
+
+#: Entries of one block of (points × lattice): temporaries that stay in the cache.
+_BLOCK = 100_000
+
+#: Classes ε_F that are few enough for all of them to be found when the first is asked for.
+_FEW_CLASSES = 8
+
+#: Products of few points with the tables of all functions at once, which save the calls of one group after the other.
+_FEW = 150_000
+
+
+@dataclass(frozen=True)
+class Theta:
+    """The theta functions of T, shape (g, g); ``waves`` is the set F of the sum over Z^g, None for the cheapest accurate one."""
+
+    T: Array
+    waves: tuple[int, ...] | None = None
+
+    @property
+    def genus(self) -> int:
+        """Return g."""
+        return int(self.T.shape[0])
+
+    @cached_property
+    def _chosen(self) -> tuple[Coordinates, float]:
+        return Coordinates.cheapest(self.T) if self.waves is None else Coordinates.given(self.T, self.waves)
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Return the basis and the set F in which the sums are formed."""
+        return self._chosen[0]
+
+    @cached_property
+    def _split(self) -> tuple[list[int], list[int]]:
+        return list(self.coordinates.waves), self.coordinates.gaussians
+
+    @cached_property
+    def _to_coordinates(self) -> Array:
+        """Return the matrix from z to y, (g, g): first the coordinates with Gaussians, then those of the waves."""
+        F, G = self._split
+        return np.asarray(self.coordinates.U[[*G, *F]].T, dtype=np.float64)
+
+    @cached_property
+    def _parts(self) -> tuple[Array, Array, Array, float]:
+        """Return (S, C, T_GG⁻¹, det T_GG^{−1/2})."""
+        S, C, inverse = schur(self.coordinates.form(self.T), *self._split)
+        return S, C, inverse, float(np.sqrt(np.linalg.det(inverse))) if len(inverse) else 1.0
+
+    @cached_property
+    def _gaussian_lattice(self) -> Array:
+        """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
+        return centred_points(self._parts[2], RADIUS)
+
+    @cached_property
+    def _of_cell(self) -> tuple[Array, Array]:
+        """Return −πkᵀT_GG⁻¹k, (K,), all k at once, and what a point r of the cell is multiplied with, (|G|, K + |G| + |F|).
+
+        These are 2πT_GG⁻¹k and −πT_GG⁻¹, of which the exponents −π(k−r)ᵀT_GG⁻¹(k−r) are made, and −πC, which turns the waves.
+        """
+        k, inverse = self._gaussian_lattice, -np.pi * self._parts[2]
+        return np.sum((k @ inverse) * k, axis=1), np.hstack([-2 * inverse @ k.T, inverse, -np.pi * self._parts[1].T])
+
+    @property
+    def cost(self) -> float:
+        """Return about the number of lattice terms, without forming them, and what their Gaussians and waves take."""
+        return self._chosen[1]
+
+    @cached_property
+    def size(self) -> int:
+        """Return the number of lattice terms for characteristic zero."""
+        of_zero = self._crossings(frozenset({0}))[1][0]
+        return len(self._gaussian_lattice) * (of_zero.stop - of_zero.start)
+
+    def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
+        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
+
+        |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
+        """
+        wanted, y = tuple(characteristics), (z - 2 * np.rint(z / 2)) @ self._to_coordinates
+        if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
+            blocks = self._blocks(wanted)
+            return blocks.values(*self._bells(y, blocks.shifts))
+        result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)
+        block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
+        at_once = max(1, block // max(len(z), 1))  # groups, of few points
+        for first in range(0, z.shape[0], block):
+            rows = slice(first, first + block)
+            for k in range(0, len(groups), at_once):
+                self._fill(groups[k : k + at_once], y[rows], result[:, rows])
+        return result.T
+
+    def _fill(self, groups: list[Group], y: Array, result: Array) -> None:
+        """Write the values of some groups at points y (N, g) to their places, the rows of the result."""
+        bells, angles, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
+        for k, group in enumerate(groups):
+            half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
+            signs = group.signs[:, None] * SIGNS[half_turns & 1]
+            result[group.places] = group.sums(bells[k], angles[k]) * signs
+
+    def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
+        """Return (e^{−π|k−r|²}, π(y_F − Cr), n), k on the Gaussian lattice, with y_G + δ_G = n + r, r in the cell around zero.
+
+        ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |F|) and (P, N, |G|).
+        """
+        gaussians = shifts.shape[1]
+        y_G = y[:, :gaussians] + shifts[:, None, :]
+        nearest = np.rint(y_G)
+        if not gaussians:
+            return np.ones((*y_G.shape[:2], 1)), np.pi * y[None], nearest
+        constant, of_cell = self._of_cell
+        r, ends = y_G - nearest, (constant.size, constant.size + gaussians)
+        made = r @ of_cell
+        angles = np.pi * y[:, gaussians:] + made[:, :, ends[1] :]
+        exponents = constant + made[:, :, : ends[0]]
+        exponents += (made[:, :, ends[0] : ends[1]] * r).sum(axis=2, keepdims=True)
+        exponents[exponents <= _VANISHING] = -np.inf
+        return np.exp(exponents, out=exponents), angles, nearest
+
+    @cached_property
+    def _size_in_blocks(self) -> int:
+        """Return about how many entries the tables of all characteristics at once have for each."""
+        return int(2 * self.size * 2 ** len(self._split[1]))
+
+    def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
+        """Return the tables of all characteristics at once."""
+        return _kept(self._blocked, characteristics, self._side_by_side, Blocks.of)
+
+    @cached_property
+    def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks]:
+        return {}
+
+    def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
+        local, signs = zip(*self.coordinates.characteristics(characteristics), strict=True)
+        deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
+        shifts, (of, doubled, turned) = list(dict.fromkeys(deltas)), self._turned(local)
+        blocks = np.array([shifts.index(delta) for delta in deltas])
+        return Blocks(
+            np.array(shifts, dtype=float) / 2,
+            in_blocks(doubled, blocks[of], len(shifts)),
+            in_blocks(np.concatenate([turned.real, -turned.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
+            np.flatnonzero(np.diff(of, prepend=-1)),
+            in_blocks(self._parities(local).T, blocks, len(shifts)),
+            self._parts[3] * np.array(signs)[:, None],
+        )
+
+    def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
+        """Return the families by δ_G."""
+        return _kept(self._grouped, characteristics, self._by_shift, _part)
+
+    @cached_property
+    def _grouped(self) -> dict[tuple[Characteristic, ...], list[Group]]:
+        return {}
+
+    def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
+        families = self.coordinates.families(characteristics).items()
+        members = [c for _, of in families for given in of.values() for _, c, _ in given]
+        self._crossings(frozenset(self._codes(members)))  # at once
+        return [self._group(delta_G, list(of.values())) for delta_G, of in families]
+
+    def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
+        places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
+        families = [self._family([c for _, c, _ in of]) for of in members]
+        parities = self._parities(characteristics)
+        return Group(np.array(delta_G) / 2, families, list(places), parities, self._parts[3] * np.array(signs))
+
+    def _parities(self, members: Sequence[Characteristic]) -> Array:
+        G = self._split[1]
+        return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
+
+    def _family(self, members: list[Characteristic]) -> Family:
+        of, doubled, turned = self._turned(members)
+        each = turned.reshape(len(turned), len(members), -1)
+        parts = [each.real, -each.imag] if self._split[0] else [each.real]
+        tables = np.stack(parts, axis=2).reshape(len(turned), -1)
+        return Family(doubled[of == 0], np.ascontiguousarray(tables.T))
+
+    def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
+        """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
+        (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
+        F = self._split[0]
+        codes = self._codes(members)
+        doubled, places, crossings = self._crossings(frozenset(codes))
+        ranges = [places[code] for code in codes]
+        of, waves = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
+        delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
+        signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
+        doubled = doubled[waves]
+        turned = crossings[:, waves]
+        turned *= signs[:, of]
+        turned *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
+        return of, doubled, turned
+
+    def _codes(self, members: Sequence[Characteristic]) -> list[int]:
+        """Return the bits of 2ε_F of each."""
+        return [sum(c.epsilon[i] << place for place, i in enumerate(self._split[0])) for c in members]
+
+    def _crossings(self, wanted: frozenset[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+        """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
+
+        ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
+        above e^−39 of the largest: where T is large ε = ½ makes all small.
+        """
+        if (classes := 2 ** len(self._split[0])) <= _FEW_CLASSES:
+            wanted = frozenset(range(classes))
+        known = list(self._crossed)  # a copy: another thread may add to them
+        if (found := next((kept for kept in known if wanted <= kept), None)) is not None:
+            return self._crossed[found]
+        self._crossed[wanted] = self._formed(sorted(wanted))
+        return self._crossed[wanted]
+
+    def _formed(self, codes: list[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+        """Return the ``_crossings`` of these codes and no others."""
+        S, C, _, _ = self._parts
+        doubled = half_of(self._doubled_points(codes))
+        of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
+        norms = ((x @ S) * x).sum(axis=1)
+        least = np.full(2 ** len(S), -np.inf)
+        least[codes] = np.inf
+        np.minimum.at(least, of, norms)
+        kept = norms <= RADIUS**2 + least[of]
+        order = np.flatnonzero(kept)[np.argsort(of[kept], kind="stable")]
+        doubled, x = doubled[order], x[order]
+        weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
+        firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
+        places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
+        return doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
+
+    def _doubled_points(self, codes: list[int]) -> NDArray[np.int64]:
+        """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent finds all of them at once."""
+        S, bits = self._parts[0], np.arange(len(self._parts[0]))
+        # No point of space is farther from a lattice than a corner of its cell is from the middle.
+        reach = float(np.sqrt(RADIUS**2 + largest_corner(S)))
+        if 2 ** len(S) <= 2 * len(codes):
+            return lattice_points(S / 4, reach, np.zeros(len(S))).astype(np.int64)
+        return np.concatenate([2 * lattice_points(S, reach, (code >> bits & 1) / 2) for code in codes]).astype(np.int64)
+
+    @cached_property
+    def _crossed(self) -> dict[frozenset[int], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
+        return {}
+
+
+def _kept(
+    tables: dict[tuple[Characteristic, ...], K],
+    wanted: tuple[Characteristic, ...],
+    made: Callable[[tuple[Characteristic, ...]], K],
+    part: Callable[[K, list[int]], K],
+) -> K:
+    """Return the tables of characteristics: those that are kept, a part of those of more of them, or those that are made."""
+    if (found := tables.get(wanted)) is None:
+        each, known = set(wanted), list(tables)  # a copy: another thread may add to them
+        more = next((kept for kept in known if each <= set(kept)), None) if len(each) == len(wanted) else None
+        found = made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
+        tables[wanted] = found
+    return found
+
+
+def _part(groups: list[Group], members: list[int]) -> list[Group]:
+    """Return the groups of the characteristics at some places, in this order."""
+    places = {member: place for place, member in enumerate(members)}
+    return [part for group in groups if (part := group.of(places)) is not None]

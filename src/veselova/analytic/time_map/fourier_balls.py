@@ -1,0 +1,129 @@
+"""The Fourier clock in balls, for any time at all: the determinants of analytic.fourier_clock to any number of digits."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
+from veselova.analytic.arithmetic.trigonometric_sums import waves_at
+from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.numerics.monotone_root import Rows, doublings, increasing_root, interval_step
+from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.analytic.time_map.fourier import ColumnsForModes
+from veselova.analytic.time_map.fourier_modes import grown
+
+__all__ = ["MOST_MODES", "EnclosedFourier"]
+
+#: Modes looked at before giving up: minutes.
+MOST_MODES = 200_000
+
+#: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double; and waves in memory at once.
+_SETTLED, _BLOCK = 1e-7, 2_000_000
+
+#: Digits of modes, and of slopes, beyond those of a step.
+_MODE_DIGITS, _SLOPE_DIGITS = 2, 2
+
+#: What the modes left out add up to, in units of the smallest kept for 1/(m·f) or for the time elapsed, those kept and those next
+#: to them: others fall off as fast as they came.
+_TAIL = 4
+
+
+class EnclosedFourier:
+    """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is left out is estimated."""
+
+    name = "fourier"
+
+    def __init__(self, orbit: Orbit) -> None:
+        self._orbit = orbit
+        xp: Any = orbit.rate.inversion.arithmetic
+        self._xp, self._mean = xp, orbit.rate.mean
+        self._modes, coefficients, edge = self._significant()
+        rates = self._modes @ orbit.frequencies
+        self._amplitudes, self._slopes = coefficients / (xp.pi * rates), 2 * coefficients
+        self._bend = np.sum(xp.at_most(2 * xp.pi * rates * self._slopes))
+        fastest = 2 * xp.pi * np.max(np.abs(orbit.frequencies.astype(float)))
+        #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
+        self._weights = np.maximum(xp.at_most(self._slopes), xp.at_most(fastest * self._amplitudes)) / self._mean
+        #: 1/|m·f| of those kept and of those next to them.
+        self._slowness = np.abs(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)).astype(float)
+
+    @property
+    def size(self) -> int:
+        """Return the number of modes kept, m and −m counted once."""
+        return len(self._modes)
+
+    @cached_property
+    def _smallest(self) -> Any:
+        return self._mean * self._xp.epsilon
+
+    def _significant(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
+        """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
+        rate, xp = self._orbit.rate, self._xp
+        columns = ColumnsForModes(rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp))
+
+        def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
+            stacks = [column.cosines(modes) for column in columns(modes)]
+            values = np.array([xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)], dtype=object)
+            values = rate.scale * values
+            return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
+
+        return grown(rate.inversion.periods.genus, determinants, 2 * MOST_MODES)  # those at the edge are looked at too
+
+    def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
+        """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""
+        xp = self._xp
+        uniform = times / self._mean
+        z = self._orbit.phases(uniform)
+        delta = xp.array(self._near(z.astype(float)))
+        for digits in doublings(xp.digits):
+            with xp.at(digits):
+                value, slope = self._excess(digits, z, delta)
+                delta = xp.midpoints(delta - value / slope)
+        value, slope = self._excess(xp.digits, z, delta)
+        tau1 = uniform + delta
+        tail = self._tail(float(np.max(np.abs(tau1.astype(float)))))
+        return np.asarray(tau1 - interval_step(xp.widened(value, tail), slope, self._bend, xp)[0])
+
+    def _tail(self, elapsed: float) -> Any:
+        """Return what the modes left out add up to: what a mode does to t grows until a half of its period, 1/(2 m·f)."""
+        return _TAIL * self._smallest * float(np.linalg.norm(np.minimum(self._slowness, math.pi * elapsed)))
+
+    def _excess(self, digits: int, z: Values, delta: Values) -> tuple[Values, Values]:
+        """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step asks for no more."""
+        xp, half, start = self._xp, math.ceil(digits / 2) + _SLOPE_DIGITS, self._orbit.start[None, :]
+        turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
+        kept = self._kept(digits)
+        waves = sums_over_modes("sines", self._modes[kept], self._amplitudes[kept], turns, xp.at(digits))
+        value = self._mean * delta + waves[1:] - waves[0]
+        kept = self._kept(half)
+        with xp.at(half) as fewer:
+            waves = sums_over_modes("cosines", self._modes[kept], self._slopes[kept], turns[1:], fewer)
+            return value, xp.widened(self._mean + waves, np.sum(xp.at_most(self._slopes[~kept])))
+
+    def _kept(self, digits: int) -> NDArray[np.bool_]:
+        """Return the modes that matter to so many digits."""
+        return np.asarray(self._weights > self._xp.number(10) ** -(digits + _MODE_DIGITS), dtype=bool)
+
+    def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return δ in double precision, from the uniform phases (N, g)."""
+        kept = self._kept(DOUBLE.digits)
+        modes, amplitudes, slopes = self._modes[kept], self._amplitudes[kept].astype(float), self._slopes[kept].astype(float)
+        frequencies, mean = self._orbit.frequencies.astype(float), float(self._mean)
+        begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
+        reach, settled = 2 * float(np.sum(np.abs(amplitudes))) / mean, _SETTLED / float(np.max(np.abs(frequencies)))
+        highest, block = int(np.max(np.abs(modes), initial=0)), max(1, _BLOCK // max(1, len(modes)))
+
+        def root(z: NDArray[np.float64]) -> NDArray[np.float64]:
+            def excess(delta: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                cosines, sines = waves_at(2 * np.pi * (z[rows] + delta[:, None] * frequencies), modes, highest)
+                return mean * delta + amplitudes @ sines - begin, mean + slopes @ cosines
+
+            bounds = np.full(len(z), reach)
+            return increasing_root(excess, np.zeros(len(z)), -bounds, bounds, settled)
+
+        return np.concatenate([root(z[first : first + block]) for first in range(0, len(z), block)])

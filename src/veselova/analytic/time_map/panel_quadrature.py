@@ -1,0 +1,122 @@
+"""Integrals along an orbit by quadrature. Cost grows with the length, hardly with the genus."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.time_map.chebyshev_panels import TAIL, Panels, are_settled
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.mechanics.core.errors import Unsolved
+
+__all__ = ["integrated"]
+
+Array = NDArray[np.float64]
+
+#: Points per panel, of a short stretch and of a long one.
+_FEW_NODES, _NODES = 24, 48
+
+#: Panels beyond an end, as ends come from means; none beyond one so near that going on, where it is short, costs little.
+_MARGIN, _NEAR = 2, 4
+
+#: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and how many are looked at.
+_MANY_PANELS, _LONGER, _PROBED = 200, (7, 6, 5, 4, 3.5, 3, 2.5), 8
+
+#: Last coefficients below this part of the first may be rounding of the phases.
+_NOISE_TAIL = 1e-11
+
+#: Halvings of a panel before giving up; near a separatrix integrands vary over a few hundredths of a cycle.
+_MOST_HALVINGS = 30
+
+#: Nodes evaluated at once.
+_BLOCK = 4096
+
+
+def integrated(
+    integrand: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> Panels:
+    """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high, and a margin.
+
+    ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean, or of ``floor`` where that is
+    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the rounding of the values may be.
+    Panels that are not resolved are halved, each for itself. An end at zero, where the integral is known, has no margin.
+    Raises Unsolved (``narrow-gap``) where a spike is too short for that.
+    """
+    panels = _Panels(integrand, in_tau1, floor, _FEW_NODES, 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))))
+    if (high - low) / panels.length >= _MANY_PANELS:
+        panels = panels.longer(low, high)
+    lefts, length = panels.lefts(low, high), panels.length
+    before = np.full(lefts.size, np.inf)
+    done: list[tuple[Array, Array, Array, Array, Array]] = []
+    for _ in range(_MOST_HALVINGS):
+        coefficients, sizes, tails = panels.series(lefts, length)
+        # A spike may be shorter than its phases are exact, and its series never end; a short one needs no more than a long panel.
+        settled = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (tails * sizes * length <= TAIL * floor * panels.length)
+        lengths = np.full(lefts.size, length)
+        done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
+        if np.all(settled):
+            return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+        length /= 2
+        lefts = (lefts[~settled][:, None] + np.array([0.0, length])).ravel()
+        before = np.repeat(tails[~settled], 2)
+    raise Unsolved("narrow-gap", "a spike along the orbit is shorter than phases in doubles are exact; integrate numerically")
+
+
+@dataclass(frozen=True)
+class _Panels:
+    """Panels of so many nodes, at first of a length of few bits: borders are exact multiples of it."""
+
+    integrand: Callable[[Array], Array]
+    in_tau1: LinearFlow
+    floor: float
+    nodes: int
+    length: float
+
+    def lefts(self, low: float, high: float) -> Array:
+        """Return where the panels over a stretch start."""
+        before, after = math.ceil(-low / self.length), math.ceil(high / self.length)
+        first = before + _MARGIN * (before > _NEAR)
+        last = max(after + _MARGIN * (after > _NEAR), first == 0)
+        return np.arange(-first, last, dtype=float) * self.length
+
+    def series(self, lefts: Array, length: float) -> tuple[Array, Array, Array]:
+        """Return the Chebyshev coefficients (P, nodes), their sizes and relative tails, (P,).
+
+        Phases of nodes are those of the border plus a short way.
+        """
+        points, to_coefficients = _chebyshev(self.nodes)
+        z = self.in_tau1.phases(lefts)[:, None, :] + (points * length)[:, None] * self.in_tau1.rates
+        z = z.reshape(-1, z.shape[2])
+        values = [self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
+        coefficients = np.concatenate(values).reshape(lefts.size, -1) @ to_coefficients
+        sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))  # zero is resolved
+        return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+
+    def longer(self, low: float, high: float) -> _Panels:
+        """Return longer panels of more nodes where such resolve the integrand, and otherwise these."""
+        for factor in _LONGER:
+            panels = replace(self, nodes=_NODES, length=factor * self.length)
+            lefts = panels.lefts(low, high)
+            probed = lefts[np.linspace(0, lefts.size - 1, _PROBED).astype(int)]
+            if np.all(are_settled(panels.series(probed, panels.length)[2], np.inf, _NOISE_TAIL)):
+                return panels
+        return self
+
+
+@lru_cache
+def _chebyshev(count: int) -> tuple[Array, Array]:
+    """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to coefficients; read-only."""
+    points, to_coefficients = np.asarray((np.cos(DOUBLE.nodes(count)) + 1) / 2), np.asarray(DOUBLE.cosine_series(np.eye(count)))
+    points.flags.writeable = to_coefficients.flags.writeable = False
+    return points, to_coefficients

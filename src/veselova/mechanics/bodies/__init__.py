@@ -1,0 +1,1 @@
+"""Bodies: inertia operators and their principal axes."""

@@ -1,0 +1,125 @@
+"""Principal axes of a symmetric matrix far beyond double precision: Jacobi's rotations in integers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.exact_input import over_common_denominator
+
+__all__ = ["WideAxes", "wide_axes"]
+
+Array = NDArray[np.float64]
+
+#: Bits after the point, of the matrix over its largest entry.
+_BITS = 320
+
+#: Entries below this many units in the last place are zero: what the roundings of all rotations leave.
+_NOTHING = 1 << 24
+
+#: Bits that are kept of what is found: two values that are equal, or a component that is zero, then come out so.
+_KEPT = 256
+
+#: Sweeps of rotations; from eigenvectors in doubles three are needed.
+_SWEEPS = 30
+
+_ONE = 1 << _BITS
+
+
+@dataclass(frozen=True)
+class WideAxes:
+    """The principal axes of a symmetric matrix to 2^−256, determinant +1.
+
+    values  the eigenvalues, increasing, (n,): multiple ones are equal numbers
+    columns the axes as columns of integers, 2^320 for one, (n, n) · rounded: the same as floats, each correctly rounded
+    """
+
+    values: tuple[Fraction, ...]
+    columns: Any
+    rounded: Array
+
+    def along(self, vector: Sequence[Fraction]) -> tuple[Fraction, ...]:
+        """Return the components of a vector along the axes, to 2^−256 of the largest."""
+        whole, common = over_common_denominator(vector)
+        components = np.array(whole, dtype=object) @ self.columns
+        spare = max(0, max(int(abs(x)).bit_length() for x in components) - _KEPT)
+        return tuple(Fraction(_nearest(x, spare) << spare, common << _BITS) for x in components)
+
+
+def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
+    """Return the principal axes of a symmetric matrix, not zero.
+
+    Doubles find the axes first. Along them the matrix is diagonal to ε of its largest entry, and rotations of two axes at a time,
+    which need no distance between eigenvalues, do the rest.
+    """
+    largest = max(abs(x) for row in matrix for x in row)
+    scaled = [[x / largest for x in row] for row in matrix]
+    M = np.array([[(x.numerator << _BITS) // x.denominator for x in row] for row in scaled], dtype=object)
+    V = _orthonormal(np.linalg.eigh(np.array(scaled, dtype=np.float64))[1])
+    V = _diagonalised(_product(V.T, _product(M, V)), V)
+    values = [_nearest(int(x), _BITS - _KEPT) for x in np.sum(V * _product(M, V), axis=0) >> _BITS]
+    order = sorted(range(len(values)), key=values.__getitem__)
+    values, V = [values[i] for i in order], V[:, order]
+    for i in range(1, len(values)):
+        if values[i] - values[i - 1] <= 2:
+            values[i] = values[i - 1]
+    rounded = _as_floats(V)
+    if np.linalg.slogdet(rounded)[0] < 0:  # eigenvectors come with any sign
+        V[:, -1], rounded[:, -1] = -V[:, -1], -rounded[:, -1]
+    return WideAxes(tuple(Fraction(x, 1 << _KEPT) * largest for x in values), V, rounded)
+
+
+def _orthonormal(V: Array) -> Any:
+    """Return nearly orthogonal columns, made orthogonal, as integers: each step of Newton–Schulz squares the defect."""
+    wide = np.array([[int(math.ldexp(x, 1000)) >> (1000 - _BITS) for x in row] for row in V.tolist()], dtype=object)
+    three = 3 * np.diag([_ONE] * V.shape[0])
+    for _ in range(5):
+        wide = _product(wide, three - _product(wide.T, wide)) >> 1
+    return wide
+
+
+def _diagonalised(H: Any, V: Any) -> Any:
+    """Return V after the rotations that make H = VᵀMV diagonal."""
+    n = H.shape[0]
+    for _ in range(_SWEEPS):
+        turned = False
+        for p in range(n - 1):
+            for q in range(p + 1, n):
+                if abs(H[p, q]) <= _NOTHING:
+                    continue
+                turned = True
+                cosine, sine = _rotation(H[p, p], H[q, q], H[p, q])
+                for X in (H.T, H, V):  # the columns p and q of Hᵀ are the rows of H
+                    first, second = X[:, p].copy(), X[:, q].copy()
+                    X[:, p] = (cosine * first - sine * second) >> _BITS
+                    X[:, q] = (sine * first + cosine * second) >> _BITS
+        if not turned:
+            break
+    return V
+
+
+def _rotation(first: int, second: int, across: int) -> tuple[int, int]:
+    """Return cosine and sine of the smaller angle that makes ``across`` vanish."""
+    ratio = ((second - first) << (_BITS - 1)) // across
+    tangent = (1 << 2 * _BITS) // (abs(ratio) + math.isqrt(ratio * ratio + (1 << 2 * _BITS)))
+    cosine = (1 << 2 * _BITS) // math.isqrt((1 << 2 * _BITS) + tangent * tangent)
+    return cosine, (-1 if ratio < 0 else 1) * tangent * cosine >> _BITS
+
+
+def _product(a: Any, b: Any) -> Any:
+    return (a @ b) >> _BITS
+
+
+def _nearest(x: int, bits: int) -> int:
+    """Return x/2^bits to the nearest integer."""
+    return (x + (1 << bits >> 1)) >> bits
+
+
+def _as_floats(V: Any) -> Array:
+    return np.array([[float(Fraction(x, _ONE)) for x in row] for row in V.tolist()])

@@ -1,0 +1,1 @@
+"""The core of every problem: its data in exact numbers, times, exceptions, and what a flow is."""

@@ -1,0 +1,203 @@
+"""Numbers as given: every input becomes an exact rational before anything is rounded.
+
+A decimal string ("0.7") or a ratio ("7/10") is taken at its word; a float is the dyadic rational that it stores.
+The engines round these rationals once, to the precision they work in.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from decimal import Decimal, InvalidOperation
+from fractions import Fraction
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import InvalidInput, shown
+
+__all__ = [
+    "Number",
+    "exact_matrix",
+    "exact_number",
+    "exact_vector",
+    "is_matrix",
+    "over_common_denominator",
+    "plain",
+    "read_only",
+    "require_truth_value",
+    "stated",
+    "to_float",
+    "whole_number",
+]
+
+Number = int | float | str | Fraction | Decimal
+
+Path = tuple[str | int, ...]
+
+#: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other alphabets.
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
+
+#: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the memory.
+_LARGEST_EXPONENT = 400
+
+#: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
+_LONGEST_NUMERAL = 2100
+
+_REQUIRED = 'a finite real number within the range of a float (a JSON number, or a string such as "0.7" or "7/10")'
+
+
+def exact_number(value: Any, path: Path) -> Fraction:
+    """Return the rational number that ``value`` states exactly.
+
+    Accepts int, float, NumPy real scalars, Fraction, Decimal and strings ("0.7", "-1e-3", "7/10").
+    Raises InvalidInput for booleans, NaN, infinities, anything that is not a number, and numbers beyond float range.
+    """
+    try:
+        if type(value) is float:
+            return Fraction(value)
+        number = _parse(value)
+        float(number)
+    except (ValueError, OverflowError, ZeroDivisionError, InvalidOperation, TypeError):
+        raise InvalidInput(path, _REQUIRED, shown(value)) from None
+    return number
+
+
+def _parse(value: Any) -> Fraction:
+    if type(value) is int:
+        return Fraction(value)
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError("a boolean is not a number")
+    if isinstance(value, str):
+        return _parse_numeral(value)
+    if isinstance(value, Decimal) and value.is_finite() and value and abs(value.adjusted()) > _LARGEST_EXPONENT:
+        raise OverflowError("beyond float range")
+    if isinstance(value, (Fraction, Decimal, float)):
+        return Fraction(value)
+    if isinstance(value, Integral):
+        return Fraction(int(value))
+    if isinstance(value, np.floating):  # of any width: longdouble has more digits than a float
+        return Fraction(*value.as_integer_ratio())
+    if isinstance(value, Real):
+        return Fraction(float(value))
+    raise TypeError("not a number")
+
+
+def _parse_numeral(text: str) -> Fraction:
+    if len(text) > _LONGEST_NUMERAL:
+        raise ValueError("numeral too long")
+    parts = text.strip().split("/")
+    if len(parts) > 2 or not all(_DECIMAL.fullmatch(part.strip()) for part in parts):
+        raise ValueError("not a decimal or a ratio")
+    decimals = [Decimal(part.strip()) for part in parts]
+    if any(d and abs(d.adjusted()) > _LARGEST_EXPONENT for d in decimals):
+        raise OverflowError("beyond float range")
+    values = [Fraction(d) for d in decimals]
+    return values[0] if len(values) == 1 else values[0] / values[1]
+
+
+def _items(values: Any, path: Path, required: str) -> list[Any]:
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise InvalidInput(path, required, "an array with masked entries")
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
+        raise InvalidInput(path, required, shown(values))
+    return list(values)
+
+
+def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fraction, ...]:
+    """Return the entries of a vector as exact rationals; raises InvalidInput when the length is not ``length``."""
+    required = "a list of numbers" if length is None else f"a list of {length} numbers"
+    items = _items(values, path, required)
+    if length is not None and len(items) != length:
+        raise InvalidInput(path, required, f"{len(items)} entries")
+    return tuple(exact_number(item, (*path, i)) for i, item in enumerate(items))
+
+
+def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the rows of a matrix as exact rationals; raises InvalidInput when it has not ``size`` rows and as many columns.
+
+    ``columns`` is their number where the matrix is not square.
+    """
+    width = size if columns is None else columns
+    required = f"{size} rows of {width} numbers"
+    rows = _items(values, path, required)
+    if len(rows) != size:
+        raise InvalidInput(path, required, f"{len(rows)} rows")
+    return tuple(exact_vector(row, (*path, i), width) for i, row in enumerate(rows))
+
+
+def whole_number(value: Any, path: Path, least: int, most: int) -> int:
+    """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0 included."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise InvalidInput(path, f"a whole number from {least} to {most}", shown(value))
+    return int(value)
+
+
+def require_truth_value(value: Any, name: str) -> None:
+    """Raise InvalidInput, located at ``name``, for anything but true or false."""
+    if not isinstance(value, bool):
+        raise InvalidInput((name,), "true or false", shown(value))
+
+
+def stated(**arguments: Any) -> dict[str, Any]:
+    """Return the arguments that were given, those other than None, in JSON types."""
+    return {name: plain(value) for name, value in arguments.items() if value is not None}
+
+
+def plain(value: Any) -> Any:
+    """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding: ratios become strings."""
+    if type(value) in (float, bool, str) or (type(value) is int and abs(value) < 2**63):
+        return value
+    if type(value) is list:
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(item) for item in value]
+    if isinstance(value, (Fraction, Decimal)) or type(value) is int:
+        return str(value)
+    if isinstance(value, np.longdouble) and np.isfinite(value):
+        return plain(Fraction(*value.as_integer_ratio()))
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def is_matrix(values: Any) -> bool:
+    """Return whether the value is a list of lists: only the outermost shape is looked at."""
+    if isinstance(values, np.ndarray):
+        return values.ndim > 1
+    return (
+        isinstance(values, Sequence)
+        and len(values) > 0
+        and isinstance(values[0], (Sequence, np.ndarray))
+        and not isinstance(values[0], str)
+    )
+
+
+def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:
+    """Return exact numbers as a read-only float64 array, each entry correctly rounded."""
+    if values and not isinstance(values[0], Fraction):
+        array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
+    else:
+        array = np.array([float(x) for x in values])  # type: ignore[arg-type]
+    if not np.isfinite(array).all():
+        raise OverflowError("a validated number left the float range")
+    return read_only(array)
+
+
+def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]:
+    """Return a vector as integers and their denominator: sums and products of them need no further divisors."""
+    common = math.lcm(*(x.denominator for x in vector))
+    return [x.numerator * (common // x.denominator) for x in vector], common
+
+
+def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the array, no longer writable."""
+    array.setflags(write=False)
+    return array

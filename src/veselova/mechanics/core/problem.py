@@ -1,0 +1,144 @@
+"""What every problem is: a system of the paper with its state at time zero, immutable and validated on construction."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import read_only
+from veselova.mechanics.core.flow import Flow
+
+if TYPE_CHECKING:
+    from veselova.mechanics.systems.torus_problem import TorusProblem
+
+__all__ = ["Problem", "Series"]
+
+Array = NDArray[np.float64]
+
+#: Series by name, first axis the times.
+Series = Mapping[str, Array]
+
+
+class Problem(ABC):
+    """A system and its start. A subclass is one system: its data, its series, its integrals, and the field that moves it."""
+
+    #: The discriminator of the JSON, and the name of the independent variable.
+    system: ClassVar[str]
+    time: ClassVar[str] = "t"
+
+    #: The series of a trajectory, with the names of the axes that follow the time axis; the order of every listing and file.
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]]
+    #: Those that follow from the others, by ``derive``; and those whose true errors ``error`` bounds.
+    derived: ClassVar[tuple[str, ...]] = ()
+    bounded: ClassVar[tuple[str, ...]]
+
+    #: The series that tables and pictures show.
+    portrait: ClassVar[str]
+
+    #: Engines that serve the system, with their methods, and the formulations that the numerical one integrates; defaults first.
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
+    formulations: ClassVar[tuple[str, ...]]
+
+    #: Whether motions of the system run on tori that ``torus`` describes: all of them, or some.
+    has_tori: ClassVar[bool] = False
+
+    #: The arguments as given, JSON-ready.
+    given: Mapping[str, Any]
+
+    def _set(self, **fields: Any) -> None:
+        """Set attributes once and for all: a problem is immutable, and its arrays are read-only."""
+        for name, value in fields.items():
+            object.__setattr__(self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value)
+
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """Return the outputs from which a trajectory can be rebuilt: the others follow from them."""
+        return tuple(name for name in self.outputs if name not in self.derived)
+
+    @abstractmethod
+    def flow(self, formulation: str) -> Flow:
+        """Return the field with this start; it must move."""
+
+    @abstractmethod
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along series, by name, first axis the times."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """Return the system and its size in a few words."""
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the integrals whose value is zero, so that their drift is absolute."""
+        return frozenset()
+
+    @property
+    @abstractmethod
+    def start(self) -> Series:
+        """Return the series at time zero, each with a first axis of length one."""
+
+    @property
+    @abstractmethod
+    def turning(self) -> float:
+        """Return the rate at which the state turns at the start, in radians per unit of time."""
+
+    @property
+    def moves(self) -> bool:
+        """Return whether anything moves; a problem at rest stays at its start."""
+        return True
+
+    @property
+    def default_engine(self) -> str:
+        """Return the engine that serves this problem where none is asked for: the closed form where the problem has one."""
+        return next(iter(self.engines))
+
+    @property
+    def has_torus(self) -> bool:
+        """Return whether the motion runs on a torus that ``torus`` describes, or rests."""
+        return self.has_tori
+
+    def on_torus(self) -> TorusProblem:
+        """Return the problem on whose torus the motion runs. Raises InvalidInput for a system without tori."""
+        raise InvalidInput(
+            ("problem",), "a system with a torus: veselova, veselova-so3, neumann, ellipsoid-geodesic", self.system
+        )
+
+    @property
+    def semiaxes(self) -> Array | None:
+        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to show one; None for a sphere."""
+        return None
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return one of the ``derived`` series."""
+        raise KeyError(name)
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return one of the ``derived`` series as decimals with radii, from the decimals of the stored ones."""
+        raise KeyError(name)
+
+    def completed(self, series: Series) -> Series:
+        """Return the series of a flow, with what it leaves to the problem, along the axes in which the problem was given."""
+        return series
+
+    def bound(self, series: Series, error: Array) -> Array:
+        """Return the error of all bounded series, from that of those among them which are not derived."""
+        return error
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
+        return {"system": self.system, **self.given}
+
+    def as_request(self) -> dict[str, Any]:
+        """Return ``as_dict`` where it is the JSON that a request states; raises InvalidInput for a problem that none can."""
+        return self.as_dict()
+
+    def conditioning_floor(self, times: Array) -> Array:
+        """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
+        return np.asarray(np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64)

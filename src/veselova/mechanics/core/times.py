@@ -1,0 +1,189 @@
+"""The times at which a motion is asked for: finite, in any order, repeated or not; t = 0 is the start, negative times are fine.
+
+A time is taken exactly as it is stated. Engines take it as the nearest double and a remainder, which is a second double.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from functools import partial
+from itertools import pairwise
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain, read_only, to_float
+from veselova.mechanics.core.remainders import split, split_grid
+
+__all__ = ["MOST_TIMES", "TimeGrid", "as_request"]
+
+Array = NDArray[np.float64]
+
+Exact = Fraction | float
+
+#: Times of one call: their frames alone take a gigabyte for n = 4.
+MOST_TIMES = 10_000_000
+
+#: Whole numbers up to here are doubles.
+_LARGEST_WHOLE_DOUBLE = 2**53
+
+_REQUIRED = "a number, a list of numbers, or exactly the fields start, stop, count"
+
+
+@dataclass(frozen=True, eq=False)
+class TimeGrid:
+    """The different times asked for, in increasing order, and where each time asked for is among them.
+
+    doubles (N,) nearest to the exact times, increasing; two different times may have one double ·
+    remainders (N,) what the exact times are beyond the doubles, None where that is nothing ·
+    places (M,) of the M times asked for, None where these are the N times in this order ·
+    rationals: what makes the exact times of arithmetic beyond double precision
+    """
+
+    doubles: Array
+    remainders: Array | None
+    places: NDArray[np.intp] | None
+    rationals: Callable[[], Sequence[Exact]]
+
+    @classmethod
+    def of(cls, times: Any, exact: bool = False) -> TimeGrid:
+        """Return the times that a number, a list or an array states, or a mapping of start, stop and count.
+
+        A grid of start, stop and count has the points of ``numpy.linspace`` where both ends are doubles. Where an end is a text,
+        a Fraction or a Decimal, or where ``exact`` asks for it, the points are start + k(stop − start)/(count − 1) exactly.
+        Raises InvalidInput, located at ``times``, unless all are finite and there is one at least.
+        """
+        if isinstance(times, TimeGrid):
+            return times
+        if isinstance(times, Mapping):
+            return _uniform(times, exact)
+        if _is_number(times):
+            times = [times.item() if isinstance(times, np.ndarray) else times]
+        doubles = _as_doubles(times)
+        if doubles is not None:
+            return _of_doubles(doubles, times)
+        if isinstance(times, (str, bytes)) or not isinstance(times, (Sequence, np.ndarray)):
+            raise InvalidInput(("times",), _REQUIRED, shown(times))
+        return _of_rationals(exact_vector(times, ("times",)))
+
+    @property
+    def exact(self) -> tuple[Exact, ...]:
+        """Return the N times as exact numbers: doubles that stand for themselves, or rationals."""
+        return tuple(self.rationals())
+
+    @property
+    def asked(self) -> Array:
+        """Return the doubles nearest to the times asked for, (M,)."""
+        return self.doubles if self.places is None else self.doubles[self.places]
+
+    @property
+    def asked_remainders(self) -> Array | None:
+        """Return the remainders of the times asked for, (M,)."""
+        return self.remainders if self.remainders is None or self.places is None else self.remainders[self.places]
+
+
+def as_request(times: Any) -> Any:
+    """Return valid times as the JSON of a request states them, without rounding; raises InvalidInput as ``TimeGrid.of``."""
+    TimeGrid.of(times)
+    stated = plain(times)
+    return stated if isinstance(stated, (list, dict)) else [stated]
+
+
+def _is_number(times: Any) -> bool:
+    if isinstance(times, np.ndarray):
+        return times.ndim == 0
+    if isinstance(times, str):
+        try:
+            exact_number(times, ("times",))
+        except InvalidInput:
+            raise InvalidInput(("times",), _REQUIRED, shown(times)) from None
+        return True
+    return isinstance(times, (Real, Decimal, np.number))
+
+
+def _as_doubles(times: Any) -> Array | None:
+    """Return a copy of times that are doubles as they stand, or whole numbers that are; None for others."""
+    if type(times) is list:
+        return np.array(times, dtype=np.float64) if all(isinstance(time, float) for time in times) else None
+    if isinstance(times, range):
+        within = all(abs(end) <= _LARGEST_WHOLE_DOUBLE for end in (*times[:1], *times[-1:]))
+        return np.arange(times.start, times.stop, times.step, dtype=np.float64) if within else None
+    if not isinstance(times, np.ndarray) or isinstance(times, np.ma.MaskedArray) or times.ndim != 1:
+        return None
+    if times.dtype.kind == "f" and times.dtype.itemsize <= np.dtype(np.float64).itemsize:
+        return np.array(times, dtype=np.float64)
+    if times.dtype.kind in "iu" and times.size and max(-int(times.min()), int(times.max())) <= _LARGEST_WHOLE_DOUBLE:
+        return np.array(times, dtype=np.float64)
+    return None
+
+
+def _of_doubles(doubles: Array, times: Any) -> TimeGrid:
+    if doubles.size == 0:
+        raise InvalidInput(("times",), "at least one time", "none")
+    places = None
+    # NaN is greater than nothing: where each is greater than the one before it, all are finite if the first and the last are.
+    increasing = bool((doubles[1:] > doubles[:-1]).all())
+    if not (increasing and np.isfinite(doubles[[0, -1]]).all()):
+        if not np.isfinite(doubles).all():
+            exact_vector(times, ("times",))  # raises, and says which is not
+        doubles, places = np.unique(doubles, return_inverse=True)
+    return TimeGrid(read_only(doubles), None, places, doubles.tolist)
+
+
+def _of_rationals(numbers: Sequence[Fraction]) -> TimeGrid:
+    if not numbers:
+        raise InvalidInput(("times",), "at least one time", "none")
+    places = None
+    if any(later <= earlier for earlier, later in pairwise(numbers)):
+        found = sorted(set(numbers))
+        place_of = {number: place for place, number in enumerate(found)}
+        numbers, places = found, np.array([place_of[number] for number in numbers])
+    return _split(*split(numbers), places, lambda: numbers)
+
+
+def _split(
+    doubles: Array, remainders: Array, places: NDArray[np.intp] | None, rationals: Callable[[], Sequence[Exact]]
+) -> TimeGrid:
+    kept = read_only(remainders) if remainders.any() else None
+    return TimeGrid(read_only(doubles), kept, places, rationals)
+
+
+def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
+    """Return the grid of a mapping with start, stop and count, both ends included."""
+    if set(grid) != {"start", "stop", "count"}:
+        given = f"the fields {', '.join(map(str, grid)) or 'none'}"
+        raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", shown(given))
+    ends, count = [exact_number(grid[key], ("times", key)) for key in ("start", "stop")], grid["count"]
+    if isinstance(count, (bool, np.bool_)) or not isinstance(count, (int, np.integer)):
+        raise InvalidInput(("times", "count"), "a whole number", shown(count))
+    if count < 1:
+        raise InvalidInput(("times", "count"), "at least 1", str(count))
+    if count > MOST_TIMES:
+        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(count)[:30])
+    count, (start, stop) = int(count), ends
+    if count > 1 and not start < stop:
+        raise InvalidInput(("times", "stop"), f"a time greater than start ({shown(grid['start'])})", shown(grid["stop"]))
+    low, high = to_float(ends).tolist()
+    if not np.isfinite(high - low):
+        raise InvalidInput(("times", "stop"), "a span within the range of a float", f"{low!r} to {high!r}")
+    if not exact and all(_is_double(grid[key]) for key in ("start", "stop")):
+        return _of_doubles(np.linspace(low, high, count), [])
+    step = (stop - start) / max(count - 1, 1)
+    return _split(*split_grid(start, step, count), None, partial(_points, start, step, count))
+
+
+def _points(start: Fraction, step: Fraction, count: int) -> list[Fraction]:
+    return [start + k * step for k in range(count)]
+
+
+def _is_double(value: Any) -> bool:
+    """Return whether a valid end of a grid is a number that a double holds as it stands."""
+    if isinstance(value, (int, np.integer)):
+        return abs(int(value)) <= _LARGEST_WHOLE_DOUBLE
+    return isinstance(value, (float, np.float32, np.float16))

@@ -1,0 +1,182 @@
+"""The reduced LR flow on T*V(r,n), equation (dot_P), and the same motion by its momentum equation (4.1c).
+
+Momenta are measured in units in which the inertia operator is near one and the angular velocity at the start is one: the field
+is then of order one whatever the scales of the input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.stiefel_inertia import BodyInertia
+from veselova.mechanics.core.flow import FLOATS, Flow, Operations
+from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.stiefel import (
+    admissible_part,
+    cotangent,
+    momentum_map,
+    nearest_orthonormal,
+    product,
+    tangent_part,
+)
+
+__all__ = ["CotangentFlow", "MomentumFlow"]
+
+Array = NDArray[np.float64]
+
+#: The torque, squared, below which turning the state no longer restores the energy: its rounding would turn it farther.
+_LEAST_TORQUE = 1e-4
+
+
+@dataclass(frozen=True)
+class CotangentFlow(Flow):
+    """Ẋ = −ωX, Ṗ = −ωP, equation (dot_P), ω ∈ 𝓓_r from (dotX->P); a state is the flat array (X, P) of length 2nr.
+
+    Both factors are turned by the same rotation, so that XᵀX, XᵀP and PᵀP are constant; of a state that left the manifold by
+    rounding the nearest rotation of the start is kept, turned along the torque until the energy is that of the start.
+    """
+
+    inertia: BodyInertia
+    rank: int
+    time_unit: float
+    momentum_unit: float
+    start: Array
+
+    @classmethod
+    def of(cls, inertia: BodyInertia, X: Array, omega: Array) -> CotangentFlow:
+        """Return the flow of a moving body (ω ≠ 0) that starts in X with angular velocity ω ∈ 𝓓_r, in units of the problem."""
+        speed = float(np.max(np.abs(omega)))
+        speed *= float(np.sqrt(product(omega / speed, omega / speed)))
+        P = cotangent(X, inertia.apply(omega / speed))
+        return cls(inertia, X.shape[1], 1 / speed, speed, np.stack([X, P]))
+
+    @property
+    def initial(self) -> Array:  # type: ignore[override]
+        """Return the start."""
+        return self.start.ravel()
+
+    @cached_property
+    def parameters(self) -> Array:  # type: ignore[override]
+        """Return those of the inertia operator."""
+        return self.inertia.parameters
+
+    @property
+    def structure(self) -> Hashable | None:
+        """Return what determines the field besides its parameters."""
+        return type(self), *self.inertia.structure, self.inertia.n, self.rank
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return (−ωX, −ωP)."""
+        X, P = state.reshape(2, self.inertia.n, self.rank)
+        omega = self.inertia.angular_velocity(X, P, parameters, ops)
+        return np.concatenate([ops.dot(omega, -X).ravel(), ops.dot(omega, -P).ravel()])
+
+    def _momenta(self, pairs: Array) -> tuple[Array, Array]:
+        """Return ω and 𝓘ω at (X, P), shape (..., n, n)."""
+        omega = self.inertia.angular_velocity(pairs[..., 0, :, :], pairs[..., 1, :, :], self.parameters, FLOATS)
+        return omega, self.inertia.apply(omega)
+
+    @cached_property
+    def _twice_energy(self) -> Array:
+        return product(*self._momenta(self.start))
+
+    def project(self, state: Array) -> Array:
+        """Return states (..., 2nr) as rotations of the start, with its energy."""
+        pairs = self._rotated(state.reshape(*state.shape[:-1], *self.start.shape))
+        omega, momentum = self._momenta(pairs)
+        torque = momentum @ omega - omega @ momentum
+        # Turned by ξ, the energy changes by ⟨ξ,[𝓘ω,ω]⟩ to first order.
+        excess = (product(momentum, omega) - self._twice_energy) / 2
+        turn = torque * (-excess / (product(torque, torque) + _LEAST_TORQUE))[..., None, None]
+        return self._rotated(pairs + turn[..., None, :, :] @ pairs).reshape(state.shape)
+
+    def _rotated(self, pairs: Array) -> Array:
+        """Return the rotations of the start that are nearest to (X, P), shape (..., 2, n, r)."""
+        now, start = (np.concatenate([pair[..., 0, :, :], pair[..., 1, :, :]], axis=-1) for pair in (pairs, self.start))
+        left, _, right = np.linalg.svd(now @ start.T)
+        return np.asarray((left @ right)[..., None, :, :] @ self.start, dtype=np.float64)
+
+    def neighbour(self, distance: float) -> CotangentFlow:
+        """Return the flow of a start moved by about ``distance`` on the manifold, energy included: how data rounding acts."""
+        X, P = self.start
+        move = np.random.default_rng(self.inertia.n).normal(size=self.start.shape) / np.sqrt(self.inertia.n)
+        X = nearest_orthonormal(X + distance * move[0])
+        P = P + distance * float(np.linalg.norm(P)) * move[1]
+        return replace(self, start=np.stack([X, tangent_part(X, P)]))
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return X and P in units of the problem, on the manifold: between its steps an integrator has fewer digits."""
+        pairs = self.project(states).reshape(-1, *self.start.shape)
+        return {"X": pairs[:, 0], "P": np.ldexp(pairs[:, 1] * self.momentum_unit, self.inertia.exponent)}
+
+
+@dataclass(frozen=True)
+class MomentumFlow(Flow):
+    """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c), (4.2a), 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω; a state is (X, 𝓜), 𝓜 by its coefficients.
+
+    Here ω solves the full linear system (4.2) of n(n−1)/2 equations, in floating point only.
+    """
+
+    reduced: CotangentFlow
+
+    @property
+    def time_unit(self) -> float:  # type: ignore[override]
+        """Return the unit of the reduced flow."""
+        return self.reduced.time_unit
+
+    @property
+    def parameters(self) -> Array:  # type: ignore[override]
+        """Return those of the inertia operator."""
+        return self.reduced.parameters
+
+    @property
+    def initial(self) -> Array:  # type: ignore[override]
+        """Return the start."""
+        return self._state(self.reduced.start)
+
+    @property
+    def structure(self) -> None:
+        """Return None: no symbols."""
+        return
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return (−ωX, [𝓜,ω])."""
+        inertia, (X, momentum) = self.reduced.inertia, self._parts(state)
+        system = coefficients(self._basis + admissible_part(X, inertia.apply(self._basis) - self._basis))
+        omega = skew(np.linalg.solve(system.T, coefficients(momentum)), inertia.n)
+        return np.concatenate([(-omega @ X).ravel(), coefficients(momentum @ omega - omega @ momentum)])
+
+    @cached_property
+    def _basis(self) -> Array:
+        n = self.reduced.inertia.n
+        return skew(np.eye(n * (n - 1) // 2), n)
+
+    def _parts(self, states: Array) -> tuple[Array, Array]:
+        n, r = self.reduced.inertia.n, self.reduced.rank
+        return states[..., : n * r].reshape(*states.shape[:-1], n, r), skew(states[..., n * r :], n)
+
+    def _pairs(self, states: Array) -> Array:
+        X, momentum = self._parts(states)
+        return np.stack([X, cotangent(X, momentum)], axis=-3)
+
+    def _state(self, pair: Array) -> Array:
+        return np.concatenate([pair[0].ravel(), coefficients(momentum_map(*pair))])
+
+    def project(self, state: Array) -> Array:
+        """Return the state projected as a pair (X, P)."""
+        pair = self.reduced.project(self._pairs(state).ravel())
+        return self._state(pair.reshape(self.reduced.start.shape))
+
+    def neighbour(self, distance: float) -> MomentumFlow:
+        """Return the flow of a start moved by about ``distance`` on the manifold."""
+        return MomentumFlow(self.reduced.neighbour(distance))
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return X and P in units of the problem."""
+        return self.reduced.unpack(self._pairs(states).reshape(len(states), -1))

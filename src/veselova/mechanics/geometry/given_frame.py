@@ -1,0 +1,109 @@
+"""A frame [e_1 … e_n] as given: admitted to rounding, or made orthonormal where that was asked for."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import exact_matrix, over_common_denominator, to_float
+from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+
+__all__ = ["ExactFrame", "admissible_frame", "given_frame"]
+
+Array = NDArray[np.float64]
+ExactFrame = tuple[tuple[Fraction, ...], ...]
+
+#: Bits after the point of a mended frame: beyond all digits that can be asked for, and, in dimensions without digits, beyond
+#: doubles.
+_ALL_BITS, _DOUBLE_BITS = 4096, 320
+
+#: The largest dimension with digits.
+_WITH_DIGITS = 8
+
+#: A column that is left with less than its 10¹²th part depends on those before it.
+_DEPENDENT = 10**12
+
+
+def given_frame(frame: Any, q: tuple[Fraction, ...], normalize: bool, name: str = "q") -> ExactFrame:
+    """Return the columns of a frame exactly, row by row; ``q``, of any length, and its ``name``.
+
+    As given, where it is orthogonal with e_1 = q/|q| to 1e-9. With ``normalize`` any other is mended: e_1 becomes q/|q|, and
+    e_2 … e_n are made orthonormal in turn, each against those before it. The sign of the determinant is kept, by reversing e_n
+    where the new e_1 would change it. Raises InvalidInput unless the columns are independent, with q in place of e_1 as well.
+    """
+    exact = exact_matrix(frame, ("frame",), len(q))
+    try:
+        _require_admissible(to_float(exact), _unit(q), name)
+    except InvalidInput:
+        if not normalize:
+            raise
+    else:
+        return exact
+    return _mended(exact, q, name)
+
+
+def admissible_frame(frame: Array, q: Array) -> Array:
+    """Return a nearly orthogonal frame, first column nearly q, made so to rounding."""
+    rest = frame[:, 1:] - np.outer(q, q @ frame[:, 1:])
+    return orthonormalized(np.column_stack([q, rest]))
+
+
+def _require_admissible(frame: Array, q: Array, name: str) -> None:
+    """Raise InvalidInput unless the frame is orthogonal with first column q, both to the tolerance."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        defect = float(np.max(np.abs(frame.T @ frame - np.eye(q.size))))
+    if not defect <= INPUT_TOLERANCE:
+        required = "an orthogonal matrix to 1e-9 (or normalize=True)"
+        raise InvalidInput(("frame",), required, f"one with |EᵀE − 1| up to {defect:.3g}")
+    offset = float(np.max(np.abs(frame[:, 0] - q)))
+    if offset > INPUT_TOLERANCE:
+        required = f"first column e_1 equal to {name} to 1e-9 (or normalize=True)"
+        raise InvalidInput(("frame",), required, f"a difference of {offset:.3g}")
+
+
+def _unit(q: tuple[Fraction, ...]) -> Array:
+    largest = max(abs(x) for x in q)
+    scaled = to_float(tuple(x / largest for x in q))
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
+def _mended(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
+    """Return q/|q| and the other columns after Gram–Schmidt in integers, ``1 << bits`` for one."""
+    bits = _ALL_BITS if len(q) <= _WITH_DIGITS else _DOUBLE_BITS
+    columns = [_scaled(column, bits) for column in zip(*frame, strict=True)]
+    found = [_to_unit(_scaled(q, bits), bits)]
+    for i, column in enumerate(columns[1:], start=2):
+        rest = column
+        for unit in found:
+            rest = rest - ((unit * (int(unit @ rest) >> bits)) >> bits)
+        if _DEPENDENT * math.isqrt(int(rest @ rest)) <= math.isqrt(int(column @ column)):
+            raise InvalidInput(
+                ("frame",), f"columns independent of each other and of {name}", f"column {i} in the span of others"
+            )
+        found.append(_to_unit(rest, bits))
+    before, after = (np.array([[float(Fraction(int(y), 1 << bits)) for y in x] for x in vectors]) for vectors in (columns, found))
+    signs = [np.linalg.slogdet(vectors)[0] for vectors in (before, after)]
+    if np.linalg.svd(before, compute_uv=False)[-1] <= 1 / _DEPENDENT:
+        raise InvalidInput(("frame",), "linearly independent columns", "e_1 in the span of others")
+    if signs[0] != signs[1]:
+        found[-1] = -found[-1]
+    return tuple(tuple(Fraction(int(x), 1 << bits) for x in row) for row in zip(*found, strict=True))
+
+
+def _scaled(vector: tuple[Fraction, ...], bits: int) -> Any:
+    """Return a vector over its largest entry as integers; zero stays zero."""
+    whole, _ = over_common_denominator(vector)
+    largest = max(abs(x) for x in whole) or 1
+    return np.array([(x << bits) // largest for x in whole], dtype=object)
+
+
+def _to_unit(vector: Any, bits: int) -> Any:
+    """Return an integer vector at unit length."""
+    length = math.isqrt(int(vector @ vector))
+    return np.array([(int(x) << bits) // length for x in vector], dtype=object)

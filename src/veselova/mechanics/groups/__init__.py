@@ -1,0 +1,1 @@
+"""Matrix groups, and the distributions that constraints define on them."""

@@ -1,0 +1,1 @@
+"""Potentials: polynomials, Laurent polynomials, the separable family, functions on a group."""

@@ -1,0 +1,118 @@
+"""The flat table of a trajectory, one row per time, and the files that hold it: CSV, Parquet, Arrow."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import BackendMissing, InternalContradiction
+
+__all__ = ["Table", "Target", "flat_columns", "opened", "row_blocks"]
+
+Columns: TypeAlias = Mapping[str, NDArray[Any]]
+
+#: Where a file is written to: its path, or a binary stream that is open.
+Target: TypeAlias = "str | Path | BinaryIO"
+
+#: Numbers that are turned into text, and into rows of a binary table, at a time.
+_TEXT_BLOCK, _BINARY_BLOCK = 1 << 19, 1 << 22
+
+
+def row_blocks(rows: int, width: int, numbers: int = _TEXT_BLOCK) -> Iterator[slice]:
+    """Return slices that cut a table of so many rows and columns into blocks of about so many numbers."""
+    step = max(1, numbers // max(width, 1))
+    return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
+
+
+def flat_columns(name: str, values: NDArray[Any]) -> Columns:
+    """Return the components of a series (first axis the times) as columns named like ``frame_1_2``, from 1."""
+    return {
+        "_".join([name, *(str(i + 1) for i in index)]): values[(slice(None), *index)] for index in np.ndindex(values.shape[1:])
+    }
+
+
+@contextmanager
+def opened(target: Target) -> Iterator[BinaryIO]:
+    """Open a path for writing, or pass on a stream and leave it open."""
+    if isinstance(target, (str, Path)):
+        with Path(target).open("wb") as stream:
+            yield stream
+    else:
+        yield target
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length, doubles or decimals, and the provenance that goes with them. Written block by block."""
+
+    columns: Columns
+    provenance: Mapping[str, Any]
+
+    def _blocks(self, numbers: int) -> Iterator[dict[str, NDArray[Any]]]:
+        rows = len(next(iter(self.columns.values())))
+        for block in row_blocks(rows, len(self.columns), numbers):
+            yield {name: np.ascontiguousarray(values[block]) for name, values in self.columns.items()}
+
+    def to_csv(self, target: Target) -> None:
+        """Write comma-separated values under one line of names: the shortest text of every double, all digits of decimals."""
+        with opened(target) as stream:
+            stream.write((",".join(self.columns) + "\n").encode())
+            for block in self._blocks(_TEXT_BLOCK):
+                stream.write(_lines(np.column_stack(list(block.values()))))
+
+    def to_parquet(self, target: Target) -> None:
+        """Write Parquet, the provenance as JSON in the schema's metadata; raises BackendMissing without pyarrow."""
+        try:
+            from pyarrow import parquet
+        except ImportError:
+            raise _pyarrow_missing("Parquet") from None
+        # Without dictionaries, which no two numbers of a motion share; a table is a row group, written at once.
+        with opened(target) as stream, parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer:
+            for table in self._tables():
+                writer.write_table(table)
+
+    def to_arrow(self, target: Target) -> None:
+        """Write an Arrow IPC stream, the provenance as JSON in the schema's metadata; raises BackendMissing without pyarrow."""
+        try:
+            from pyarrow import ipc
+        except ImportError:
+            raise _pyarrow_missing("Arrow") from None
+        with opened(target) as stream, ipc.new_stream(stream, self._schema()) as writer:
+            for table in self._tables():
+                writer.write_table(table)
+
+    def _schema(self) -> Any:
+        import pyarrow
+
+        fields = [pyarrow.field(name, pyarrow.float64()) for name in self.columns]
+        return pyarrow.schema(fields, {"provenance": json.dumps(self.provenance)})
+
+    def _tables(self) -> Iterator[Any]:
+        import pyarrow
+
+        schema = self._schema()
+        for block in self._blocks(_BINARY_BLOCK):
+            yield pyarrow.table(list(block.values()), schema=schema)
+
+
+def _lines(rows: NDArray[Any]) -> bytes:
+    """Return rows of doubles or of texts as lines of comma-separated values."""
+    if rows.dtype == object:
+        return "".join(",".join(str(value) for value in row) + "\n" for row in rows).encode()
+    import orjson  # three times as fast as %.17g, and as exact
+
+    if not np.all(np.isfinite(rows)):
+        raise InternalContradiction("a table holds a number that is not finite")
+    text = orjson.dumps(np.ascontiguousarray(rows), option=orjson.OPT_SERIALIZE_NUMPY)
+    return text[2:-2].replace(b"],[", b"\n") + b"\n"
+
+
+def _pyarrow_missing(kind: str) -> BackendMissing:
+    return BackendMissing("pyarrow", f"{kind} output", "pip install pyarrow")

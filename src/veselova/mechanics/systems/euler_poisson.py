@@ -1,0 +1,112 @@
+"""The Euler–Poisson equations of a free rigid body in a potential 𝒱(γ), and their duality with the Veselova system."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import exact_number
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
+
+__all__ = ["EulerPoisson", "dual"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class EulerPoisson(RigidBody):
+    """A free rigid body in an axisymmetric potential, equations (3.4): 𝒥Ω̇ = 𝒥Ω×Ω + γ×∂𝒱/∂γ, ė_i = e_i×Ω, e_1 = γ.
+
+    inertia    𝒥: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix
+    gamma      the unit vector e_1 at t = 0, seen from the body, (3,) · Omega  the angular velocity in the body, (3,)
+    potential  𝒱(γ) as data (see ``Potential``): {"clebsch": α} α(𝒥γ,γ), {"family": [α₁ … α₅]} the F(γ) of (3.5) for
+               𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
+    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ and γ̇
+
+    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made orthonormal.
+    Raises InvalidInput, which names the field.
+    Outputs: Omega, gamma, frame, momentum 𝒥Ω. Formulations: ``velocity``, (3.4); ``momentum``, the momentum in space.
+    """
+
+    system: ClassVar[str] = "euler-poisson"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "Omega": ("axis",),
+        "gamma": ("axis",),
+        "frame": ("axis", "vector"),
+        "momentum": ("axis",),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("gamma", "momentum")
+    formulations: ClassVar[tuple[str, ...]] = ("velocity", "momentum")
+    constrained: ClassVar[bool] = False
+
+    @property
+    def _linear_name(self) -> str:
+        return "i2"
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return i_2, where it is zero."""
+        return frozenset({"i2"}) if self.linear == 0 else frozenset()
+
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along the series, by name.
+
+        ``gamma_norm`` i_1 = (γ,γ); ``i2`` (𝒥Ω,γ); ``energy`` f_1 = ½(𝒥Ω,Ω) + 𝒱; ``f2`` ½(𝒥Ω,𝒥Ω) + V(γ) where the potential has
+        the companion V of the duality lemma and i_2 = 0 or V asks for none; ``space_momentum`` Eᵀ𝒥Ω where 𝒱 = 0.
+        """
+        Omega, frame = series["Omega"], series["frame"]
+        gamma, potential = frame[..., 0], self.potential
+        M = Omega @ self.inertia
+        found = {
+            "gamma_norm": np.sum(gamma * gamma, axis=-1),
+            "i2": np.sum(M * gamma, axis=-1),
+            "energy": np.asarray(np.sum(Omega * M, axis=-1) / 2 + potential.terms.value(gamma)),
+        }
+        if potential.companion is not None and (self.linear == 0 or potential.unconditional):
+            found["f2"] = np.asarray(np.sum(M * M, axis=-1) / 2 + potential.companion.value(gamma))
+        if not potential.terms:
+            found["space_momentum"] = np.einsum("...ji,...j->...i", frame, M)
+        return found
+
+
+def dual(problem: RigidBody) -> RigidBody:
+    """Return the dual of a Veselova system, which is an Euler–Poisson one, or the other way round (duality lemma).
+
+    Its inertia is 𝒥 = 𝓘⁻¹, and potential and companion are exchanged: 𝒱 = F, and V completes the integral. It starts with
+    the same γ, γ̇ and frame, and zero linear constant: Ω = γ̇×γ + sγ. The dual of the dual is the first.
+    Raises Unsolved: ``no-companion`` where no F(γ) is known, ``off-constraint`` where (Ω,γ) ≠ 0, or (𝒥Ω,γ) ≠ 0.
+    """
+    if problem.potential.companion is None:
+        raise Unsolved("no-companion", 'the potential has no known companion F(γ); give it as "companion" beside "polynomial"')
+    if problem.linear != 0:
+        raise Unsolved("off-constraint", f"duality holds on {problem._linear_name} = 0, here {problem.linear:.6g}")
+    gamma = problem.gamma
+    Omega = problem.Omega - (problem.Omega @ gamma) * gamma
+    free = isinstance(problem, VeselovaSO3)
+    if free:
+        Omega = Omega - ((Omega @ problem.inverse @ gamma) / (gamma @ problem.inverse @ gamma)) * gamma
+    inertia: Any = [1 / moment for moment in problem.moments] if problem.axes is None else problem.inverse
+    start = (inertia, gamma, Omega, _dual_data(problem), problem.frame)
+    return EulerPoisson(*start, normalize=True) if free else VeselovaSO3(*start, normalize=True)
+
+
+def _dual_data(problem: RigidBody) -> dict[str, Any] | None:
+    """Return the data of the dual potential."""
+    given = problem.potential.given
+    if given is None:
+        return None
+    swapped: dict[str, Any] = {"family": given["family"]} if "family" in given else {}
+    if "clebsch" in given:
+        # F = −α det𝓘 (𝓘⁻¹γ,γ) = −(α/det𝒥) (𝒥γ,γ)
+        determinant = np.prod(np.array(problem.moments, dtype=object))
+        swapped["clebsch"] = -exact_number(given["clebsch"], ("potential", "clebsch")) * determinant
+    if "polynomial" in given:
+        swapped |= {"polynomial": given["companion"], "companion": given["polynomial"]}
+    return swapped

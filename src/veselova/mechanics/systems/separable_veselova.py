@@ -1,0 +1,172 @@
+"""The reduced rank-one Veselova system in n dimensions, in the separable potentials of which (3.5) is the case n = 3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, require_truth_value, stated, to_float
+from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.flows.separable_flow import SeparableFlow
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.potentials.separable import SeparablePotential, family_polynomial, separation_constants
+
+__all__ = ["SeparableVeselova"]
+
+Array = NDArray[np.float64]
+
+#: Larger numbers leave the range of a float when they are multiplied.
+_LARGEST, _WIDEST = Fraction(10**100), Fraction(10**20)
+
+#: The parts of a potential.
+_PARTS = ("quartic", "quadratic", "centrifugal")
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class SeparableVeselova(Problem):
+    """The point q = e_1 of an n-dimensional body with inertia (4.5) under (44), n ≥ 2, in a separable potential
+
+    V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5) where n = 3 and A = 𝓘⁻¹.
+
+    A          n distinct positive numbers
+    q, q_dot   the unit vector e_1 at t = 0 and its velocity, tangent to the sphere, (n,)
+    potential  {"quartic": α₁, "quadratic": α₂, "centrifugal": [β_1 … β_n]}, what is left out being zero
+
+    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first. In time τ
+    the motion separates in spheroconic coordinates, for any n (docs/separable.md). The rest of the frame is left out: with a
+    potential it is no algebraic function of the motion of q. Raises InvalidInput.
+    """
+
+    A: Array
+    q: Array
+    q_dot: Array
+    exact: ExactState
+    potential: tuple[Fraction, Fraction, tuple[Fraction, ...]]
+    given: Mapping[str, Any]
+
+    system: ClassVar[str] = "separable"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {"q": ("axis",), "q_dot": ("axis",), "spheroconic": ("coordinate",)}
+    derived: ClassVar[tuple[str, ...]] = ("spheroconic",)
+    bounded: ClassVar[tuple[str, ...]] = ("q",)
+    portrait: ClassVar[str] = "q"
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"analytic": ("angles",), "numeric": ("dop853", "taylor")}
+    formulations: ClassVar[tuple[str, ...]] = ("reduced",)
+
+    def __init__(self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False) -> None:
+        require_truth_value(normalize, "normalize")
+        diagonal = positive_numbers(A)
+        require_moderate(diagonal, "A", _WIDEST)
+        n = len(diagonal)
+        for i, value in enumerate(diagonal):
+            if value in diagonal[:i]:
+                raise InvalidInput(("A", i), "a number different from the others", shown(A[i]))
+        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
+        parts = _potential(potential, n)
+        for i, beta in enumerate(parts[2]):
+            if beta and not exact.q[i]:
+                raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", shown(beta))
+        self._set(A=to_float(diagonal), q=unit(position), q_dot=to_float(exact.tangent), exact=exact, potential=parts)
+        for name, values in {"potential": (*parts[:2], *parts[2]), "q_dot": exact.tangent}.items():
+            largest = max(abs(x) for x in values)
+            if largest > _LARGEST:
+                raise InvalidInput((name,), f"numbers up to {float(_LARGEST):.0e}", f"{float(largest):.3g}")
+        if not np.isfinite(self.energy):
+            raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
+        self._set(given=stated(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
+
+    def __repr__(self) -> str:
+        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
+        return f"SeparableVeselova({', '.join(parts)}, potential={self.given.get('potential')})".replace("\n", "")
+
+    @property
+    def n(self) -> int:
+        """Return the dimension of the body."""
+        return int(self.A.size)
+
+    @property
+    def title(self) -> str:
+        """Return the system, its dimension and its energy."""
+        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+
+    @property
+    def polynomial(self) -> tuple[Fraction, ...]:
+        """Return the coefficients of v(λ), lowest first: V = Σ v(λ_k)/Π_{s≠k}(λ_k−λ_s), the β_i apart."""
+        return family_polynomial([1 / a for a in self.exact.A], *self.potential[:2])
+
+    @property
+    def separable_potential(self) -> SeparablePotential:
+        """Return the potential in floating point."""
+        return SeparablePotential(to_float(self.polynomial), to_float(self.potential[2]))
+
+    @property
+    def energy(self) -> float:
+        """Return h = T + V at the start."""
+        with np.errstate(all="ignore"):
+            kinetic = float(integrals.energy(self.A, self.q, self.q_dot))
+            return kinetic + float(self.separable_potential.value(self.A, self.q))
+
+    @property
+    def turning(self) -> float:
+        """Return |q̇| plus a rate to which the potential can bring the body."""
+        scale, k = integrals.unit_scale(self.A)
+        lightest = float(np.min(scale)) ** 2 / float(np.prod(scale)) * 2.0 ** (k * (2 - self.n))
+        return float(integrals.norm(self.q_dot) + np.sqrt(2 * self._size / lightest))
+
+    @property
+    def _size(self) -> float:
+        """Return how large the parts of the potential are at the start."""
+        quartic, quadratic, betas = self.potential
+        I, q2 = 1 / self.A, self.q * self.q
+        walls = sum(abs(float(b)) / x for b, x in zip(betas, q2, strict=True) if b)
+        return float(abs(float(quartic)) * (I * I @ q2) + abs(float(quadratic)) * (I @ q2) + walls)
+
+    @property
+    def moves(self) -> bool:
+        """Return whether the point moves: q̇ or the force along the sphere."""
+        if np.any(self.q_dot) or self.turning == 0:
+            return bool(np.any(self.q_dot))
+        rate = self.flow()
+        return bool(np.any(np.abs(rate.vector_field(0.0, rate.initial)) > np.finfo(float).eps))
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {"q": self.q[None], "q_dot": self.q_dot[None]}
+
+    def flow(self, formulation: str = "reduced") -> SeparableFlow:
+        """Return the reduced flow with this potential, in units of this problem."""
+        quartic, quadratic, betas = self.potential
+        turning = max(self.turning, float(np.finfo(float).tiny))  # its reciprocal is a float
+        return SeparableFlow.of(self.A, self.q, self.q_dot, (float(quartic), float(quadratic), to_float(betas)), turning)
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return the spheroconic coordinates."""
+        return to_spheroconic(self.A, series["q"])
+
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return ``energy`` h = T + V, ``constants`` f_0 … f_{n−3} of the separation (docs/separable.md), ``q_norm`` (q,q)."""
+        potential = self.separable_potential
+        rows = zip(series["q"], series["q_dot"], strict=True)
+        found = np.array([separation_constants(self.A, q, v, potential) for q, v in rows])
+        q = series["q"]
+        return {"energy": found[:, -1], "constants": found[:, :-1], "q_norm": np.sum(q * q, axis=-1)}
+
+
+def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, ...]]:
+    """Return (α₁, α₂, β); raises InvalidInput, located below ``potential``."""
+    if given is None:
+        return Fraction(0), Fraction(0), (Fraction(0),) * n
+    if not isinstance(given, Mapping) or not given or set(given) - set(_PARTS):
+        raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", shown(given))
+    quartic, quadratic = (exact_number(given.get(name, 0), ("potential", name)) for name in _PARTS[:2])
+    betas = exact_vector(given["centrifugal"], ("potential", "centrifugal"), n) if "centrifugal" in given else (Fraction(0),) * n
+    return quartic, quadratic, betas

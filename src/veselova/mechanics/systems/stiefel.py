@@ -1,0 +1,207 @@
+"""The reduced LR flow on T*V(r,n): an n-dimensional body under the constraints (4.1), seen through its first r vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.exact_input import exact_matrix, is_matrix, require_truth_value, stated, to_float
+from veselova.mechanics.core.flow import FLOATS, Flow
+from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.flows.cotangent_flow import CotangentFlow, MomentumFlow
+from veselova.mechanics.geometry.integrals_of_motion import norm
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+from veselova.mechanics.geometry.stiefel import (
+    ad_invariants,
+    angular_velocity,
+    cotangent,
+    momentum_map,
+    nearest_orthonormal,
+    product,
+    tangent_part,
+    trace_integrals,
+)
+
+__all__ = ["StiefelFlow"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class StiefelFlow(Problem):
+    """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P), for any inertia and every rank 1 ≤ r ≤ n.
+
+    inertia  {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …}, symmetric and positive
+             definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order
+    X        (e_1 … e_r) at t = 0, (n, r), orthonormal columns
+    P        the momentum ∂L/∂Ẋ, equation (dotX->P), (n, r), with XᵀP + PᵀX = 0, (condX); or
+    X_dot    the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X)
+
+    The constraints must hold to 1e-9; with ``normalize=True`` X becomes the nearest orthonormal matrix and P or X_dot is
+    projected first. What is off by less is projected too. Raises InvalidInput, which names the field, what was required and
+    what was given. Tested for n = 2…6 and every rank.
+    """
+
+    X: Array
+    P: Array
+    inertia: BodyInertia
+    given: Mapping[str, Any]
+
+    system: ClassVar[str] = "stiefel"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "X": ("axis", "vector"),
+        "P": ("axis", "vector"),
+        "omega": ("axis", "axis_2"),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("omega",)
+    bounded: ClassVar[tuple[str, ...]] = ("X",)
+    portrait: ClassVar[str] = "X"
+    formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
+
+    def __init__(self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False) -> None:
+        require_truth_value(normalize, "normalize")
+        if (P is None) == (X_dot is None):
+            raise InvalidInput(("P",), "either P or X_dot", "neither" if P is None else "both")
+        if not is_matrix(X) or len(X) < 2:
+            raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", shown(X))
+        n, r = len(X), len(X[0])
+        if not 1 <= r <= n:
+            raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
+        operator = body_inertia(inertia, n)
+        columns = _orthonormal(to_float(exact_matrix(X, ("X",), n, r)), normalize)
+        name, values = ("P", P) if X_dot is None else ("X_dot", X_dot)
+        tangent = _tangent(columns, to_float(exact_matrix(values, (name,), n, r)), name, normalize)
+        momentum = tangent if X_dot is None else _momentum(operator, columns, tangent)
+        self._set(inertia=operator, X=columns, P=momentum)
+        if not (np.isfinite(self.energy) and np.all(np.isfinite(self.omega)) and bool(np.any(momentum)) == (self.energy > 0)):
+            raise InvalidInput((name,), "an energy and angular velocity within the range of a float", f"energy {self.energy}")
+        self._set(given=stated(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize))
+
+    def __repr__(self) -> str:
+        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("X", "P"))
+        return f"StiefelFlow({', '.join(parts)})".replace("\n", "")
+
+    @property
+    def n(self) -> int:
+        """Return the dimension of the body."""
+        return int(self.X.shape[0])
+
+    @property
+    def rank(self) -> int:
+        """Return r, the number of vectors in whose planes the body may turn."""
+        return int(self.X.shape[1])
+
+    @cached_property
+    def omega(self) -> Array:
+        """Return the angular velocity ω(X,P) ∈ 𝓓_r at the start."""
+        return self._angular_velocity(self.X, self.P)
+
+    @cached_property
+    def energy(self) -> float:
+        """Return the kinetic energy h = ½⟨𝓘ω,ω⟩ = ½ tr PᵀẊ."""
+        return float(self._energy(self.X[None], self.P[None])[0])
+
+    @property
+    def title(self) -> str:
+        """Return the system, its dimension and rank."""
+        return f"{self.system}, n = {self.n}, r = {self.rank}, energy {self.energy:.12g}"
+
+    @property
+    def moves(self) -> bool:
+        """Return whether the body moves at all."""
+        return bool(np.any(self.P))
+
+    @property
+    def turning(self) -> float:
+        """Return the fastest rate at which ω turns a vector."""
+        return float(np.linalg.norm(self.omega, 2))
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {"X": self.X[None], "P": self.P[None]}
+
+    def flow(self, formulation: str = "reduced") -> Flow:
+        """Return the field (dot_P), or for ``momentum`` (4.1c) with (4.2a), in units of this problem; the body must move."""
+        reduced = CotangentFlow.of(self.inertia, self.X, self.omega)
+        return reduced if formulation == "reduced" else MomentumFlow(reduced)
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return ω(X,P)."""
+        return self._angular_velocity(series["X"], series["P"])
+
+    def _angular_velocity(self, X: Array, P: Array) -> Array:
+        largest = float(np.max(np.abs(P))) or 1.0
+        with np.errstate(over="ignore", invalid="ignore"):  # refused by the constructor
+            omega = self.inertia.angular_velocity(X, P / largest, self.inertia.parameters, FLOATS)
+            return np.asarray(np.ldexp(omega * largest, -self.inertia.exponent), dtype=np.float64)
+
+    def _energy(self, X: Array, P: Array) -> Array:
+        omega = self.derive("omega", {"X": X, "P": P})
+        with np.errstate(over="ignore", invalid="ignore"):  # refused by the constructor
+            return product(momentum_map(X, P), omega) / 2
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the integrals whose value is of order one or zero: XᵀP/|P|."""
+        return frozenset({"X_P"})
+
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along the series, by name.
+
+        ``energy`` ½⟨𝓘ω,ω⟩; ``X_X`` XᵀX; ``X_P`` XᵀP/|P|, which is skew; ``P_P`` PᵀP; ``traces`` the coefficients of
+        tr(𝓜+λΓ)^k, k ≤ n, see ``trace_integrals``; ``invariants`` the singular values of 𝓜, its Ad-invariants.
+        """
+        X, P = series["X"], series["P"]
+        momentum, transposed = momentum_map(X, P), np.swapaxes(X, -1, -2)
+        size = norm(P.reshape(P.shape[0], -1))[:, None, None]
+        return {
+            "energy": self._energy(X, P),
+            "X_X": transposed @ X,
+            "X_P": np.divide(transposed @ P, size, out=np.zeros((len(X), self.rank, self.rank)), where=size > 0),
+            "P_P": np.swapaxes(P, -1, -2) @ P,
+            "traces": trace_integrals(X, momentum),
+            "invariants": ad_invariants(momentum),
+        }
+
+
+def _orthonormal(X: Array, normalize: bool) -> Array:
+    """Return the columns made exactly orthonormal; raises InvalidInput where they are not, or not independent."""
+    largest = float(np.max(np.abs(X))) or 1.0
+    if normalize:
+        values = np.linalg.svd(X / largest, compute_uv=False)
+        if values[-1] <= X.shape[0] * np.finfo(float).eps * values[0]:
+            raise InvalidInput(("X",), "linearly independent columns", f"a smallest singular value of {values[-1] * largest:.3g}")
+        return nearest_orthonormal(X / largest)
+    with np.errstate(over="ignore", invalid="ignore"):
+        defect = float(np.max(np.abs(X.T @ X - np.eye(X.shape[1]))))
+    if not defect <= INPUT_TOLERANCE:
+        raise InvalidInput(("X",), "orthonormal columns to 1e-9 (or normalize=True)", f"|XᵀX − 1| up to {defect:.3g}")
+    return nearest_orthonormal(X)
+
+
+def _tangent(X: Array, values: Array, name: str, normalize: bool) -> Array:
+    """Return the part of values that meets (cond_X), (condX); raises InvalidInput where it is not all."""
+    largest = float(np.max(np.abs(values))) or 1.0
+    scaled = values / largest
+    along = X.T @ scaled
+    defect = float(np.max(np.abs(along + along.T)))
+    if not normalize and defect > INPUT_TOLERANCE:
+        required = f"Xᵀ{name} skew to 1e-9 of its size (or normalize=True)"
+        raise InvalidInput((name,), required, f"a symmetric part up to {defect / 2 * largest:.3g}")
+    return tangent_part(X, scaled) * largest
+
+
+def _momentum(inertia: BodyInertia, X: Array, X_dot: Array) -> Array:
+    """Return P = ∂L/∂Ẋ, equation (dotX->P)."""
+    largest = float(np.max(np.abs(X_dot))) or 1.0
+    P = cotangent(X, inertia.apply(angular_velocity(X, X_dot / largest)))
+    with np.errstate(over="ignore"):  # refused by the constructor
+        return np.asarray(np.ldexp(P * largest, inertia.exponent), dtype=np.float64)

@@ -1,0 +1,67 @@
+"""Problems whose motion is linear on the real torus of a hyperelliptic curve: what the closed form needs to know of them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.geometry.sphere import ExactState
+
+__all__ = ["TorusProblem"]
+
+Array = NDArray[np.float64]
+
+
+class TorusProblem(Problem):
+    """A point q on Sⁿ⁻¹ that is Neumann's in τ₁, with the frame [q, n_2 … n_{n−1}, γ] or a rotated one.
+
+    Subclasses differ in their time.
+    A (n,) along principal axes · frame (n, n) at the start, along them · near_frame: the same in double precision, at less cost;
+    a natural one is turned by ε/(distance of its constants) · exact: the data as rationals · axes (n, n): the principal axes as
+    columns, None where they are the body's. The series of an engine are ``tau1``, ``frame``, ``spheroconic``
+    and ``q_dot``, the velocity in the problem's own ``time``: t, s or tau1; ``completed`` makes the problem's series of them.
+    """
+
+    A: Array
+    near_frame: Array
+    exact: ExactState
+    axes: Array | None = None
+
+    has_tori: ClassVar[bool] = True
+    engines: ClassVar = {"analytic": ("theta", "products", "nufft", "angles"), "numeric": ("dop853", "taylor")}
+
+    @property
+    @abstractmethod
+    def frame(self) -> Array:
+        """Return the frame at the start, columns, shape (n, n)."""
+
+    @property
+    @abstractmethod
+    def energy(self) -> float:
+        """Return the energy that the motion conserves."""
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return q, the first column of the frame, with its radii."""
+        if name != "q":
+            raise KeyError(name)
+        return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
+
+    def on_torus(self) -> TorusProblem:
+        """Return the problem itself."""
+        return self
+
+    @property
+    def has_units(self) -> bool:
+        """Return whether the energy is a float with all its digits."""
+        return True
+
+    @property
+    def n(self) -> int:
+        """Return the dimension."""
+        return int(self.A.size)

@@ -1,0 +1,242 @@
+"""The integrable rank-one Veselova problem: a body with inertia (4.5) and its state at t = 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.principal_inertia import principal_inertia
+from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.flows.reduced_flow import ReducedFlow
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
+from veselova.mechanics.geometry.natural_frame import moser_frame, refined
+from veselova.mechanics.geometry.sphere import ExactState, over_largest, point_on_sphere, unit
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.systems.neumann import NeumannSystem
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+__all__ = ["Veselova"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Veselova(TorusProblem):
+    """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the constraint (44), n ≥ 2.
+
+    A        n positive numbers, or a symmetric positive definite n × n matrix, which is diagonalised: the body axes then
+             stay the given ones, and A, q, q_dot, frame below are in the principal axes (``axes`` maps back)
+    q        the unit vector e_1 at t = 0, seen from the body, (n,)
+    q_dot    its velocity, tangent to the sphere, (n,); zero is a body at rest
+    frame    the frame [e_1 … e_n] at t = 0, (n, n), columns e_i, e_1 = q; None for the natural frame (Theorem recon0)
+
+    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first,
+    and the frame made orthonormal with e_1 = q, its determinant keeping its sign (``given_frame``).
+    Every number may be given as a string ("0.7", "7/10") and is then taken exactly. What is off the manifold by less than
+    the tolerance is projected onto it. Raises InvalidInput, which names the field, what was required and what was given.
+    """
+
+    A: Array
+    q: Array
+    q_dot: Array
+    near_frame: Array
+    axes: Array | None
+    exact: ExactState
+    given: Mapping[str, Any]
+
+    system: ClassVar[str] = "veselova"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "q": ("axis",),
+        "q_dot": ("axis",),
+        "frame": ("axis", "vector"),
+        "omega": ("axis", "axis_2"),
+        "spheroconic": ("coordinate",),
+        "tau1": (),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("q", "omega")
+    bounded: ClassVar[tuple[str, ...]] = ("frame",)
+    portrait: ClassVar[str] = "q"
+    formulations: ClassVar[tuple[str, ...]] = ("reduced",)
+
+    def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False) -> None:
+        require_truth_value(normalize, "normalize")
+        diagonal, axes = principal_inertia(A)
+        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
+        exact_frame = None if frame is None else given_frame(frame, exact.q, normalize)
+        if axes is not None:
+            # The tangential part, so that a body at rest stays so.
+            exact = replace(exact, q=axes.along(exact.q), q_dot=axes.along(exact.tangent))
+            position = to_float(over_largest(exact.q))
+        exact = replace(exact, frame=exact_frame)
+        position, velocity = unit(position), _rounded(exact.tangent)
+        A_float = to_float(diagonal)
+        found = integrals.StateIntegrals(A_float, position, velocity)
+        _require_representable_energy(float(found.scaled_energy), velocity)
+        if exact_frame is None:
+            near_frame = moser_frame(found.A, position, found.q_prime)
+        else:
+            along = to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
+            near_frame = admissible_frame(along, position)
+        given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
+        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given)
+        self._set(axes=None if axes is None else axes.rounded)
+
+    @classmethod
+    def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
+        """Return the problem whose motion has these constants and phases, as ``veselova.torus`` gives them.
+
+        A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 = 0 and the sorted I_i
+                interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases (n−1,) z⁰ of the start, modulo 1
+        signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as above
+
+        Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A up to 100.
+        """
+        from veselova.engines import start_on_torus
+
+        q, q_dot = start_on_torus(A, energy, constants, phases, signs)
+        return cls(A, q, q_dot, frame, normalize=True)
+
+    def neumann(self) -> NeumannSystem:
+        """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the principal axes; F_0 = 0.
+
+        q' = q̇ √((Aq,q)/(2h det A)); ``NeumannSystem.veselova`` is the way back. Raises InvalidInput for a body at rest.
+        """
+        if not self.moves:
+            raise InvalidInput(("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector")
+        return NeumannSystem(self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True)
+
+    def __repr__(self) -> str:
+        # Vectors along the principal axes, to the digits that recognise them.
+        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
+        return f"Veselova({', '.join(parts)})".replace("\n", "")
+
+    @cached_property
+    def moves(self) -> bool:
+        """Return whether the body moves at all (q̇ ≠ 0)."""
+        return bool(self.q_dot.any())
+
+    @cached_property
+    def frame(self) -> Array:
+        """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the last bit."""
+        if not self.exact.natural:
+            return self.near_frame
+        return read_only(refined(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
+
+    @cached_property
+    def energy(self) -> float:
+        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the range of a float."""
+        return float(integrals.energy(self.A, self.q, self.q_dot))
+
+    @cached_property
+    def constants(self) -> Array:
+        """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of the invariant polynomial N(λ), shape (n−2,)."""
+        return read_only(integrals.constants_of_motion(self.A, self.q, self.q_dot))
+
+    @cached_property
+    def spheroconic(self) -> Array:
+        """Return the spheroconic coordinates λ_1 ≤ … ≤ λ_{n−1} at t = 0, shape (n−1,)."""
+        return read_only(to_spheroconic(self.A, self.q))
+
+    @property
+    def title(self) -> str:
+        """Return the system and its dimension."""
+        return f"{self.system}, n = {self.n}" + (f", energy {self.energy:.12g}" if self.has_units else "")
+
+    @cached_property
+    def has_units(self) -> bool:
+        """Return whether h and p are floats: they scale like A^(2−n), and the motion does not depend on the scale of A."""
+        return integrals.StateIntegrals(self.A, self.q, self.q_dot).has_units
+
+    @property
+    def turning(self) -> float:
+        """Return |q̇|."""
+        return float(np.linalg.norm(self.q_dot))
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        series = {"tau1": np.zeros(1), "q_dot": self.q_dot[None], "frame": self.frame[None]}
+        return self.completed({**series, "spheroconic": self.spheroconic[None]})
+
+    def flow(self, formulation: str = "reduced") -> ReducedFlow:
+        """Return the reduced flow (extended) with the frame, in units of this problem; the body must move."""
+        return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the integrals whose value is zero: (q,p)."""
+        return frozenset({"q_p"})
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the body, equation (44.3)."""
+        q, q_dot = series["frame"][..., 0], series["q_dot"]
+        if name == "q":
+            return np.asarray(q)
+        if name == "spheroconic":
+            return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
+        product = q[..., :, None] * q_dot[..., None, :]
+        return np.asarray(product - np.swapaxes(product, -1, -2))
+
+    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+        """Return q or ω with its radii."""
+        if name == "omega":
+            return derive_velocity_pair(midpoints, radii, digits)
+        return super().derive_decimals(name, midpoints, radii, digits)
+
+    def completed(self, series: Series) -> Series:
+        """Return series along the principal axes of A in the body axes; spheroconic coordinates only where they were found."""
+        turned = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
+        return {**series, **turned}
+
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along states in the body axes, by name, first axis the times.
+
+        ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n; ``constants`` c_2…c_{n−1}.
+        ``energy`` and ``linear`` are left out where det A takes h or p out of the range of a float.
+        """
+        q_dot, frame = series["q_dot"], series["frame"]
+        if self.axes is not None:
+            q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
+        q = frame[..., 0]
+        found = integrals.StateIntegrals(self.A, q, q_dot)
+        p = found.scaled_momentum
+        size = integrals.norm(p)
+        with_units = self.has_units
+        return {
+            **({"energy": found.energy} if with_units else {}),
+            "q_norm": (q * q).sum(axis=-1),
+            "q_p": np.divide((q * p).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0),
+            "neumann": found.neumann,
+            **({"linear": integrals.linear_integrals(found.momentum, frame)} if with_units else {}),
+            "constants": found.constants,
+        }
+
+    def to_body_axes(self, vectors: Array) -> Array:
+        """Return components along the given body axes of vectors (..., n) or column matrices (..., n, k) in principal axes."""
+        if self.axes is None:
+            return vectors
+        return np.asarray(vectors @ self.axes.T if vectors.ndim < 3 else self.axes @ vectors, dtype=np.float64)
+
+
+def _rounded(tangent: tuple[Fraction, ...]) -> Array:
+    try:
+        return to_float(tangent)
+    except OverflowError:
+        given = f"{len(tangent)} entries beyond it"
+        raise InvalidInput(("q_dot",), "a tangential part within the range of a float", given) from None
+
+
+def _require_representable_energy(energy: float, q_dot: Array) -> None:
+    if not math.isfinite(energy) or (energy == 0 and q_dot.any()):
+        raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")

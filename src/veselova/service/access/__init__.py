@@ -1,0 +1,1 @@
+"""Keys, their database, and the middleware that asks for them."""

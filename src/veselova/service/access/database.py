@@ -1,0 +1,235 @@
+"""The database of the service: its tables, its migrations, and the one way to connect to it.
+
+SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The tables are made and changed by the migrations
+in ``veselova.migrations`` alone; what is written here must say the same, and a test compares the two. ``engine.connect()`` reads;
+whatever writes does so in ``writing(engine)``.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.runtime.environment import EnvironmentContext
+from alembic.runtime.migration import MigrationContext, MigrationStep
+from alembic.script import ScriptDirectory
+from alembic.script.revision import RevisionError
+from alembic.util import CommandError
+
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access.sqlite_file import begin_immediately, damage_of, empty_log, open_sqlite, sqlite_path
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+
+__all__ = [
+    "api_keys",
+    "chunks",
+    "connect",
+    "database_url",
+    "idempotency_keys",
+    "in_utc",
+    "is_outage",
+    "jobs",
+    "metadata",
+    "reason_of",
+    "schema_differences",
+    "writing",
+]
+
+metadata = sa.MetaData()
+
+#: One row for each sweep of an owner. ``id`` is the hash of the canonical request and its owner, so that the same request is the
+#: same job. ``owner`` is that of the key which asked, empty where none is shown; ``bytes`` what its results may take, or took.
+jobs = sa.Table(
+    "jobs",
+    metadata,
+    sa.Column("id", sa.String(32), primary_key=True),
+    sa.Column("request", sa.Text, nullable=False),
+    sa.Column("state", sa.String(16), nullable=False, index=True),
+    sa.Column("detail", sa.Text, nullable=False, server_default=""),
+    sa.Column("total", sa.BigInteger, nullable=False),
+    sa.Column("chunk_rows", sa.Integer, nullable=False),
+    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
+    sa.Column("finished_at", sa.DateTime(timezone=True)),
+    sa.Column("owner", sa.String(16), nullable=False, server_default=""),
+    sa.Column("bytes", sa.BigInteger, nullable=False, server_default="0"),
+)
+
+#: The finished chunks of a job, each a file whose content has this hash.
+chunks = sa.Table(
+    "chunks",
+    metadata,
+    sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("position", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("rows", sa.Integer, nullable=False),
+    sa.Column("sha256", sa.String(64), nullable=False),
+)
+
+#: What a client said with ``Idempotency-Key``, and the job that it got. A row is written before its job is.
+idempotency_keys = sa.Table(
+    "idempotency_keys",
+    metadata,
+    sa.Column("owner", sa.String(16), primary_key=True),
+    sa.Column("key", sa.String(255), primary_key=True),
+    sa.Column(
+        "job_id",
+        sa.String(32),
+        sa.ForeignKey("jobs.id", ondelete="CASCADE", deferrable=True, initially="DEFERRED"),
+        nullable=False,
+    ),
+    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
+)
+
+#: Keys that clients show; only the hash of a key is known here. Keys of one ``owner`` see the same jobs and answers.
+api_keys = sa.Table(
+    "api_keys",
+    metadata,
+    sa.Column("id", sa.String(16), primary_key=True),
+    sa.Column("name", sa.String(100), nullable=False),
+    sa.Column("sha256", sa.String(64), nullable=False, unique=True),
+    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
+    sa.Column("revoked_at", sa.DateTime(timezone=True)),
+    sa.Column("scope", sa.String(16), nullable=False, server_default="solve"),
+    sa.Column("owner", sa.String(16), nullable=False, server_default=""),
+    sa.Column("expires_at", sa.DateTime(timezone=True)),
+)
+
+#: Alembic keeps the migration that runs in a module of its own, so two must not run in one process at once.
+_MIGRATING = threading.Lock()
+
+#: Failures of a statement or its values. The database is there: asking again changes nothing.
+_NO_OUTAGE = (sa.exc.DataError, sa.exc.IntegrityError, sa.exc.ProgrammingError, sa.exc.NotSupportedError)
+
+
+def connect(settings: Settings) -> sa.Engine:
+    """Return an engine on the database of the settings, its tables brought up to date.
+
+    Raises InvalidInput for an address that cannot be read or a folder that others may write, Refused (``database-damaged``,
+    ``database-newer``), OSError or sqlalchemy.exc.SQLAlchemyError where it cannot be opened.
+    """
+    url = database_url(settings)
+    path = sqlite_path(url)
+    engine = open_sqlite(url, path) if url.get_backend_name() == "sqlite" else sa.create_engine(url, pool_pre_ping=True)
+    try:
+        with _MIGRATING:
+            _bring_up_to_date(engine, path)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+def _bring_up_to_date(engine: sa.Engine, path: Path | None) -> None:
+    try:
+        damage = "" if path is None else damage_of(engine, path)
+        if not damage:
+            with writing(engine, "migrations") as connection:
+                changed = _migrate(connection)
+            if changed and path is not None:
+                empty_log(engine)  # tables that are in the file outlive what may happen to the log
+            lacking = sorted(metadata.tables.keys() - set(sa.inspect(engine).get_table_names()))
+            damage = f"it lacks the tables {', '.join(lacking)}" if lacking else ""
+    except (CommandError, RevisionError) as error:
+        detail = f"The database was made by a later version of veselova, which has to be started instead ({error})."
+        raise Refused("database-newer", detail) from None
+    except sa.exc.OperationalError:
+        raise
+    except sa.exc.DatabaseError as error:
+        if path is None:
+            raise
+        damage = reason_of(error)
+    if damage:
+        raise Refused("database-damaged", _what_to_do(damage, path))
+
+
+def _what_to_do(damage: str, path: Path | None) -> str:
+    if path is None:
+        return f"The database is damaged: {damage}. Restore it from a copy."
+    return (
+        f"The database {path} is damaged: {damage}. Stop every veselova that uses it and move {path.name}, {path.name}-wal and "
+        f"{path.name}-shm together into another folder; then put a copy of it in their place, or start without one. "
+        f"`sqlite3 {path.name} .recover` in that folder prints what can be read, the keys among it. Where the log alone is "
+        "damaged, the database without it is as it was before what the log has."
+    )
+
+
+@contextmanager
+def writing(engine: sa.Engine, lock: str = "") -> Iterator[sa.Connection]:
+    """Give a connection whose transaction writes, and commits at the end of the block.
+
+    On SQLite it holds the one lock for writing from its first statement on, so nothing that it read can change before it writes.
+    On PostgreSQL ``lock`` names what two such transactions may not do at once.
+    """
+    with engine.connect() as plain:
+        connection = begin_immediately(plain)
+        with connection.begin():
+            if lock and connection.dialect.name == "postgresql":
+                connection.execute(sa.text("SELECT pg_advisory_xact_lock(hashtext(:name))"), {"name": f"veselova {lock}"})
+            yield connection
+
+
+def database_url(settings: Settings) -> sa.URL:
+    """Return the address of the database. Raises InvalidInput for one that cannot be read, or another kind of database."""
+    stated = settings.database_url.get_secret_value()
+    try:
+        url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")
+    except sa.exc.ArgumentError:
+        url = sa.URL.create("unreadable")
+    if url.get_backend_name() not in ("sqlite", "postgresql"):
+        raise InvalidInput(
+            ("VESELOVA_DATABASE_URL",), "an address sqlite:///PATH or postgresql://USER@HOST/NAME", url.render_as_string()
+        )
+    # A bare postgresql:// would mean psycopg2, which is not what the extra installs.
+    return url.set(drivername="postgresql+psycopg") if url.drivername == "postgresql" else url
+
+
+def _migrate(connection: sa.Connection) -> bool:
+    """Run the migrations that the database has not seen, all or none of them, and return whether there were any.
+
+    Of two servers that start together the second waits for the first, and finds nothing to do.
+    """
+    scripts = Path(__file__).parent.parent.parent / "migrations"
+    config = Config()
+    config.set_main_option("script_location", str(scripts).replace("%", "%%"))
+    config.set_main_option("version_locations", str(scripts).replace("%", "%%"))
+    config.set_main_option("path_separator", "newline")
+    script = ScriptDirectory.from_config(config)
+
+    pending: list[Any] = []
+
+    def steps(current: Any, _: Any) -> list[Any]:
+        pending.extend(reversed(list(script.iterate_revisions("head", current or "base"))))
+        return [MigrationStep.upgrade_from_script(script.revision_map, revision) for revision in pending]
+
+    with EnvironmentContext(config, script, fn=steps) as environment:
+        environment.configure(connection=connection, target_metadata=metadata, transactional_ddl=True)
+        environment.run_migrations()
+    return bool(pending)
+
+
+def in_utc(moment: datetime) -> datetime:
+    """Return a moment in UTC; SQLite gives back what was stored in UTC without saying so."""
+    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+
+
+def reason_of(error: Exception) -> str:
+    """Return what the disk or the database says, without statements, addresses or paths."""
+    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(".")
+
+
+def is_outage(error: Exception) -> bool:
+    """Return whether a failure says that the disk or the database does not answer at present, so that asking again may help."""
+    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(error, _NO_OUTAGE)
+
+
+def schema_differences(engine: sa.Engine) -> list[Any]:
+    """Return what the tables in the database have that those of this module have not, and the other way round."""
+    with engine.connect() as connection:
+        return list(compare_metadata(MigrationContext.configure(connection), metadata))

@@ -1,0 +1,221 @@
+"""Answers to requests for motions and tori: negotiated, taken from the cache or computed, in memory or through the spool."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from anyio import to_thread
+from starlette.requests import Request
+from starlette.responses import Response
+
+from veselova.service.answers.cache import Cache
+from veselova.service.answers.cache_entry import DamagedEntry
+from veselova.service.answers.disconnect import while_connected
+from veselova.service.answers.etag import entity_tag, is_identity, matches
+from veselova.service.answers.rendering import Delivery, Wanted, answered, restored, solved
+from veselova.service.answers.request_limits import require_acceptable
+from veselova.service.answers.request_reading import Reader
+from veselova.service.answers.spool import Spool, SpooledResponse
+from veselova.service.answers.write_behind import Pending
+from veselova.service.api.caller import caller_of
+from veselova.service.api.content_negotiation import accepted_coding, accepted_type
+from veselova.service.api.media_types import FORMATS, Format, format_of
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.settings import Settings
+from veselova.service.observability.metrics import Metrics
+from veselova.service.workers.pool import Workers
+
+__all__ = ["PROVENANCE", "Answers"]
+
+#: Bytes of a kept answer that is written to a file.
+_LARGE_BYTES = 1_000_000
+
+#: The header field that has the provenance of a trajectory, whatever its format, as JSON.
+PROVENANCE = "Veselova-Provenance"
+
+#: What a name stands for never changes; only who asked may keep it, since a server may ask for keys.
+_FOREVER = "private, max-age=31536000, immutable"
+
+#: What Cache-Status says of an answer that came from the cache.
+_HIT = "veselova; hit"
+
+
+class Answers:
+    """What one server answers, from its workers, its cache and its spool."""
+
+    def __init__(self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics) -> None:
+        self._settings, self._workers, self._reader, self._metrics = settings, workers, reader, metrics
+        self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
+        self._pending = Pending(self._cache)
+        self._spool = Spool(settings.data_dir / "spool")
+
+    @asynccontextmanager
+    async def serving(self) -> AsyncIterator[None]:
+        """Keep the spool open, and write what is to be kept, for the life of the server."""
+        await to_thread.run_sync(self._spool.open)
+        try:
+            async with self._pending.writing():
+                yield
+        finally:
+            self._spool.close()
+
+    async def document(self, kind: str, request: Request) -> Response:
+        """Return the JSON answer of a comparison or a torus."""
+        require_acceptable(_header(request, "accept"))
+        asked = await self._reader.asked(kind, request)
+        wanted = Wanted("json", _coding(request), self._place(asked.large))
+
+        async def work() -> Response:
+            with self._metrics.work(kind, asked.system, asked.engine):
+                delivery = await self._workers.run(
+                    answered, kind, asked.content, wanted, budget_s=asked.budget_s, caller=caller_of(request).name
+                )
+            return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
+
+        return await self._guarded(request, work, wanted.place)
+
+    async def trajectory(self, request: Request) -> Response:
+        """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
+        form = _format(request)
+        asked = await self._reader.asked("trajectory", request)
+        name = asked.name
+        kept_as = _kept_as(name, request)
+        await self._require_news(request, kept_as, entity_tag(name, form.name))
+        wanted = Wanted(form.name, _coding(request), self._place(asked.large))
+        entry, content = self._cache.entry(kept_as), self._pending.find(kept_as)
+        task = (restored, content, wanted) if content else (solved, asked.content, wanted, entry)
+
+        async def work() -> Response:
+            with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
+                try:
+                    delivery = await self._workers.run(*task, budget_s=asked.budget_s, caller=caller_of(request).name)
+                    ending.kept = delivery.kept
+                finally:
+                    self._metrics.cached(hit=ending.kept)
+            headers = _headers(name, form, await self._kept(kept_as, delivery))
+            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.kept else headers)
+
+        return await self._guarded(request, work, wanted.place, None if entry is None else entry.part)
+
+    async def _require_news(self, request: Request, kept_as: str, tag: str) -> None:
+        """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304 answers GET and HEAD alone."""
+        stated = _header(request, "if-none-match")
+        if stated is None:
+            return
+        if matches(stated, tag, await self._find(kept_as) is not None):
+            raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
+
+    async def _find(self, name: str) -> bytes | str | None:
+        """Return an entry that is kept: the content of one that is not written yet, the file of another."""
+        return self._pending.find(name) or await to_thread.run_sync(self._cache.find, name)
+
+    async def _kept(self, name: str, delivery: Delivery) -> bool:
+        """See to what the cache has to do with an answer, and return whether it can be had again."""
+        if delivery.damaged:
+            await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
+        if delivery.not_stored is not None:
+            self._cache.report(delivery.not_stored)
+        if delivery.stored and self._cache.is_full(delivery.stored):
+            await to_thread.run_sync(self._cache.make_room)
+        if delivery.entry is not None:
+            return await self._pending.keep(name, delivery.entry)
+        return delivery.kept or delivery.stored > 0
+
+    async def named(self, name: str, request: Request) -> Response:
+        """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
+        form = _format(request)
+        kept_as = _kept_as(name, request)
+        kept = await self._find(kept_as) if is_identity(name) else None
+        if kept is None:
+            raise _not_kept(name)
+        headers = {**_headers(name, form), "Cache-Control": _FOREVER}
+        if matches(_header(request, "if-none-match"), headers["ETag"], exists=True):
+            return Response(status_code=304, headers=headers)
+        if request.method == "HEAD":
+            response = Response(headers={**headers, "Content-Type": form.media_type})
+            del response.headers["content-length"]  # that of the GET is not known before it
+            return response
+        wanted = Wanted(form.name, _coding(request), self._place(_bytes(kept) > _LARGE_BYTES))
+
+        async def work() -> Response:
+            delivery = await self._restored(kept_as, kept, wanted, caller_of(request).name)
+            if delivery is None:
+                raise _not_kept(name)
+            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT})
+
+        return await self._guarded(request, work, wanted.place)
+
+    async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, caller: str) -> Delivery | None:
+        """Return a kept answer, or None where it is damaged or has just been removed."""
+        try:
+            return await self._workers.run(restored, kept, wanted, budget_s=self._settings.max_budget_s, caller=caller)
+        except DamagedEntry:
+            await to_thread.run_sync(self._cache.discard, name)
+        except FileNotFoundError:
+            pass
+        return None
+
+    def _place(self, needed: bool) -> str | None:
+        return self._spool.place() if needed else None
+
+    @staticmethod
+    async def _guarded(request: Request, work: Any, *places: str | None) -> Response:
+        """Return what the work gives while the client is there; of work that was stopped no file is left."""
+        try:
+            return await while_connected(request, work)
+        except BaseException:
+            for place in filter(None, places):
+                with suppress(OSError):
+                    Path(place).unlink(missing_ok=True)
+            raise
+
+
+def _response(delivery: Delivery, wanted: Wanted, headers: Mapping[str, str]) -> Response:
+    fields = {**headers, "Content-Type": FORMATS[wanted.format].media_type}
+    if delivery.coding != "identity":
+        fields["Content-Encoding"] = delivery.coding
+    if delivery.provenance is not None:
+        fields[PROVENANCE] = delivery.provenance
+    if delivery.body is not None:
+        return Response(delivery.body, headers=fields)
+    return SpooledResponse(str(wanted.place), fields)
+
+
+def _headers(name: str, form: Format, kept: bool = True) -> dict[str, str]:
+    """Return what the headers of a trajectory say of its name: its own address where it can be had there again."""
+    headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
+    if form.name != "json":
+        headers["Content-Disposition"] = f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
+    return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if kept else headers
+
+
+def _header(request: Request, name: str) -> str | None:
+    return ", ".join(request.headers.getlist(name)) or None
+
+
+def _format(request: Request) -> Format:
+    return format_of(accepted_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()]))
+
+
+def _coding(request: Request) -> str:
+    return accepted_coding(_header(request, "accept-encoding"))
+
+
+def _bytes(kept: bytes | str) -> int:
+    try:
+        return len(kept) if isinstance(kept, bytes) else Path(kept).stat().st_size
+    except OSError:
+        return 0
+
+
+def _kept_as(name: str, request: Request) -> str:
+    """Return the name under which the cache has an answer: that of an owner is no name of an answer, and so nobody else's."""
+    owner = caller_of(request).owner
+    return f"{owner}-{name}" if owner else name
+
+
+def _not_kept(name: str) -> Refused:
+    return Refused("no-such-answer", f"No trajectory is kept as {name[:80]}; POST its request to /v1/trajectories.")

@@ -1,0 +1,126 @@
+"""Bodies of requests, read and validated: small ones by the server itself, others in a worker.
+
+Whatever is in a body of the largest size, the event loop only passes it on.
+"""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+from typing import Any
+
+from anyio import to_thread
+from starlette.requests import ClientDisconnect, Request
+
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.service.answers.etag import identity
+from veselova.service.answers.request_limits import admit, require_modest
+from veselova.service.api.caller import caller_of
+from veselova.service.api.json_text import decoded
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.workers.pool import Workers
+from veselova.service.workers.tasks import TASKS
+
+__all__ = ["Asked", "Reader"]
+
+#: Bytes of a body that the event loop reads itself, in a millisecond or two whatever they are.
+_SMALL_BYTES = 8_000
+
+#: Numbers from which an answer is written to a file.
+_LARGE_NUMBERS = 100_000
+
+#: What becomes of a body that does not come whole, by the reason that the connection states.
+_UNFINISHED = {
+    "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
+    "request-timeout": "The body came too slowly.",
+    "shutting-down": "The server is shutting down and reads no further.",
+    "client-gone": "The client closed the connection before its request was complete.",
+}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request as its server needs it: what it is about, and a pickle, of its validated fields for the worker, of the SweepPlan.
+
+    ``name`` is the name of the answer, of a trajectory; ``large`` says whether the answer is written to a file.
+    """
+
+    system: str
+    engine: str
+    budget_s: float
+    large: bool
+    name: str
+    content: bytes
+
+
+class Reader:
+    """Reads the bodies that one server is sent."""
+
+    def __init__(self, settings: Settings, workers: Workers) -> None:
+        self._settings, self._workers = settings, workers
+
+    async def asked(self, kind: str, request: Request) -> Asked:
+        """Return what the body of a request asks, of a kind of TASKS or of a sweep.
+
+        Raises Refused for another media type, a body over the limit, one that does not come whole, or text that is not JSON;
+        InvalidInput or InvalidRequest for what is wrong with it.
+        """
+        body = await self._body(request)
+        if len(body) <= _SMALL_BYTES:
+            if kind == "sweep":  # problems of which are made, in a tenth of a second
+                return await to_thread.run_sync(_read, kind, body, self._settings)
+            return _read(kind, body, self._settings)
+        caller, budget_s = caller_of(request).name, self._settings.max_budget_s
+        return await self._workers.run(_read, kind, body, self._settings, budget_s=budget_s, caller=caller)
+
+    async def _body(self, request: Request) -> bytes:
+        _require_json(request)
+        limit = self._settings.max_body_bytes
+        too_large = Refused("body-too-large", f"The body: required at most {limit} bytes; given more.")
+        declared = request.headers.get("content-length", "")
+        if declared.isdigit() and int(declared[:20]) > limit:
+            raise too_large
+        body = bytearray()
+        try:
+            async for chunk in request.stream():
+                body += chunk
+                if len(body) > limit:
+                    raise too_large
+        except ClientDisconnect:
+            code = request.scope.get("state", {}).get("unfinished", "client-gone")
+            raise Refused(code, _UNFINISHED[code], retry_after=5 if code == "shutting-down" else None) from None
+        return bytes(body)
+
+
+def _require_json(request: Request) -> None:
+    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if media_type != "application/json" and not (media_type.startswith("application/") and media_type.endswith("+json")):
+        raise Refused("unsupported-media-type", f"Content-Type: required application/json; given {media_type[:100] or 'none'}.")
+    if (coding := request.headers.get("content-encoding", "identity").strip().lower()) != "identity":
+        raise Refused("unsupported-media-type", f"Content-Encoding: required none; given {coding[:100]}.")
+
+
+def _read(kind: str, body: bytes, settings: Settings) -> Asked:
+    """Return what a body asks; raises Refused and InvalidInput as ``Reader.asked`` does."""
+    document = decoded(body)
+    require_modest(document, settings)
+    model: type[TorusRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
+    request: Any = read_request(model, document)
+    admit(request, settings)
+    if isinstance(request, SweepRequest):
+        content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
+        return Asked(request.problem.system, request.engine or "", request.budget_s, False, request.id, content)
+    stated, name, engine = request.model_dump(), "", "both" if kind == "comparison" else "analytic"
+    if isinstance(request, TrajectoryRequest):
+        name, engine = identity(request, stated), request.chosen_engine
+    content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
+    return Asked(request.problem.system, engine, request.budget_s, _is_large(request), name, content)
+
+
+def _is_large(request: TorusRequest) -> bool:
+    if not isinstance(request, ComparisonRequest):
+        return False
+    return request.time_count() * request.problem.dimension**2 * request.digits / FEWEST_DIGITS > _LARGE_NUMBERS

@@ -1,0 +1,70 @@
+"""The formats of a trajectory and the content codings, as a worker writes them: block by block, to memory or to a file."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, BinaryIO, TypeAlias, cast
+
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.json_documents import trajectory_document, write_document
+
+__all__ = ["FORMATS", "JSON", "Format", "coded", "format_of"]
+
+Outputs: TypeAlias = "Iterable[str] | None"
+
+#: Both codings: on the mantissas of a motion a higher level costs seconds and saves little.
+_LEVEL = 1
+
+
+def _write_json(trajectory: Trajectory, stream: BinaryIO, outputs: Outputs) -> None:
+    write_document(trajectory_document(trajectory, outputs), stream)
+
+
+@dataclass(frozen=True)
+class Format:
+    """One representation of a trajectory. ``compressed``: it is already, so that no content coding is put on top."""
+
+    name: str
+    media_type: str
+    write: Callable[[Trajectory, BinaryIO, Outputs], None]
+    compressed: bool = False
+
+
+JSON = Format("json", "application/json", _write_json)
+
+#: The formats by name, in the order of preference.
+FORMATS: Mapping[str, Format] = {
+    entry.name: entry
+    for entry in (
+        JSON,
+        Format("csv", "text/csv", Trajectory.to_csv),
+        Format("npz", "application/x-npz", Trajectory.to_npz, compressed=True),
+        Format("arrow", "application/vnd.apache.arrow.stream", Trajectory.to_arrow),
+        Format("parquet", "application/vnd.apache.parquet", Trajectory.to_parquet, compressed=True),
+    )
+}
+
+
+def format_of(media_type: str) -> Format:
+    """Return the format of a media type that is offered."""
+    return next(entry for entry in FORMATS.values() if entry.media_type == media_type)
+
+
+@contextmanager
+def coded(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
+    """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or ``identity``."""
+    if coding == "identity":
+        yield stream
+        return
+    encoder: Any
+    if coding == "gzip":
+        encoder = gzip.GzipFile(fileobj=stream, mode="wb", compresslevel=_LEVEL, mtime=0)
+    else:
+        import zstandard
+
+        encoder = zstandard.ZstdCompressor(level=_LEVEL).stream_writer(stream, closefd=False)
+    with encoder:
+        yield cast("BinaryIO", encoder)

@@ -1,0 +1,213 @@
+"""What a sweep varies: each parameter a place in the JSON of the problem, with the values that it takes there."""
+
+from __future__ import annotations
+
+import copy
+import math
+from abc import ABC
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from veselova.mechanics.core.errors import InvalidInput, shown, unknown_name
+from veselova.mechanics.core.exact_input import exact_number
+
+__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replaced", "tabulated"]
+
+Path = tuple[str | int, ...]
+
+#: No problem has as many places, and the product of so many axes has no name.
+_MOST_PARAMETERS = 64
+
+#: Larger integers need not be doubles.
+_LARGEST_INTEGER = 2**53
+
+_DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
+_SPACINGS = ("linear", "log")
+
+
+@dataclass(frozen=True)
+class Parameter(ABC):
+    """A place in the problem, by the parts of its JSON pointer."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """Return the place as tables name it: ``A.0`` for /A/0."""
+        return ".".join(str(part) for part in self.path)
+
+
+@dataclass(frozen=True)
+class Axis(Parameter):
+    """A parameter that takes each of its values, in combination with those of every other axis."""
+
+    values: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Draw(Parameter):
+    """A parameter that is drawn at random, each of its components independently of the others."""
+
+    distribution: str
+    bounds: tuple[float, float]
+    shape: tuple[int, ...]
+
+    def drawn(self, random: np.random.Generator) -> Any:
+        """Return one draw: a number, or nested lists of numbers."""
+        first, second = self.bounds
+        if self.distribution == "normal":
+            return random.normal(first, second, self.shape).tolist()
+        if self.distribution == "log_uniform":
+            return np.exp(random.uniform(math.log(first), math.log(second), self.shape)).tolist()
+        return random.uniform(first, second, self.shape).tolist()
+
+
+def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[Parameter]:
+    """Return the parameters of a sweep over a problem, in the order given.
+
+    Raises InvalidInput for a place that the problem has not, for two places one inside the other, and for values, grids and
+    distributions that are none; all axes together have at most ``most_values`` values.
+    """
+    if not isinstance(vary, Mapping) or not vary or len(vary) > _MOST_PARAMETERS:
+        raise InvalidInput(("vary",), f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem", shown(vary))
+    found: list[Parameter] = []
+    for pointer, stated in vary.items():
+        where = ("vary", str(pointer)[:100].encode("utf-8", "backslashreplace").decode("utf-8"))
+        path = _path(pointer, problem, where)
+        if other := next((p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None):
+            raise InvalidInput(where, "a place of its own", f"a place that overlaps with {other.name}")
+        found.append(_parameter(path, stated, _value_at(problem, path), where, most_values))
+        count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
+        if count > most_values:
+            raise InvalidInput(("vary",), f"lists and grids of at most {most_values} values, all together", str(count))
+    return found
+
+
+def _value_at(document: Any, path: Path) -> Any:
+    """Return the value at a place of a document; raises KeyError or IndexError."""
+    for part in path:
+        document = document[part]
+    return document
+
+
+def replaced(document: Mapping[str, Any], values: Mapping[Path, Any]) -> dict[str, Any]:
+    """Return the document with the values at their places."""
+    changed: dict[str, Any] = copy.deepcopy(dict(document))
+    for path, value in values.items():
+        _value_at(changed, path[:-1])[path[-1]] = value
+    return changed
+
+
+def components(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the scalars of a value by the names of their columns: ``q.0``, ``q.1`` …"""
+    if isinstance(value, (list, tuple)):
+        for i, item in enumerate(value):
+            yield from components(f"{name}.{i}", item)
+    else:
+        yield name, value
+
+
+def is_double(value: Any) -> bool:
+    """Return whether a value of the JSON is a number that a double holds exactly."""
+    return (type(value) is float and math.isfinite(value)) or (type(value) is int and abs(value) <= _LARGEST_INTEGER)
+
+
+def tabulated(value: Any) -> float | str | None:
+    """Return a scalar of the JSON as tables hold it: a number wherever it states one."""
+    if is_double(value):
+        return float(value) + 0.0  # a zero has no sign
+    try:
+        return float(exact_number(value, ()))
+    except InvalidInput:
+        return value if isinstance(value, str) or value is None else str(value).lower()
+
+
+def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
+    """Return the parts of an RFC 6901 pointer to a value that the problem states."""
+    required = f'a JSON pointer to a value that the problem states, such as "/{next(iter(k for k in problem if k != "system"))}"'
+    parts = str(pointer).split("/")
+    place: Any = problem
+    path: list[str | int] = []
+    for part in parts[1:]:
+        name = part.replace("~1", "/").replace("~0", "~")
+        if isinstance(place, Mapping) and name in place and name != "system":
+            path.append(name)
+        elif isinstance(place, list) and name.isascii() and name.isdigit() and len(name) < 6 and int(name) < len(place):
+            path.append(int(name))
+        else:
+            raise InvalidInput(where, required, shown(pointer))
+        place = place[path[-1]]
+    if parts[0] or not path:
+        raise InvalidInput(where, required, shown(pointer))
+    return tuple(path)
+
+
+def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int) -> Parameter:
+    if isinstance(stated, list):
+        return Axis(path, _values(stated, base, where, most_values))
+    if isinstance(stated, Mapping) and len(stated) == 1 and next(iter(stated)) in _DISTRIBUTIONS:
+        ((distribution, bounds),) = stated.items()
+        return Draw(path, distribution, _bounds(distribution, bounds, (*where, distribution)), _shape(base, where))
+    if isinstance(stated, Mapping) and {"start", "stop", "count"} <= set(stated) <= {"start", "stop", "count", "spacing"}:
+        if _shape(base, where):
+            raise InvalidInput(where, "a list of values (a grid is for one number, and this place holds a list)", shown(stated))
+        return Axis(path, _grid(stated, where, most_values))
+    forms = f"a list of values, a grid (start, stop, count, spacing), or one of {', '.join(_DISTRIBUTIONS)} with two numbers"
+    raise InvalidInput(where, forms, shown(stated))
+
+
+def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
+    if not 1 <= len(stated) <= most:
+        raise InvalidInput(where, f"1 to {most} values", str(len(stated)))
+    names = [name for name, _ in components("", base)]
+    for i, value in enumerate(stated):
+        scalars = dict(components("", value))
+        if list(scalars) != names or isinstance(value, Mapping):
+            raise InvalidInput((*where, i), "a value of the same shape as in the problem", shown(value))
+        if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
+            raise InvalidInput((*where, i), "finite numbers", shown(value))
+    return stated
+
+
+def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
+    count, spacing = stated["count"], stated.get("spacing", "linear")
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
+        raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", shown(count))
+    if spacing not in _SPACINGS:
+        raise unknown_name((*where, "spacing"), spacing, _SPACINGS)
+    start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
+    if not math.isfinite(stop - start):
+        raise InvalidInput(where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}")
+    if spacing == "linear":
+        return [float(value) for value in np.linspace(start, stop, count)]
+    if min(start, stop) <= 0:
+        raise InvalidInput(where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}")
+    return [float(value) for value in np.geomspace(start, stop, count)]
+
+
+def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
+    if not isinstance(stated, list) or len(stated) != 2:
+        raise InvalidInput(where, "two numbers", shown(stated))
+    first, second = (float(exact_number(value, (*where, i))) for i, value in enumerate(stated))
+    if distribution == "normal":
+        if second < 0:
+            raise InvalidInput((*where, 1), "a standard deviation of at least 0", f"{second:g}")
+    elif not first <= second or not math.isfinite(second - first):
+        raise InvalidInput(where, "the lower bound first", f"{first:g}, {second:g}")
+    elif distribution == "log_uniform" and first <= 0:
+        raise InvalidInput((*where, 0), "a positive bound", f"{first:g}")
+    return first, second
+
+
+def _shape(base: Any, where: Path) -> tuple[int, ...]:
+    """Return the shape of the numbers at a place; raises InvalidInput where it holds something else."""
+    if isinstance(base, list):
+        inner = {_shape(item, where) for item in base}
+        if len(inner) != 1:
+            raise InvalidInput(where, "a place that holds a number, a vector or a matrix", shown(base))
+        return (len(base), *inner.pop())
+    exact_number(base, where)
+    return ()

@@ -1,0 +1,144 @@
+"""What the command line prints: tables on a terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.json_documents import encoded
+
+__all__ = ["print_comparison", "print_json", "print_torus", "print_trajectory", "terminal"]
+
+#: Rows of a trajectory that a terminal is shown; files and JSON have all.
+_SHOWN_TIMES = 12
+
+#: Components of the series shown.
+_SHOWN_COMPONENTS = 6
+
+
+def terminal() -> Console:
+    """Return standard output. Tables keep their columns when it is a file; a terminal's own width is taken as it is."""
+    return Console(width=None if sys.stdout.isatty() else 120)
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """Print a document on one line."""
+    sys.stdout.buffer.write(encoded(document) + b"\n")
+    sys.stdout.buffer.flush()
+
+
+def _table(*columns: str) -> Table:
+    table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+    return table
+
+
+def _heading(console: Console, text: str) -> None:
+    console.print(f"\n{text}", style="bold", highlight=False)
+
+
+def _describe(trajectory: Trajectory) -> str:
+    problem, provenance = trajectory.problem, trajectory.provenance
+    count, shown = trajectory.times.size, _told_apart(np.array([trajectory.times.min(), trajectory.times.max()]))
+    span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
+    return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
+
+
+def _told_apart(times: Any) -> list[str]:
+    """Return times in the fewest digits, six or more, in which no two are the same."""
+    different = np.unique(times).size
+    for digits in range(6, 18):
+        texts = [f"{time:z.{digits}g}" for time in times.tolist()]
+        if len(set(texts)) == different:
+            break
+    return texts
+
+
+def print_trajectory(console: Console, trajectory: Trajectory) -> None:
+    """Print the motion at some of its times, the error and the drift of the integrals."""
+    console.print(_describe(trajectory), highlight=False)
+    problem = trajectory.problem
+    series = trajectory.series(problem.portrait)
+    rows = series.reshape(series.shape[0], -1)
+    names = [problem.portrait + "".join(f"_{i + 1}" for i in index) for index in np.ndindex(series.shape[1:])]
+    more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
+    clock = ["tau1"] if "tau1" in problem.outputs else []
+    table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
+    error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
+    shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
+    for i, time in zip(shown, _told_apart(trajectory.times[shown]), strict=True):
+        components = [
+            *(f"{trajectory.series(name)[i]:z.6f}" for name in clock),
+            *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
+        ]
+        table.add_row(time, *components, *more, f"{error[i]:.1e}")
+    console.print(table)
+    _print_drift(console, {trajectory.provenance.engine: trajectory})
+
+
+def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:
+    _heading(console, "Drift of the integrals of motion")
+    table = _table("integral", *trajectories)
+    drifts = [trajectory.drift for trajectory in trajectories.values()]
+    for name in drifts[0]:
+        table.add_row(name, *(f"{drift[name]:.1e}" for drift in drifts))
+    console.print(table)
+
+
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print how the engines agree, quantity by quantity, against their errors and the conditioning floor."""
+    console.print(_describe(comparison.analytic), highlight=False)
+    console.print(_describe(comparison.numeric), highlight=False)
+    _heading(console, "Largest difference of the two engines")
+    table = _table("output", "deviation")
+    for name, value in comparison.deviation.items():
+        table.add_row(name, f"{value:.1e}")
+    console.print(table)
+    _heading(console, "What to hold it against")
+    table = _table("bound", "largest value")
+    table.add_row("error bound, analytic", f"{np.max(comparison.analytic.error):.1e}")
+    table.add_row("error bound, numeric", f"{np.max(comparison.numeric.error):.1e}")
+    table.add_row("conditioning floor (one rounding of the data)", f"{np.max(comparison.conditioning_floor):.1e}")
+    console.print(table)
+    _print_drift(console, {"analytic": comparison.analytic, "numeric": comparison.numeric})
+    verdict = (
+        "The engines agree within their error bounds." if comparison.agrees else "The engines DISAGREE beyond their error bounds."
+    )
+    console.print(f"\n{verdict}", highlight=False)
+
+
+def print_torus(console: Console, torus: Torus, time: str) -> None:
+    """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own ``time``, periods."""
+    energy = "energy beyond the range of a float" if torus.energy is None else f"energy {torus.energy:.12g}"
+    console.print(f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}", highlight=False)
+    _heading(console, "Branch points")
+    table = _table("b", "origin", "value")
+    for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
+        table.add_row(f"b_{j}", origin, f"{value:.15g}")
+    console.print(table)
+    _heading(console, "Phases (cycles)")
+    table = _table("s", "z⁰", "per unit τ₁", f"per unit {time}", "action J_s")
+    columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
+    for s, row in enumerate(zip(*columns, strict=True), start=1):
+        table.add_row(str(s), *(f"{x:.15g}" for x in row))
+    console.print(table)
+    if torus.periods is not None:
+        _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
+    _print_matrix(console, f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})", torus.riemann_matrix)
+
+
+def _print_matrix(console: Console, title: str, matrix: Any) -> None:
+    _heading(console, title)
+    table = _table(*("" for _ in range(matrix.shape[1])))
+    for row in matrix:
+        table.add_row(*(f"{x: .12g}" for x in row))
+    console.print(table)

@@ -1,0 +1,169 @@
+"""Sweeps without a server: the same jobs, run in this process and its workers, and resumed where they were interrupted."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import anyio
+from anyio.from_thread import start_blocking_portal
+
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, install_extra, shown
+from veselova.mechanics.core.problem import Problem
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import read_request
+from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepRequest, sweep_document
+from veselova.service.cli.script_guard import unguarded
+from veselova.service.http.server import settings_of_environment
+
+if TYPE_CHECKING:
+    from veselova.service.sweeps.job_store import Job, Jobs
+
+__all__ = ["local_settings", "run_sweep", "sweep"]
+
+#: Called with the numbers of problems done and in all.
+Report = Callable[[int, int], None]
+
+#: So many problems are computed in this process, and more where they take less than so many seconds: starting others takes some.
+_FEW = 50
+_SOON_S = 3.0
+
+#: A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.
+_UNGUARDED = 'a script uses several processors where veselova.sweep is called below `if __name__ == "__main__":`'
+
+#: How often workers are asked for. A server goes on asking; here somebody waits.
+_TRIES = 3
+
+#: Seconds between two reports.
+_REPORT_S = 0.2
+
+
+def sweep(
+    problem: Problem | Mapping[str, Any],
+    vary: Mapping[str, Any],
+    *,
+    samples: int = 1,
+    seed: int = 0,
+    times: Any = None,
+    engine: str | None = None,
+    method: str | None = None,
+    formulation: str | None = None,
+    outputs: list[str] | None = None,
+    trajectories: bool = False,
+    budget_s: float = 10.0,
+    workers: int | None = None,
+    folder: str | Path | None = None,
+    progress: Report | None = None,
+) -> Any:
+    """Return the tori and, with ``times``, the motions of many problems as an xarray Dataset.
+
+    ``vary``: places in the problem's JSON, such as ``"/A/0"`` or ``"/q_dot"``, each with a list or an array of values, a grid
+    ``{"start", "stop", "count", "spacing"}``, or a distribution ``{"uniform": [low, high]}``, ``{"log_uniform": [low, high]}``,
+    ``{"normal": [mean, deviation]}``: ``samples`` draws are taken for each combination of the others, fixed by ``seed``.
+    Without ``times`` each problem gives its torus (constants, frequencies, actions, regime …); with them also the largest error,
+    the drift of the integrals and the extremes of the ``outputs``, and with ``trajectories`` these themselves. A problem that
+    cannot be solved, or not within ``budget_s`` seconds, has its reason in ``outcome`` and ``detail``.
+    What is done is kept in ``folder`` (default: that of the account's state), and a second call with the same arguments goes on
+    from there. ``workers``: processes; all processors when left out. ``progress(done, total)`` is called a few times a second.
+    Raises InvalidInput or InvalidRequest for bad input, BackendMissing without the extra ``sweeps``.
+    """
+    asked = sweep_document(problem, vary, times)
+    options: dict[str, Any] = {"samples": samples, "seed": seed, "engine": engine, "method": method, "formulation": formulation}
+    options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
+    request = read_request(SweepRequest, {**asked, **options})
+    settings = local_settings(folder, workers)
+    job, jobs = run_sweep(request, settings, progress or (lambda done, total: None))
+    from veselova.service.api.sweep_dataset import sweep_dataset
+
+    kept = jobs.packed_path(job.id)
+    return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
+
+
+def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
+    """Return the settings of sweeps in this process; those of a server in the environment hold, but for the folder."""
+    settings = settings_of_environment()
+    home = Path(folder) if folder is not None else settings.data_dir / "local"
+    changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
+    if workers is not None:
+        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+            raise InvalidInput(("workers",), "a whole number of at least 1", shown(workers))
+        changes["sweep_workers"] = workers
+    return Settings(**{**settings.model_dump(), **changes})
+
+
+def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tuple[Job, Jobs]:
+    """Run a sweep to its end and return its job, with the store in which its results are.
+
+    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra ``sweeps``, InvalidInput for a
+    folder that others may write, Refused where its storage fails or is damaged.
+    """
+    try:
+        from sqlalchemy.exc import SQLAlchemyError
+
+        from veselova.service.access.database import reason_of
+        from veselova.service.sweeps.job_store import Jobs
+        from veselova.service.sweeps.runner import Sweeps
+    except ImportError as error:
+        raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
+
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise RuntimeError(f"{_UNGUARDED}; it ran into the sweep of the process that started it")
+    try:
+        jobs = Jobs(settings)
+    except (OSError, SQLAlchemyError) as error:
+        raise Refused("storage-unavailable", f"{settings.data_dir} cannot keep the sweep: {reason_of(error)}.") from error
+
+    async def run() -> None:
+        sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
+        sweeps.begin(job.id)
+        ending = asyncio.ensure_future(sweeps.ended(job.id))
+        try:
+            while not ending.done():
+                await asyncio.wait([ending], timeout=_REPORT_S)
+                if progress := sweeps.progress(job.id):
+                    report(progress.done, request.total)
+        finally:
+            with anyio.CancelScope(shield=True):  # a portal cancels again whatever is awaited after it has cancelled
+                await sweeps.close()
+
+    with closing(jobs):
+        job = jobs.submit(request)
+        if not job.ended:
+            processes = _needs_processes(request, settings)
+            _in_a_loop_of_its_own(run)
+        job = jobs.get(job.id)
+        if job.state != "finished":
+            raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
+        report(job.total, job.total)
+    return job, jobs
+
+
+def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
+    """Return whether others than this process are to compute: only where they save more than it takes to start them."""
+    from veselova.service.sweeps.in_process_cluster import seconds_of
+
+    if settings.dask_scheduler:
+        return True
+    if request.total <= _FEW or seconds_of(request, _SOON_S) < _SOON_S:
+        return False
+    if unguarded():
+        warnings.warn(f"{_UNGUARDED}; the sweep is computed in this process alone", stacklevel=4)
+        return False
+    return True
+
+
+def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
+    """Run a coroutine to its end, from a notebook too, whose thread runs a loop already."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        asyncio.run(run())
+        return
+    with start_blocking_portal() as portal:  # an interrupt of this thread cancels what the other one runs
+        portal.call(run)

@@ -1,0 +1,277 @@
+"""The command line. Exit status: 0 solved, 1 could not be solved, 2 bad input."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from veselova.service.cli import server_commands
+from veselova.version import __version__
+
+__all__ = ["main"]
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+_File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input")]
+_Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
+_Output = Annotated[
+    Path | None, typer.Option(help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet, .arrow or .json")
+]
+_Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
+_Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
+
+
+def main() -> None:
+    """Run the command line; errors are one sentence on standard error."""
+    # As process 1 of a container the default action of SIGTERM would be to ignore it, and 143 is what a shell expects.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if sys.stdout is None or sys.stderr is None:  # started with a closed stream
+        raise SystemExit(1)
+    with _reported():
+        app()
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    from veselova.mechanics.core.errors import InvalidInput, VeselovaError
+    from veselova.service.api.problem_details import Refused
+
+    try:
+        yield
+    except InvalidInput as error:
+        _fail(str(error), 2)
+    except Refused as error:
+        _fail(str(error), 1 if error.code == "over-budget" else 2)
+    except VeselovaError as error:
+        _fail(str(error), 1)
+    except BrokenPipeError:  # the reader of our output has gone, as in `veselova solve … | head`
+        sys.stderr.close()
+        raise SystemExit(1) from None
+    except OSError as error:
+        _give_up_output()
+        _fail(f"writing {error.filename or 'the answer'} failed: {error.strerror or error}", 1)
+    except MemoryError:
+        _fail("not enough memory for so many times and so large a body", 1)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+
+
+def _give_up_output() -> None:
+    """Keep the interpreter from failing once more when it flushes what could not be written."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def _within_budget(document: Any) -> Iterator[None]:
+    """Stop the work after the ``budget_s`` that a file states; without one it may take as long as it takes."""
+    stated = document.get("budget_s") if isinstance(document, dict) else None
+    if not isinstance(stated, (int, float)) or stated <= 0 or not hasattr(signal, "setitimer"):
+        yield
+        return
+    from veselova.service.api.problem_details import Refused
+
+    def stop(*_: object) -> None:
+        raise Refused("over-budget", f"the work was stopped after its budget of {stated:g} s")
+
+    signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, stated)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def _fail(message: str, status: int) -> None:
+    # What a file says is not to steer a terminal.
+    print("veselova: " + re.sub(r"[^\n]", _printable, message), file=sys.stderr)
+    raise SystemExit(status)
+
+
+def _printable(letter: re.Match[str]) -> str:
+    text = letter.group()
+    return text if text.isprintable() else text.encode("unicode_escape").decode()
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="print the version")] = False) -> None:
+    """Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by integration."""
+    if version:
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command()
+def demo(method: _Method = None, plot: _Plot = None) -> None:
+    """Solve a four-dimensional body with both engines and show how they agree."""
+    from veselova.service.api.examples import BODY4
+
+    _compare({**BODY4, "method": method}, False, None, plot)
+
+
+@app.command()
+def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None) -> None:
+    """Solve a motion with one engine."""
+    from veselova.service.api.json_documents import trajectory_document
+    from veselova.service.api.request_models import TrajectoryRequest, read_request
+    from veselova.service.cli.console import print_json, print_trajectory, terminal
+    from veselova.service.workers.tasks import requested_trajectory
+
+    document = _document(file)
+    request = read_request(TrajectoryRequest, document)
+    _check_files(output, plot)
+    with _within_budget(document):
+        trajectory = requested_trajectory(request)
+    if output:
+        _write(trajectory, output, request.outputs)
+    if plot:
+        _draw(trajectory, plot)
+    if json:
+        print_json(trajectory_document(trajectory, request.outputs))
+    else:
+        print_trajectory(terminal(), trajectory)
+        _say_written(output, plot)
+
+
+@app.command()
+def compare(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None, method: _Method = None) -> None:
+    """Solve a motion with both engines and show how they agree."""
+    document = _document(file)
+    if method is not None and isinstance(document, dict):
+        document = {**document, "method": method}
+    _compare(document, json, output, plot)
+
+
+def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
+    from veselova.service.api.json_documents import comparison_document
+    from veselova.service.api.request_models import ComparisonRequest, read_request
+    from veselova.service.cli.console import print_comparison, print_json, terminal
+    from veselova.service.workers.tasks import requested_comparison
+
+    if isinstance(document, dict):
+        document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
+    request = read_request(ComparisonRequest, document)
+    _check_files(output, plot)
+    with _within_budget(document):
+        comparison = requested_comparison(request)
+    if output:
+        _write(comparison.analytic, output, request.outputs)
+    if plot:
+        _draw(comparison, plot)
+    if json:
+        print_json(comparison_document(comparison, request.outputs))
+    else:
+        print_comparison(terminal(), comparison)
+        _say_written(output, plot)
+
+
+@app.command()
+def torus(file: _File, json: _Json = False) -> None:
+    """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
+    from veselova.service.api.request_models import TorusRequest, read_request
+    from veselova.service.cli.console import print_json, print_torus, terminal
+    from veselova.service.workers.tasks import requested_torus
+
+    document = _document(file)
+    if isinstance(document, dict):  # the file of a motion serves here too
+        document = {name: value for name, value in document.items() if name not in _OF_MOTIONS}
+    request = read_request(TorusRequest, document)
+    with _within_budget(document):
+        answer = requested_torus(request)
+    if json:
+        print_json(answer.as_dict())
+    else:
+        print_torus(terminal(), answer, request.problem.problem_class.time)
+
+
+@app.command()
+def sweep(
+    file: _File,
+    json: _Json = False,
+    output: Annotated[Path | None, typer.Option(help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr")] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="where what is done is kept, so that a second start goes on from there")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes; all processors when left out")] = None,
+) -> None:
+    """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes on where it was."""
+    from veselova.service.cli.sweep_command import run
+
+    run(_document(file), json, output, folder, workers)
+
+
+@app.command()
+def bench(json: _Json = False) -> None:
+    """Measure the closed form against its peers on this machine, and print a table that can be pasted."""
+    from veselova.service.cli.bench import run
+    from veselova.service.cli.console import print_json
+
+    document = run(print if not json else lambda line: None)
+    if json:
+        print_json(document)
+
+
+app.command()(server_commands.serve)
+app.add_typer(server_commands.keys, name="keys")
+
+
+def _document(file: str) -> Any:
+    from veselova.mechanics.core.errors import InvalidInput
+    from veselova.service.api.json_text import decoded
+
+    if file == "-" and sys.stdin is None:
+        raise InvalidInput(("FILE",), "an open standard input", "a closed one")
+    try:
+        text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
+    except OSError as error:
+        raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
+    return decoded(text)
+
+
+#: Fields of a motion's request that say nothing of its torus.
+_OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
+
+_WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
+_PICTURES = (".png", ".pdf", ".svg")
+
+
+def _check_files(output: Path | None, plot: Path | None) -> None:
+    """Refuse a file name before the work, not after it."""
+    from veselova.mechanics.core.errors import InvalidInput
+
+    for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
+        if path is not None and not path.parent.is_dir():
+            raise InvalidInput((option,), "a file in an existing folder", str(path))
+        if path is not None and (path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK)):
+            raise InvalidInput((option,), "a file that can be written", str(path))
+
+
+def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:
+    from veselova.service.api.json_documents import encoded, trajectory_document
+
+    if path.suffix.lower() == ".json":
+        path.write_bytes(encoded(trajectory_document(trajectory, outputs)))
+    else:
+        getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
+
+
+def _say_written(output: Path | None, plot: Path | None) -> None:
+    for name, path in (("Motion", output), ("Picture", plot)):
+        if path is not None:
+            print(f"{name}: {path}")
+
+
+def _draw(subject: Any, path: Path) -> None:
+    subject.plot().savefig(path, dpi=130)

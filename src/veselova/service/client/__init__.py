@@ -1,0 +1,1 @@
+"""The Python client: requests, downloads, jobs on a server."""

@@ -1,0 +1,300 @@
+"""The HTTP client, synchronous and asynchronous from one core. Loads neither engine.
+
+with veselova.Client("http://127.0.0.1:8000") as client:
+    trajectory = client.trajectory(problem, times=[0, 1, 2])
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import random
+import re
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from itertools import count
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+
+import anyio
+import httpx2 as httpx
+import orjson
+from anyio import to_thread
+
+from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
+from veselova.mechanics.core.problem import Problem
+from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
+from veselova.service.client.requests import Call, compare_call, download_call, torus_call, trajectory_call
+
+__all__ = ["AsyncClient", "Client"]
+
+T = TypeVar("T")
+P = ParamSpec("P")
+
+#: Statuses that may pass if the same request is sent again: too many requests, overload or a lost worker.
+_RETRIED_STATUSES = frozenset({429, 503})
+
+#: Seconds that the answer may take on its way beyond the budget of the work itself.
+_TRANSFER_S = 10.0
+
+
+#: Seconds before the second attempt and, at most, before a further one; a random part comes on top.
+_FIRST_WAIT_S, _LONGEST_WAIT_S, _JITTER_S = 0.2, 5.0, 0.2
+_LOG = logging.getLogger("veselova.client")
+
+#: Longest pause that a server can ask for.
+_LONGEST_PAUSE_S = 30.0
+#: Failures of the connection. An answer that did not come in time is not among them: asking again would double the load.
+_PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
+
+
+class _Retry(Exception):
+    """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may ask for a pause in seconds."""
+
+    def __init__(self, cause: Exception, pause: float | None = None) -> None:
+        self.cause = cause
+        self.pause = pause
+
+
+def _credentials(api_key: str) -> dict[str, str]:
+    """Return the header that shows a key; none for an empty one. The refusal does not quote what may be a secret."""
+    if not re.fullmatch(r"[\x21-\x7e]*", api_key):
+        raise InvalidInput(("api_key",), "a key of the server (printable ASCII, no spaces)", "other characters")
+    return {"authorization": f"Bearer {api_key}"} if api_key else {}
+
+
+class _Core:
+    """What both clients share: the address, the retries, the reading of answers."""
+
+    def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
+        self._base_url = base_url
+        self._attempts = attempts
+        self._credentials = _credentials(os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key)
+
+    def job(self, job_id: str) -> RemoteJob:
+        """Return a job of the server by its id."""
+        return RemoteJob(self, job_id)  # type: ignore[arg-type]
+
+    def _pause(self, call: Call[Any], retry: _Retry, attempt: int) -> float:
+        """Return the seconds after a failed attempt, doubled each time, and log them; raises the cause after the last."""
+        if attempt >= self._attempts:
+            raise retry.cause from None
+        pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(0.0, _JITTER_S)
+        pause = pause if retry.pause is None else retry.pause
+        _LOG.info("%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause)
+        return pause
+
+    def _request(self, call: Call[Any]) -> dict[str, Any]:
+        headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
+        timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
+        request = {"method": call.method, "url": call.path, "headers": headers, "timeout": timeout}
+        if call.body is not None:
+            headers["content-type"] = "application/json"
+            request["content"] = orjson.dumps(call.body)
+        return request
+
+    def _result(self, call: Call[T], response: httpx.Response) -> T:
+        """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
+        if response.is_success:
+            try:
+                return call.result(orjson.loads(response.content or b"null") if call.sink is None else response.headers)
+            except (ValueError, KeyError, TypeError):
+                raise ServiceError(f"{self._base_url}{call.path} answered with something else than a result") from None
+        try:
+            document = orjson.loads(response.content)
+        except orjson.JSONDecodeError:
+            document = None
+        if not isinstance(document, dict):
+            document = {"title": response.reason_phrase, "status": response.status_code, "detail": shown(response.text)}
+        failure = ProblemResponse(response.status_code, document)
+        if response.status_code not in _RETRIED_STATUSES:
+            raise failure
+        pause = response.headers.get("retry-after", "")
+        raise _Retry(failure, min(float(pause), _LONGEST_PAUSE_S) if pause.isdigit() else None)
+
+    def _unreachable(self, call: Call[Any], error: httpx.TransportError) -> Exception:
+        """Return the failure behind a transport error, to be retried where the connection itself failed."""
+        failure = ServiceUnreachable(f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}")
+        failure.__cause__ = error
+        passing = isinstance(error, _PASSING) and (call.sink is None or call.sink.untouched)
+        return _Retry(failure) if passing else failure
+
+
+class Client(_Core):
+    """A synchronous client. Every method answers with the same types as the library itself.
+
+    ``api_key`` is shown with every request; left out, that of the environment variable VESELOVA_API_KEY.
+    ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before anything is sent,
+    ProblemResponse with the server's problem document, ServiceUnreachable when no answer comes.
+    """
+
+    def __init__(
+        self,
+        base_url: str = "http://127.0.0.1:8000",
+        *,
+        attempts: int = 4,
+        api_key: str | None = None,
+        transport: Any = None,
+    ) -> None:
+        super().__init__(base_url, attempts=attempts, api_key=api_key)
+        self._http = httpx.Client(base_url=base_url, transport=transport)
+
+    def _send(self, call: Call[T]) -> T:
+        for attempt in count(1):
+            try:
+                return self._attempt(call)
+            except _Retry as retry:
+                pause = self._pause(call, retry, attempt)
+            time.sleep(pause)
+        raise AssertionError("attempts have no end but these")
+
+    def _attempt(self, call: Call[T]) -> T:
+        try:
+            with self._http.stream(**self._request(call)) as response:
+                self._receive(call, response)
+        except httpx.TransportError as error:
+            raise self._unreachable(call, error) from None
+        except RuntimeError as error:
+            raise ServiceError(f"the client is closed ({error})") from None
+        return self._result(call, response)
+
+    @staticmethod
+    def _receive(call: Call[Any], response: httpx.Response) -> None:
+        if call.sink is None or response.status_code != httpx.codes.OK:
+            response.read()
+            return
+        with call.sink.opened() as write:
+            for chunk in response.iter_bytes():
+                write(chunk)
+
+    @staticmethod
+    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[Client, P], T]:
+        def method(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
+            return self._send(call(*args, **kwargs))
+
+        method.__doc__ = call.__doc__
+        return method
+
+    trajectory = _method(trajectory_call)
+    download = _method(download_call)
+    compare = _method(compare_call)
+    torus = _method(torus_call)
+
+    def run(self, flow: Flow) -> Any:
+        """Carry out a flow of calls and pauses, and return what it ends with."""
+        answer: Any = None
+        while True:
+            try:
+                step = flow.send(answer)
+            except StopIteration as end:
+                return end.value
+            if isinstance(step, Pause):
+                time.sleep(step.seconds)
+            else:
+                answer = self._send(step)
+
+    def sweep(
+        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+    ) -> RemoteJob:
+        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
+
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
+        """
+        job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
+        return job
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class AsyncClient(_Core):
+    """The asynchronous client: the same methods, awaited."""
+
+    def __init__(
+        self,
+        base_url: str = "http://127.0.0.1:8000",
+        *,
+        attempts: int = 4,
+        api_key: str | None = None,
+        transport: Any = None,
+    ) -> None:
+        super().__init__(base_url, attempts=attempts, api_key=api_key)
+        self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
+
+    async def _send(self, call: Call[T]) -> T:
+        for attempt in count(1):
+            try:
+                return await self._attempt(call)
+            except _Retry as retry:
+                pause = self._pause(call, retry, attempt)
+            await anyio.sleep(pause)
+        raise AssertionError("attempts have no end but these")
+
+    async def _attempt(self, call: Call[T]) -> T:
+        try:
+            async with self._http.stream(**self._request(call)) as response:
+                await self._receive(call, response)
+        except httpx.TransportError as error:
+            raise self._unreachable(call, error) from None
+        except RuntimeError as error:
+            raise ServiceError(f"the client is closed ({error})") from None
+        return self._result(call, response)
+
+    @staticmethod
+    async def _receive(call: Call[Any], response: httpx.Response) -> None:
+        if call.sink is None or response.status_code != httpx.codes.OK:
+            await response.aread()
+            return
+        with call.sink.opened() as write:
+            async for chunk in response.aiter_bytes():
+                await to_thread.run_sync(write, chunk)
+
+    @staticmethod
+    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:
+        def method(self: AsyncClient, /, *args: P.args, **kwargs: P.kwargs) -> Awaitable[T]:
+            return self._send(call(*args, **kwargs))
+
+        method.__doc__ = call.__doc__
+        return method
+
+    trajectory = _method(trajectory_call)
+    download = _method(download_call)
+    compare = _method(compare_call)
+    torus = _method(torus_call)
+
+    async def run(self, flow: Flow) -> Any:
+        """Carry out a flow of calls and pauses, and return what it ends with."""
+        answer: Any = None
+        while True:
+            try:
+                step = flow.send(answer)
+            except StopIteration as end:
+                return end.value
+            if isinstance(step, Pause):
+                await anyio.sleep(step.seconds)
+            else:
+                answer = await self._send(step)
+
+    async def sweep(
+        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+    ) -> RemoteJob:
+        job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
+        return job
+
+    sweep.__doc__ = Client.sweep.__doc__
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()

@@ -1,0 +1,72 @@
+"""What a download is: one call of the client whose answer goes to a file as it comes, in a format of the server."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import orjson
+
+from veselova.mechanics.core.errors import InvalidInput, shown, unknown_name
+from veselova.mechanics.results.table import Target
+from veselova.mechanics.results.trajectory import Provenance
+from veselova.service.api.atomic_file import whole_file
+
+__all__ = ["MEDIA_TYPES", "Sink", "media_type_of", "provenance_of", "sink_of"]
+
+#: Format → media type; a test holds it against the formats of the server.
+MEDIA_TYPES: Mapping[str, str] = {
+    "json": "application/json",
+    "csv": "text/csv",
+    "npz": "application/x-npz",
+    "arrow": "application/vnd.apache.arrow.stream",
+    "parquet": "application/vnd.apache.parquet",
+}
+
+
+def media_type_of(name: Any) -> str:
+    """Return the media type of a format; raises InvalidInput for another name."""
+    if name not in MEDIA_TYPES:
+        raise unknown_name(("format",), name, list(MEDIA_TYPES))
+    return MEDIA_TYPES[name]
+
+
+def provenance_of(headers: Mapping[str, str]) -> Provenance:
+    """Return the provenance that the header of an answer states; raises KeyError or ValueError where it states none."""
+    return Provenance(**orjson.loads(headers["veselova-provenance"]))
+
+
+@dataclass
+class Sink:
+    """Where a download goes: a file that takes its name when it is whole, or an open stream, which can be written to once."""
+
+    path: Path | None
+    stream: BinaryIO | None
+    #: Whether nothing was written yet that cannot be taken back.
+    untouched: bool = True
+
+    @contextmanager
+    def opened(self) -> Iterator[Callable[[bytes], Any]]:
+        """Give what takes the chunks; the file appears, or replaces another, at the end of the block and not before."""
+        if self.stream is not None:
+            self.untouched = False
+            yield self.stream.write
+            return
+        assert self.path is not None
+        with whole_file(self.path) as part, part.open("xb") as file:
+            yield file.write
+
+
+def sink_of(target: Target) -> Sink:
+    """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, or a folder that is not there."""
+    if isinstance(target, (str, Path)):
+        path = Path(target)
+        if not path.parent.is_dir() or path.is_dir():
+            raise InvalidInput(("target",), "a file in an existing folder", shown(str(target)))
+        return Sink(path, None)
+    if not callable(getattr(target, "write", None)):
+        raise InvalidInput(("target",), "a path, or a binary stream that is open for writing", shown(target))
+    return Sink(None, target)

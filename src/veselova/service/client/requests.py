@@ -1,0 +1,115 @@
+"""What the client asks: a call is one request, and what its answer becomes. Loads neither engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.times import as_request
+from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.table import Target
+from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.service.api.json_documents import comparison_of, torus_of, trajectory_of
+from veselova.service.client.download import Sink, media_type_of, provenance_of, sink_of
+
+__all__ = ["Call", "compare_call", "download_call", "torus_call", "trajectory_call"]
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Call(Generic[T]):
+    """One request: where it goes, its body, how long it may take, and what its answer becomes.
+
+    A call with a sink writes the body of its answer there, and ``result`` is given the header instead.
+    """
+
+    path: str
+    body: Mapping[str, Any] | None
+    budget_s: float
+    result: Callable[[Any], T]
+    accept: str = "application/json"
+    sink: Sink | None = None
+    method: str = "POST"
+
+
+def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
+    """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated here already."""
+    if isinstance(problem, Problem):
+        return problem
+    if not isinstance(problem, Mapping):
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", shown(problem)
+        )
+    from veselova.service.api.request_models import TorusRequest, read_request
+
+    return read_request(TorusRequest, {"problem": dict(problem)}).problem.problem()
+
+
+def trajectory_call(
+    problem: Problem | Mapping[str, Any],
+    times: Any,
+    engine: str | None = None,
+    method: str | None = None,
+    *,
+    digits: int = FEWEST_DIGITS,
+    certified: bool = False,
+    formulation: str | None = None,
+    budget_s: float = 10.0,
+) -> Call[Trajectory]:
+    """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
+    asked = _problem(problem)
+    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
+    body = {**chosen, **_motion(asked, times, method, budget_s)}
+    return Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
+
+
+def download_call(
+    problem: Problem | Mapping[str, Any],
+    times: Any,
+    target: Target,
+    format: str = "npz",  # noqa: A002
+    engine: str | None = None,
+    method: str | None = None,
+    *,
+    outputs: Sequence[str] | None = None,
+    digits: int = FEWEST_DIGITS,
+    certified: bool = False,
+    formulation: str | None = None,
+    budget_s: float = 10.0,
+) -> Call[Provenance]:
+    """Write the motion to a path or a binary stream as it comes, as ``json``, ``csv``, ``npz``, ``arrow`` or ``parquet``, and
+    return its provenance; ``outputs`` names the series, all of the system when left out. A file appears when it is whole."""
+    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
+    motion = {**_motion(_problem(problem), times, method, budget_s), "outputs": None if outputs is None else list(outputs)}
+    accept, sink = media_type_of(format), sink_of(target)
+    return Call("/v1/trajectories", {**chosen, **motion}, budget_s, provenance_of, accept, sink)
+
+
+def compare_call(
+    problem: Problem | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
+) -> Call[Comparison]:
+    """Return both engines' motions and how they agree (see ``veselova.compare``)."""
+    asked = _problem(problem)
+    return Call("/v1/comparisons", _motion(asked, times, method, budget_s), budget_s, partial(comparison_of, asked))
+
+
+def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
+    """Return the invariant torus of a motion (see ``veselova.torus``)."""
+    return Call("/v1/tori", {"problem": _problem(problem).as_request(), "budget_s": budget_s}, budget_s, torus_of)
+
+
+def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
+    return {
+        "problem": problem.as_request(),
+        "times": as_request(times),
+        "method": method,
+        "outputs": list(problem.stored),
+        "budget_s": budget_s,
+    }

@@ -1,0 +1,1 @@
+"""The application, its routes, the protocol and the server."""

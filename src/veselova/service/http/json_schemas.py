@@ -1,0 +1,185 @@
+"""JSON schemas of all requests and answers: for the OpenAPI document, and for /v1/schemas, where each stands alone."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import orjson
+from pydantic.json_schema import models_json_schema
+
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.http.job_document import JobDocument, JobList
+from veselova.service.workers.tasks import TASKS
+
+__all__ = ["PREFIX", "component_schemas", "schema_document", "schema_names"]
+
+#: Where the schemas stand in the OpenAPI document.
+PREFIX = "#/components/schemas/"
+
+_NUMBERS: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+_MATRIX: dict[str, Any] = {"type": "array", "items": _NUMBERS}
+
+
+def _series(number: dict[str, Any]) -> dict[str, Any]:
+    """Return the schemas of all outputs, by the schema of their numbers."""
+    schemas: dict[str, Any] = {}
+    for model in SYSTEMS.values():
+        for name, axes in model.problem_class.outputs.items():
+            schemas[name] = number
+            for _ in range(len(axes) + 1):
+                schemas[name] = {"type": "array", "items": schemas[name]}
+    return schemas
+
+
+_TEXT = {"type": "string"}
+_TEXTS = {"type": "array", "items": _TEXT}
+_DECIMAL = {"type": "string", "pattern": r"^-?\d", "description": "a decimal"}
+_NUMBER_OR_DECIMAL = {"anyOf": [{"type": "number"}, _DECIMAL]}
+_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
+
+
+def _object(properties: dict[str, Any], required: list[str] | None = None) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "required": list(properties) if required is None else required}
+
+
+_PROVENANCE = _object(
+    {
+        "engine": {"type": "string"},
+        "method": {"type": "string"},
+        "digits": {"type": "integer"},
+        "version": {"type": "string"},
+        "seconds": {"type": "number"},
+        "details": {"type": "object"},
+    }
+)
+
+#: Schemas of answers, by their names; a problem document is one of them.
+_ANSWERS: dict[str, dict[str, Any]] = {
+    "Trajectory": _object(
+        {
+            "engine": {"type": "string"},
+            "times": {**_NUMBERS, "description": "the doubles nearest to the times asked for, in their order"},
+            "remainders": {
+                **_NUMBERS,
+                "description": "what the exact times are beyond these doubles; left out where that is nothing",
+            },
+            "series": {
+                **_object(_series(_NUMBER_OR_DECIMAL), required=[]),
+                "description": f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for",
+            },
+            "radii": {**_object(_series(_DECIMAL), required=[]), "description": "the error of every decimal"},
+            "integrals": {
+                "type": "object",
+                "additionalProperties": _object(
+                    {"initial": {"anyOf": [{"type": "number"}, _NUMBERS]}, "drift": {"type": "number"}}
+                ),
+            },
+            "error": {
+                "type": "array",
+                "items": _NUMBER_OR_DECIMAL,
+                "description": "bounds the true error of every component of the bounded series at each time: true ≤ error; "
+                "bounded series of system veselova: q and frame",
+            },
+            "provenance": _PROVENANCE,
+        },
+        required=["engine", "times", "series", "integrals", "error", "provenance"],
+    ),
+    "Comparison": _object(
+        {
+            "deviation": {**_BY_NAME, "description": "largest difference of the engines, per output"},
+            "agrees": {"type": "boolean", "description": "whether they differ by no more than the sum of both errors"},
+            "conditioning_floor": {"type": "number", "description": "what one rounding of the data moves at the last time"},
+            "error": _BY_NAME,
+            "drift": {"type": "object", "additionalProperties": _BY_NAME},
+            "seconds": _BY_NAME,
+            "provenance": {"type": "object", "additionalProperties": _PROVENANCE},
+            "analytic": {"$ref": f"{PREFIX}Trajectory"},
+            "numeric": {"$ref": f"{PREFIX}Trajectory"},
+        }
+    ),
+    "Torus": _object(
+        {
+            "n": {"type": "integer"},
+            "energy": {"anyOf": [{"type": "number"}, {"type": "null"}], "description": "null beyond the range of a double"},
+            "constants": _NUMBERS,
+            "branch_points": _NUMBERS,
+            "origins": {"type": "array", "items": {"type": "string"}},
+            "periods": {"anyOf": [_MATRIX, {"type": "null"}], "description": "null beyond the range of a double"},
+            "riemann_matrix": _MATRIX,
+            "riemann_matrix_residual": {"type": "number"},
+            "frequencies_tau1": _NUMBERS,
+            "frequencies_t": _NUMBERS,
+            "phases": _NUMBERS,
+            "mean_rate": {"type": "number"},
+            "regime": {"type": "string"},
+        }
+    ),
+    "Problem": _object(
+        {
+            "type": {"type": "string", "examples": ["urn:veselova:problem:invalid-input"]},
+            "title": {"type": "string"},
+            "status": {"type": "integer"},
+            "detail": {"type": "string"},
+            "outcome": {"type": "string", "description": "the named outcome of an engine that cannot serve the problem"},
+            "errors": {"type": "array", "items": _object({"pointer": {"type": "string"}, "detail": {"type": "string"}})},
+        },
+        required=["type", "title", "status", "detail"],
+    ),
+    "SystemList": _object(
+        {
+            "systems": {
+                "type": "array",
+                "items": _object(
+                    {
+                        **dict.fromkeys(("system", "title", "schema", "time"), _TEXT),
+                        **dict.fromkeys(("fields", "formulations", "outputs"), _TEXTS),
+                        "engines": {"type": "object", "additionalProperties": _TEXTS, "description": "engine → its methods"},
+                    }
+                ),
+            },
+            "version": _TEXT,
+            "limits": {**_BY_NAME, "description": "largest dimension, most times, longest budget"},
+        }
+    ),
+    "SchemaList": _object({"schemas": {"type": "array", "items": _object(dict.fromkeys(("name", "title", "link"), _TEXT))}}),
+    "Health": _object({"status": _TEXT, "version": _TEXT}, required=["status"]),
+}
+
+
+@cache
+def _components() -> bytes:
+    """Return all schemas by their names, as JSON."""
+    requests: list[tuple[Any, Any]] = [(model, "validation") for model in (*(model for model, _ in TASKS.values()), SweepRequest)]
+    jobs: list[tuple[Any, Any]] = [(model, "serialization") for model in (JobDocument, JobList)]
+    _, definitions = models_json_schema([*requests, *jobs], ref_template=PREFIX + "{model}")
+    return orjson.dumps({**definitions["$defs"], **_ANSWERS})
+
+
+def component_schemas() -> dict[str, Any]:
+    """Return the schemas of all requests and answers by their names, which refer to one another below ``PREFIX``."""
+    return dict(orjson.loads(_components()))
+
+
+def schema_names() -> dict[str, str]:
+    """Return the names of all schemas, and what each is of, in a sentence (of an answer, its name)."""
+    return {name: schema.get("description", name).split("\n")[0] for name, schema in component_schemas().items()}
+
+
+def schema_document(name: str) -> dict[str, Any]:
+    """Return one schema by its name, those that it refers to among its ``$defs``; raises KeyError."""
+    schemas = component_schemas()
+    schema, needed, found = schemas[name], {name}, set[str]()
+    while needed := {other for known in needed for other in _references(schemas[known])} - found:
+        found |= needed
+    definitions = {other: schemas[other] for other in schemas if other in found}
+    text = orjson.dumps({**schema, "$defs": definitions}).decode().replace(PREFIX, "#/$defs/")
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, "$id": f"urn:veselova:schema:{name}", **orjson.loads(text)}
+
+
+def _references(schema: dict[str, Any]) -> list[str]:
+    return re.findall(f'"{PREFIX}([^"]*)"', orjson.dumps(schema).decode())

@@ -1,0 +1,166 @@
+"""The OpenAPI document: routes read their bodies themselves, so the models are put in here, with worked examples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from veselova.service.answers.endpoint import PROVENANCE
+from veselova.service.api.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.api.media_types import FORMATS
+from veselova.service.api.problem_details import MEDIA_TYPE
+from veselova.service.http.json_schemas import PREFIX, component_schemas
+from veselova.service.http.routes import KEPT, RESOURCES, SCHEMA
+from veselova.service.workers.tasks import TASKS
+from veselova.version import __version__
+
+__all__ = ["openapi_document"]
+
+_REFUSALS = {
+    400: "Not JSON",
+    401: "No API key of this server, where it requires one",
+    403: "The scope of the API key does not allow it",
+    406: "No acceptable representation",
+    413: "Body too large",
+    415: "Not application/json",
+    422: "Invalid input, or a problem that the engine cannot serve",
+    429: "Too many requests of one key or address; see Retry-After",
+    500: "The server failed",
+    501: "An optional library is not installed on this server",
+    503: "Overloaded, or the worker was lost; see Retry-After",
+    504: "Over the time budget",
+    507: "The work needs more memory than a worker has, or the disk is full",
+}
+
+#: Refusals of one path alone, and what a GET of a kept trajectory can be refused for.
+_PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
+_KEPT_REFUSALS = {
+    404: "Not kept, or not any more",
+    **{status: _REFUSALS[status] for status in (401, 403, 406, 429, 500, 503, 504, 507)},
+}
+
+#: Refusals of the resources of jobs, and of those that every other path has.
+_JOB_REFUSALS = {
+    **{status: _REFUSALS[status] for status in (401, 403, 422, 429, 500, 501)},
+    404: "No such job",
+    406: "No acceptable representation",
+    409: "The job has not finished",
+    503: "Jobs cannot be stored or read at present; see Retry-After",
+}
+_SWEEP_REFUSALS = {status: _REFUSALS[status] for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)}
+_COMMON_REFUSALS = {status: _REFUSALS[status] for status in (401, 403, 429, 500, 503)}
+_SCHEMA_REFUSALS = {404: "No schema of this name", **_COMMON_REFUSALS}
+
+_TEXT = {"schema": {"type": "string"}}
+#: Header fields of a trajectory, in every format.
+_FIELDS: dict[str, dict[str, Any]] = {
+    "ETag": {"description": "hash of the request, its defaults filled in and its budget left out, and the format", **_TEXT},
+    "Content-Location": {"description": "where a GET gives this trajectory, in any format, while it is kept", **_TEXT},
+    PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
+}
+_NAME = {
+    "name": "name",
+    "in": "path",
+    "required": True,
+    "description": "the last part of the Content-Location of an answer",
+    "schema": {"type": "string"},
+}
+_CONDITION = {
+    "name": "If-None-Match",
+    "in": "header",
+    "required": False,
+    "description": "an ETag: nothing is sent if it is still that of the answer",
+    "schema": {"type": "string"},
+}
+
+
+def openapi_document(app: FastAPI) -> dict[str, Any]:
+    """Return the OpenAPI document of the application, built once."""
+    if app.openapi_schema is None:
+        document = get_openapi(
+            title="veselova",
+            version=__version__,
+            summary="Motions of an n-dimensional rigid body under the Veselova constraint",
+            description="POST a problem and times; receive the motion in theta functions or by integration, with its error.",
+            routes=app.routes,
+        )
+        document.setdefault("components", {})["schemas"] = component_schemas()
+        for path, (kind, _, content) in RESOURCES.items():
+            _describe(document["paths"][path]["post"], kind, content)
+        for path, operations in document["paths"].items():
+            for operation in operations.values():
+                if path not in RESOURCES:
+                    operation["responses"].pop("422", None)  # the framework's: all refusals are problem documents here
+                    _refuse(operation, _refusals(path))
+        document["paths"][KEPT] = {"get": _kept(), "head": _kept_head()}
+        document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
+        document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
+        app.openapi_schema = document
+    return app.openapi_schema
+
+
+def _refusals(path: str) -> dict[int, str]:
+    if path == "/v1/sweeps":
+        return _SWEEP_REFUSALS
+    if path == SCHEMA:
+        return _SCHEMA_REFUSALS
+    return _JOB_REFUSALS if path.startswith("/v1/jobs") else _COMMON_REFUSALS
+
+
+def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
+    """Put the body, the answer and the refusals of one resource into its operation."""
+    example = (
+        {"problem": BODY4_PROBLEM} if kind == "torus" else {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}
+    )
+    body = {"schema": {"$ref": f"{PREFIX}{TASKS[kind][0].__name__}"}, "example": example}
+    operation["requestBody"] = {"required": True, "content": {"application/json": body}}
+    answer: dict[str, Any] = {"schema": {"$ref": f"{PREFIX}{kind.capitalize()}"}}
+    if kind in ANSWERS:
+        answer["example"] = ANSWERS[kind]
+    refusals = _REFUSALS
+    operation["responses"] = {"200": {"description": content, "content": {"application/json": answer}}}
+    if kind == "trajectory":
+        operation["parameters"], refusals = [_CONDITION], {**_REFUSALS, **_PRECONDITION}
+        operation["responses"]["200"] = _trajectory(content, answer)
+    _refuse(operation, refusals)
+
+
+def _kept() -> dict[str, Any]:
+    """Return the operation that gives a kept trajectory."""
+    answer = {"schema": {"$ref": f"{PREFIX}Trajectory"}}
+    operation: dict[str, Any] = {
+        "tags": ["motions"],
+        "summary": "Give a trajectory that is kept",
+        "operationId": "get_trajectory",
+        "parameters": [_NAME, _CONDITION],
+        "responses": {
+            "200": _trajectory("The trajectory", answer),
+            "304": {"description": "The client has it already", "headers": {"ETag": _FIELDS["ETag"]}},
+        },
+    }
+    _refuse(operation, _KEPT_REFUSALS)
+    return operation
+
+
+def _kept_head() -> dict[str, Any]:
+    """Return the operation that gives the header of a kept trajectory alone."""
+    statuses = {200: "It is kept", 304: "The client has it already", 404: "Not kept, or not any more", 406: _REFUSALS[406]}
+    responses = {str(status): {"description": description} for status, description in statuses.items()}
+    named = {"tags": ["motions"], "summary": "Tell whether a trajectory is kept", "operationId": "head_trajectory"}
+    return {**named, "parameters": [_NAME, _CONDITION], "responses": responses}
+
+
+def _trajectory(description: str, answer: dict[str, Any]) -> dict[str, Any]:
+    """Return the response that has a trajectory in one of its formats."""
+    table = {"text/csv": _TEXT}
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    content = {form.media_type: table.get(form.media_type, binary) for form in FORMATS.values()}
+    return {"description": description, "headers": _FIELDS, "content": {**content, "application/json": answer}}
+
+
+def _refuse(operation: dict[str, Any], refusals: dict[int, str]) -> None:
+    problem = {MEDIA_TYPE: {"schema": {"$ref": f"{PREFIX}Problem"}}}
+    for status, description in sorted(refusals.items()):
+        operation["responses"][str(status)] = {"description": description, "content": problem}

@@ -1,0 +1,147 @@
+"""The resources of the HTTP API."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import orjson
+from fastapi import APIRouter, Request
+from fastapi.routing import APIRoute
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from veselova.mechanics.core.errors import shown
+from veselova.service.answers.endpoint import Answers
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.settings import Settings
+from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
+from veselova.version import __version__
+
+__all__ = ["KEPT", "RESOURCES", "SCHEMA", "router"]
+
+#: The path of trajectories, and that of those which are kept.
+TRAJECTORIES, KEPT = "/v1/trajectories", "/v1/trajectories/{name}"
+
+#: The path of one JSON schema.
+SCHEMA = "/v1/schemas/{name}"
+
+#: The media type of JSON schemas.
+_SCHEMA_TYPE = "application/schema+json"
+
+#: Path → (kind of answer, summary, what the answer holds).
+RESOURCES = {
+    TRAJECTORIES: ("trajectory", "Solve a motion with one engine", "The motion at the given times"),
+    "/v1/comparisons": ("comparison", "Solve a motion with both engines", "Both motions and how they agree"),
+    "/v1/tori": ("torus", "Describe the invariant torus of a motion", "Curve, periods, frequencies, phases"),
+}
+
+#: Kind of answer → operation id: names of functions in generated clients, which never change.
+_OPERATIONS = {"trajectory": "solve_trajectory", "comparison": "compare_engines", "torus": "compute_torus"}
+
+
+def _systems() -> list[dict[str, Any]]:
+    """Return the systems served, for clients that discover them."""
+    return [
+        {
+            "system": name,
+            "title": (model.__doc__ or "").strip().splitlines()[0],
+            "schema": SCHEMA.format(name=model.__name__),
+            "fields": [field for field in model.model_fields if field != "system"],
+            "engines": {engine: list(methods) for engine, methods in model.problem_class.engines.items()},
+            "formulations": list(model.problem_class.formulations),
+            "outputs": list(model.problem_class.outputs),
+            "time": model.problem_class.time,
+        }
+        for name, model in SYSTEMS.items()
+    ]
+
+
+def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable[list[str]]]) -> APIRouter:
+    """Return the routes of one server, over its settings, its answers, and what says which of its parts are missing."""
+    routes = APIRouter()
+    for path, (kind, summary, _) in RESOURCES.items():
+        answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
+        described: dict[str, Any] = {"operation_id": _OPERATIONS[kind], "summary": summary, "name": kind, "tags": ["motions"]}
+        routes.add_api_route(path, answer, methods=["POST"], route_class_override=_Direct, **described)
+
+    async def kept(request: Request) -> Response:
+        return await answers.named(request.path_params["name"], request)
+
+    # A route of Starlette, for GET and HEAD at once; openapi describes it.
+    routes.add_route(KEPT, kept, methods=["GET"], name="kept")
+
+    async def systems() -> Response:
+        return _json({"systems": _systems(), "version": __version__, "limits": settings.limits})
+
+    async def schemas() -> Response:
+        listed = [{"name": name, "title": title, "link": SCHEMA.format(name=name)} for name, title in schema_names().items()]
+        return _json({"schemas": listed})
+
+    async def schema(name: str) -> Response:
+        try:
+            return _json(schema_document(name), _SCHEMA_TYPE)
+        except KeyError:
+            raise Refused("no-such-resource", f"No schema is called {shown(name)}; GET /v1/schemas lists all.") from None
+
+    async def healthz() -> Response:
+        return _json({"status": "ok", "version": __version__})
+
+    async def readyz() -> Response:
+        if parts := await missing():
+            raise Refused("not-ready", " ".join(parts), retry_after=1)
+        return _json({"status": "ready"})
+
+    table: tuple[tuple[str, Any, str, str, dict[str, Any]], ...] = (
+        ("/v1/systems", systems, "list_systems", "List the systems that can be solved", _described("SystemList")),
+        ("/v1/schemas", schemas, "list_schemas", "List the JSON schemas of requests and answers", _described("SchemaList")),
+        (SCHEMA, schema, "get_schema", "Give one JSON schema", {_SCHEMA_TYPE: {"schema": {"type": "object"}}}),
+        ("/healthz", healthz, "check_health", "Whether the server runs", _described("Health")),
+        (
+            "/readyz",
+            readyz,
+            "check_readiness",
+            "Whether the server can answer: a warm worker, its database",
+            _described("Health"),
+        ),
+    )
+    for path, endpoint, operation, summary, content in table:
+        named: dict[str, Any] = {"operation_id": operation, "summary": summary, "tags": ["service"]}
+        named["responses"] = {200: {"description": summary, "content": content}}
+        routes.add_api_route(path, endpoint, methods=["GET"], response_class=Response, **named)
+        routes.add_api_route(path, endpoint, methods=["HEAD"], include_in_schema=False)
+
+    return routes
+
+
+class _Direct(APIRoute):
+    """A route whose endpoint reads the request itself: the framework looks for no parameters, which takes as long as the rest.
+
+    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of the application.
+    """
+
+    def __init__(self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any) -> None:
+        super().__init__(path, endpoint, **described)
+
+        async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+            response = await endpoint(Request(scope, receive, send))
+            await response(scope, receive, send)
+
+        self.app = answer
+
+
+def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:
+    async def answer(request: Request) -> Response:
+        return await answers.document(kind, request)
+
+    return answer
+
+
+def _described(name: str) -> dict[str, Any]:
+    """Return the content of an answer that a schema describes."""
+    return {"application/json": {"schema": {"$ref": f"{PREFIX}{name}"}}}
+
+
+def _json(document: dict[str, Any], media_type: str = "application/json") -> Response:
+    return Response(orjson.dumps(document), media_type=media_type)

@@ -1,0 +1,127 @@
+"""``veselova serve``: settings, the address, and uvicorn around the application."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import os
+import signal
+import socket
+import sys
+from functools import partial
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.api.settings import Settings
+from veselova.service.sweeps.cluster import require_scheduler
+from veselova.service.workers.signals import keep_from_children
+
+__all__ = ["serve", "settings_of_environment"]
+
+_LOG = logging.getLogger("veselova.service")
+
+#: Connections that the system keeps until they are accepted; asyncio tries as many at a time.
+_BACKLOG = 256
+
+#: The key that a client of this environment shows; no setting of the server.
+_OF_THE_CLIENT = {"VESELOVA_API_KEY"}
+
+
+def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips: str | None = None, **stated: Any) -> None:
+    """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an address or a setting.
+
+    ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the proxies whose X-Forwarded-For
+    is believed (uvicorn's option), none when left out.
+    """
+    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    _drain_when_hung_up()
+    # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.umask(0o077)  # what the server and its workers write is this account's alone
+    limits = settings_of_environment(**stated)
+    if settings_only:
+        for name, value in limits.model_dump().items():
+            print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
+        return
+    _require_addresses(limits)
+    loopback = _bindable(host, port)
+    import uvicorn
+
+    from veselova.service.access.middleware import Policy
+    from veselova.service.http.app import create_app
+    from veselova.service.http.connections import Connections, use_all_descriptors
+    from veselova.service.http.h11_protocol import Http
+    from veselova.service.observability.logs import configure_logging
+
+    configure_logging(limits)
+    use_all_descriptors()
+    keep_from_children()  # work in flight gets its grace after SIGINT as after SIGTERM
+    app = create_app(limits, loopback=loopback)
+    if not loopback and not Policy.requires_keys(limits, loopback):
+        _LOG.warning("clients need no key although %s is no loopback address: whoever reaches it can use the service", host)
+    uvicorn.run(
+        app,
+        host=host,
+        port=port,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
+        http=cast(Any, partial(Http, limits, Connections(limits))),
+        timeout_keep_alive=limits.keep_alive_s,
+        backlog=_BACKLOG,
+        proxy_headers=forwarded_allow_ips is not None,
+        forwarded_allow_ips=forwarded_allow_ips,
+        timeout_graceful_shutdown=limits.shutdown_grace_s,
+    )
+
+
+def _drain_when_hung_up() -> None:
+    """Take the end of the terminal (SIGHUP) for SIGTERM, unless it is to be ignored (nohup)."""
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+
+
+def settings_of_environment(**stated: Any) -> Settings:
+    """Return the settings of the environment with those stated; raises InvalidInput for one that is not valid."""
+    known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} | _OF_THE_CLIENT
+    for name in sorted(os.environ):
+        if name.startswith("VESELOVA_") and name not in known:
+            print(f"veselova: {name} is not one of its settings (veselova serve --settings lists them)", file=sys.stderr)
+    try:
+        return Settings(**{name: value for name, value in stated.items() if value is not None})
+    except ValidationError as error:
+        item = error.errors()[0]
+        name = f"VESELOVA_{str(item['loc'][0]).upper()}"
+        required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
+        raise InvalidInput((name,), required[:1].lower() + required[1:], str(item["input"])) from None
+
+
+def _require_addresses(limits: Settings) -> None:
+    """Refuse addresses of a scheduler or a database that cannot be followed."""
+    from veselova.service.access.database import database_url
+
+    require_scheduler(limits)
+    database_url(limits)
+
+
+def _bindable(host: str, port: int) -> bool:
+    """Return whether an address is one of loopback.
+
+    An address that cannot be bound is refused in the words of the other refusals, before anything is started.
+    """
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except socket.gaierror as error:
+        raise InvalidInput(("--host",), "an address of this machine", f"{host} ({error.strerror})") from None
+    family, kind, protocol, _, address = found[0]
+    with socket.socket(family, kind, protocol) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(address)
+        except OSError as error:
+            raise InvalidInput(("--port",), "an address and a port to bind", f"{host}:{port} ({error.strerror})") from None
+    return all(ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found)

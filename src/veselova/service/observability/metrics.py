@@ -1,0 +1,103 @@
+"""What a server counts, for Prometheus: each application has a registry of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import FastAPI
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+from prometheus_fastapi_instrumentator import Instrumentator
+
+from veselova.service.api.problem_details import problem_code
+from veselova.service.observability.request_log import note
+from veselova.version import __version__
+
+__all__ = ["Ending", "Metrics"]
+
+#: Seconds of work: from a torus that is a millisecond to the longest budget.
+_BUCKETS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 60)
+
+
+@dataclass
+class Ending:
+    """What is found out about work while it is done: whether its answer was ``kept``."""
+
+    kept: bool = False
+
+
+class Metrics:
+    """The counters of one application."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        here: dict[str, Any] = {"registry": self.registry}
+        ProcessCollector(registry=self.registry)
+        Gauge("veselova_info", "Version of the server", ["version"], **here).labels(__version__).set(1)
+        self._seconds = Histogram(
+            "veselova_work_seconds", "Work on one request, waiting included", ["kind", "engine"], buckets=_BUCKETS, **here
+        )
+        self._outcomes = Counter("veselova_outcomes", "Work by how it ended", ["kind", "engine", "outcome"], **here)
+        self._refusals = Counter("veselova_refusals", "Requests refused by the service, by problem code", ["code"], **here)
+        self._cache = Counter("veselova_cache", "Answers looked up in the cache, by result", ["result"], **here)
+
+    @contextmanager
+    def work(self, kind: str, system: str, engine: str) -> Iterator[Ending]:
+        """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too.
+
+        An answer that was kept, and so needed no work, is not counted.
+        """
+        outcome, began, ending = "stopped", time.perf_counter(), Ending()
+        try:
+            yield ending
+            outcome = "solved"
+        except Exception as error:
+            outcome = problem_code(error)
+            raise
+        finally:
+            if not ending.kept:
+                self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
+                self._outcomes.labels(kind, engine, outcome).inc()
+                note(system=system, engine=engine, outcome=outcome)
+
+    def refused(self, code: str) -> None:
+        """Count a request that the service refused with this problem code."""
+        self._refusals.labels(code).inc()
+
+    def cached(self, hit: bool) -> None:
+        """Count an answer that was looked up in the cache."""
+        self._cache.labels("hit" if hit else "miss").inc()
+
+    def gauge(self, name: str, meaning: str, value: Callable[[], float]) -> None:
+        """Show a number that is asked for at every scrape."""
+        Gauge(name, meaning, registry=self.registry).set_function(value)
+
+    def gauges(self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]) -> None:
+        """Show numbers by one label (jobs by state, say) that are asked for at every scrape; they may come from the database."""
+        self.registry.register(_Family(name, meaning, label, values))
+
+    def serve(self, app: FastAPI) -> None:
+        """Time every endpoint of an application, and show all numbers at ``/metrics``."""
+        instrumentator = Instrumentator(
+            registry=self.registry, should_group_status_codes=False, excluded_handlers=["^/metrics$", "^/healthz$", "^/readyz$"]
+        )
+        instrumentator.instrument(app).expose(app, include_in_schema=False)
+
+
+class _Family(Collector):
+    def __init__(self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]) -> None:
+        self._of = (name, meaning, label)
+        self._values = values
+
+    def collect(self) -> Iterable[GaugeMetricFamily]:
+        """Return the numbers of now."""
+        name, meaning, label = self._of
+        family = GaugeMetricFamily(name, meaning, labels=[label])
+        for value, number in self._values().items():
+            family.add_metric([value], number)
+        return [family]

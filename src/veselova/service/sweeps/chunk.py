@@ -1,0 +1,177 @@
+"""What a sweep says of each problem: a row of numbers by the names of their columns, and the motion itself where it is kept."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from typing import Any
+
+import numpy as np
+import orjson
+
+from veselova.engines import Prepared
+from veselova.mechanics.core.errors import Unsolved, VeselovaError
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.problem_details import problem_code
+from veselova.service.api.request_models import TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.sweep_parameters import Path, components
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.sweeps.torus_columns import columns_at_once, columns_of_torus
+from veselova.service.workers.tasks import requested_trajectory, warm_up
+from veselova.service.workers.time_limit import TimeIsUp, time_limit
+from veselova.version import __version__
+
+__all__ = ["SOLVED", "Chunk", "OtherVersion", "computed_chunk", "lost_chunk"]
+
+_LOG = logging.getLogger("veselova.sweeps")
+
+#: What the column ``outcome`` says of a problem that was solved; else it names the reason, and ``detail`` explains it.
+SOLVED = "solved"
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """The answers to consecutive problems: a table as Parquet, and arrays with one entry of the first axis for each of them."""
+
+    rows: int
+    table: bytes
+    arrays: Mapping[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+
+
+class OtherVersion(Exception):
+    """A worker whose engines could give other numbers than those of the process that asks."""
+
+
+def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
+    """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
+
+    A problem that cannot be solved is a row that says why. Raises OtherVersion where this process has another version of the
+    engines than the one that asks.
+    """
+    if version != __version__:
+        raise OtherVersion(f"a worker of the cluster runs veselova {__version__}, and this is {version}")
+    _warm_up()
+    sweep = _sweep(request)
+    values = {row: sweep.values(row) for row in range(start, stop)}
+    together = _together(sweep, values)
+    answers = [_answer(sweep, row, values[row], together.get(row)) for row in range(start, stop)]
+    return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
+
+
+@lru_cache(maxsize=4)
+def _sweep(request: bytes) -> SweepRequest:
+    """Return the sweep of a JSON text; all chunks of a job bring the same, which may be long."""
+    return read_request(SweepRequest, orjson.loads(request))
+
+
+@cache
+def _warm_up() -> None:
+    """Load and run both engines once in this process, so that the budget of its first problem is spent on the problem."""
+    warm_up()
+
+
+def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
+    """Return the chunk of one problem whose worker died over it."""
+    detail = "the worker process ended over this problem, as it does when memory runs out"
+    return Chunk(1, _parquet([_row(sweep, row, sweep.values(row), "worker-lost", detail)]))
+
+
+def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Row]:
+    """Return what can be found for many problems at once, within the budgets of all; the others are answered one by one."""
+    try:
+        with time_limit(sweep.budget_s * len(values)):
+            return columns_at_once(sweep, values)
+    except TimeIsUp:
+        return {}
+    except Exception:
+        _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
+        return {}
+
+
+def _answer(sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Row | None) -> tuple[Row, Mapping[str, Any]]:
+    """Return the row of one problem, unless its columns were ``found`` already, and the series that are kept of it."""
+    if found is not None:
+        return {**_row(sweep, row, values, SOLVED, ""), **found}, {}
+    found = {}
+    kept: dict[str, Any] = {}
+    try:
+        with time_limit(sweep.budget_s):
+            for column, value in _findings(sweep.request_of(values), kept, sweep.trajectories):
+                found[column] = value
+        outcome, detail = SOLVED, ""
+    except TimeIsUp:
+        outcome, detail = "over-budget", f"the work was stopped after its budget of {sweep.budget_s:g} s"
+    except VeselovaError as error:
+        outcome, detail = problem_code(error), error.reason if isinstance(error, Unsolved) else str(error)
+    except Exception as error:
+        _LOG.exception("problem %d of sweep %s failed", row, sweep.id)
+        outcome, detail = problem_code(error), "an unexpected error; it has been logged"
+    return {**_row(sweep, row, values, outcome, detail), **found}, kept
+
+
+def _row(sweep: SweepRequest, row: int, values: Mapping[Path, Any], outcome: str, detail: str) -> Row:
+    return {"row": row, **dict(sweep.columns(values)), "outcome": outcome, "detail": detail}
+
+
+def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
+    """Yield the columns of one problem; what was found before a failure stays."""
+    problem = request.problem.problem()
+    prepared = Prepared(problem)
+    if prepared.has_torus:
+        yield from columns_of_torus(prepared.torus())
+    elif problem.has_torus:
+        yield "regime", "rest"
+    elif not isinstance(request, TrajectoryRequest):
+        prepared.torus()  # raises the reason
+    if isinstance(request, TrajectoryRequest):
+        trajectory = requested_trajectory(request, prepared)
+        names = request.outputs or list(problem.outputs)
+        if keep:
+            kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)
+        yield from _of_motion(problem, trajectory, names)
+
+
+def _of_motion(problem: Problem, trajectory: Trajectory, names: list[str]) -> Iterator[tuple[str, Any]]:
+    yield "error.max", float(np.max(trajectory.error))
+    for name, drift in trajectory.drift.items():
+        yield f"drift.{name}", drift
+    for name in names:
+        series = trajectory.series(name)
+        for kind, extremes in (("min", series.min(axis=0)), ("max", series.max(axis=0))):
+            yield from components(f"{name}.{kind}", extremes.tolist())
+
+
+def _parquet(rows: list[Row]) -> bytes:
+    """Return the table of the rows, columns in the order in which they first appear; numbers that are missing are null."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = {name: _column([row.get(name) for row in rows]) for name in names}
+    buffer = io.BytesIO()
+    parquet.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+def _column(values: list[Any]) -> Any:
+    """Return an Arrow array of numbers, of texts where any value is one; what is missing is null."""
+    import pyarrow as pa
+
+    if any(isinstance(value, str) for value in values):
+        return pa.array([None if value is None else str(value) for value in values], pa.string())
+    return pa.array(values) if any(value is not None for value in values) else pa.nulls(len(values), pa.float64())
+
+
+def _arrays(kept: list[Mapping[str, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    """Return the series of all problems, NaN for those that have none."""
+    complete = next((series for series in kept if series), {})
+    return {
+        name: np.stack([np.asarray(series[name]) if series else np.full_like(pattern, np.nan) for series in kept])
+        for name, pattern in complete.items()
+    }

@@ -1,0 +1,70 @@
+"""The files of jobs: where they are, and how they are written, counted and removed."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+from veselova.service.api.atomic_file import whole_file
+from veselova.service.api.private_folder import make_private, own_folder
+
+__all__ = ["JobFiles", "write_whole"]
+
+
+class JobFiles:
+    """The folder of a store, with a folder for each job."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        own_folder(self.folder)
+
+    def chunk_path(self, job_id: str, position: int) -> Path:
+        """Return where the table of a chunk is kept."""
+        return self.folder / job_id / "chunks" / f"{position:06d}.parquet"
+
+    def result_path(self, job_id: str) -> Path:
+        """Return where the table of a finished job is kept."""
+        return self.folder / job_id / "summaries.parquet"
+
+    def trajectories_path(self, job_id: str) -> Path:
+        """Return where the Zarr store of a running job is kept."""
+        return self.folder / job_id / "trajectories.zarr"
+
+    def packed_path(self, job_id: str) -> Path:
+        """Return where the Zarr store of a finished job is kept, in one file."""
+        return self.folder / job_id / "trajectories.zarr.zip"
+
+    def size(self, job_id: str) -> int:
+        """Return how many bytes a job has on the disk."""
+        total = 0
+        for folder, _, names in os.walk(self.folder / job_id):
+            for name in names:
+                with contextlib.suppress(FileNotFoundError):  # a part that was finished meanwhile
+                    total += (Path(folder) / name).stat().st_size
+        return total
+
+    def digest(self, job_id: str, position: int) -> str:
+        """Return the hash of the table of a chunk, an empty text where it cannot be read."""
+        try:
+            return hashlib.sha256(self.chunk_path(job_id, position).read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
+    def remove_files(self, job_id: str) -> None:
+        """Remove all that a job has on the disk."""
+        shutil.rmtree(self.folder / job_id, ignore_errors=True)
+
+    def remove_parts(self, job_id: str) -> None:
+        """Remove what a process that died was in the midst of writing."""
+        for path in (self.folder / job_id).rglob("*.part"):
+            path.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that a death of the process or the machine leaves it whole or absent."""
+    make_private(path.parent)
+    with whole_file(path) as part:
+        part.write_bytes(content)

@@ -1,0 +1,65 @@
+"""What a request computes: called in a worker process by the server, in the same process by the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from veselova.engines import Prepared, compare, torus
+from veselova.mechanics.core.errors import Faults
+from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.examples import BODY4
+from veselova.service.api.json_documents import comparison_document, encoded, trajectory_document
+from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest
+
+__all__ = ["TASKS", "requested_comparison", "requested_torus", "requested_trajectory", "warm_up"]
+
+
+def requested_trajectory(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
+    """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that is made already."""
+    faults = Faults()
+    prepared = prepared or faults.attempt(lambda: Prepared(request.problem.problem()))
+    grid = faults.attempt(request.time_grid)
+    faults.require_none()
+    assert prepared is not None
+    options: dict[str, Any] = {name: getattr(request, name) for name in ("digits", "certified", "formulation")}
+    return prepared.solve(grid, request.engine, request.method, **options)
+
+
+def requested_comparison(request: ComparisonRequest) -> Comparison:
+    """Return the comparison that a request asks for."""
+    return compare(request.problem.problem(), request.time_grid(), request.method)
+
+
+def requested_torus(request: TorusRequest) -> Torus:
+    """Return the torus that a request asks for."""
+    return torus(request.problem.problem())
+
+
+def _trajectory(request: Any) -> dict[str, Any]:
+    return trajectory_document(requested_trajectory(request), request.outputs)
+
+
+def _comparison(request: Any) -> dict[str, Any]:
+    return comparison_document(requested_comparison(request), request.outputs)
+
+
+def _torus(request: Any) -> dict[str, Any]:
+    return requested_torus(request).as_dict()
+
+
+#: Kind of answer → (model of the request, what computes its document).
+TASKS: Mapping[str, tuple[type[TorusRequest], Callable[[Any], dict[str, Any]]]] = {
+    "trajectory": (TrajectoryRequest, _trajectory),
+    "comparison": (ComparisonRequest, _comparison),
+    "torus": (TorusRequest, _torus),
+}
+
+
+def warm_up() -> None:
+    """Load both engines and run them once, so that the first request finds nothing left to import."""
+    request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
+    encoded(_comparison(request))
+    _torus(request)
