@@ -24,7 +24,7 @@ ALLOWED = {
 
 #: What may be imported inside a function, because the library is optional or slow to load.
 ALLOWED_LATER = {
-    # Veselova.from_torus asks the table of engines; decimals turn into numbers of the two libraries on request.
+    # Decimals turn into numbers of the last two on request.
     "mechanics": {
         "matplotlib",
         "orjson",
@@ -33,8 +33,6 @@ ALLOWED_LATER = {
         "xarray",
         "mpmath",
         "flint",
-        "veselova.conditioning",
-        "veselova.engines",
     },
     "analytic": {"finufft"},
     "numeric": {"heyoka"},
@@ -84,6 +82,59 @@ def test_each_part_imports_only_what_it_may(part: str) -> None:
             assert _permitted(name, ALLOWED[part]), f"{path.name} imports {name}"
         for name in inner:
             assert _permitted(name, ALLOWED[part] | ALLOWED_LATER[part]), f"{path.name} imports {name}"
+
+
+#: Chapter → the chapters of its part that it may import at module level.
+CHAPTERS = {
+    "analytic": {
+        "arithmetic": set(),
+        "numerics": {"arithmetic"},
+        "spectrum": {"arithmetic"},
+        "curve": {"arithmetic", "numerics", "spectrum"},
+        "attitude": {"arithmetic", "curve", "spectrum"},
+        "theta": {"arithmetic", "attitude", "curve"},
+        "time_map": {"arithmetic", "curve", "numerics", "spectrum"},
+        "dense_output": {"arithmetic", "numerics", "time_map"},
+        "motion": {"arithmetic", "attitude", "curve", "dense_output", "spectrum", "theta", "time_map"},
+        "separable": {"arithmetic", "attitude", "curve", "motion", "numerics", "spectrum", "time_map"},
+    },
+    "mechanics": {
+        "core": set(),
+        "geometry": {"core"},
+        "results": {"core"},
+        "bodies": {"core", "geometry"},
+        "groups": {"bodies", "core", "geometry"},
+        "potentials": {"core", "geometry", "groups"},
+        "flows": {"bodies", "core", "geometry", "groups", "potentials"},
+        "systems": {"bodies", "core", "flows", "geometry", "groups", "potentials"},
+        "paper": {"bodies", "core", "flows", "geometry", "groups", "potentials", "results", "systems"},
+    },
+    "service": {
+        "api": set(),
+        "observability": {"api"},
+        "client": {"api"},
+        "workers": {"api", "observability"},
+        "access": {"api", "observability"},
+        "answers": {"api", "observability", "workers"},
+        "sweeps": {"access", "api", "workers"},
+        "http": {"access", "answers", "api", "client", "observability", "sweeps", "workers"},
+        "cli": {"api", "http"},
+    },
+}
+
+
+@pytest.mark.parametrize("part", sorted(CHAPTERS))
+def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
+    chapters = CHAPTERS[part]
+    folders = {path.name for path in (ROOT / part).iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders == set(chapters)
+    for number, (chapter, allowed) in enumerate(chapters.items()):
+        assert allowed <= set(list(chapters)[:number]), f"{chapter} imports a later chapter"
+        for path in sorted((ROOT / part / chapter).glob("*.py")):
+            for name in _split_imports(path)[0]:
+                words = name.split(".")
+                if words[:2] == ["veselova", part] and len(words) > 2 and words[2] in chapters:
+                    assert words[2] in allowed | {chapter}, f"{chapter}/{path.name} imports {name}"
 
 
 @pytest.mark.parametrize(("library", "room"), [("mpmath", "arithmetic.py"), ("flint", "balls.py")])
@@ -172,3 +223,29 @@ def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
     assert mechanics == {"veselova.mechanics.core", "veselova.mechanics.core.errors"}
     libraries = {"numpy", "scipy", "mpmath", "matplotlib", "starlette", "fastapi", "httpx2", "sqlalchemy", "distributed"}
     assert not loaded & (libraries | {"veselova.analytic", "veselova.numeric", "veselova.engines"})
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def _imported_files(path: Path, modules: set[str]) -> set[str]:
+    """Return the modules of the package that a file imports anywhere, under TYPE_CHECKING and inside functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            full = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= full & modules or {node.module or ""}
+    return found & modules - {_module(path)}
+
+
+def test_no_file_imports_itself_by_way_of_others() -> None:
+    modules = {_module(path) for path in FILES}
+    remaining = {_module(path): _imported_files(path, modules) for path in FILES}
+    # A file that imports none of those left is in no circle.
+    while leaves := [name for name, imports in remaining.items() if not imports & set(remaining)]:
+        for name in leaves:
+            del remaining[name]
+    assert not remaining

@@ -34,7 +34,7 @@ from veselova.analytic.time_map.fourier_balls import EnclosedFourier
 from veselova.analytic.time_map.panels_balls import EnclosedClock
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.npz import read_archive
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
@@ -462,7 +462,7 @@ def test_files_carry_all_digits(tmp_path: Path) -> None:
     with np.load(tmp_path / "motion.npz") as archive:
         assert Decimal(str(archive["q_decimal"][1, 2])) == trajectory.decimals.midpoints["q"][1, 2]
         assert Decimal(str(archive["q_radius"][1, 2])) == trajectory.decimals.radii["q"][1, 2]
-        again = read_archive(trajectory.problem, archive)
+        again = Trajectory.from_arrays(trajectory.problem, archive)
     assert again.decimals is not None
     assert np.all(again.decimals.midpoints["omega"] == trajectory.decimals.midpoints["omega"])
     assert np.array_equal(again.error, trajectory.error)

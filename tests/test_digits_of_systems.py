@@ -21,7 +21,7 @@ from test_cli import run
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
 from veselova.mechanics.core.decimals import Decimals
-from veselova.mechanics.results.npz import read_archive
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
 
 #: Points on the unit sphere and tangents, exactly; F_0 is not zero.
@@ -242,7 +242,7 @@ def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) ->
     trajectory.to_npz(stream)
     stream.seek(0)
     document = trajectory_of(problem, orjson.loads(encoded(trajectory_document(trajectory))))
-    archive = read_archive(problem, np.load(stream))
+    archive = Trajectory.from_arrays(problem, np.load(stream))
     for found in (document.decimals, archive.decimals, pickle.loads(pickle.dumps(trajectory)).decimals):
         assert found is not None
         for name in problem.stored:

@@ -16,7 +16,6 @@ import veselova
 from problems import tagged
 from test_engines import METHODS
 from veselova import BackendMissing, Comparison, InvalidInput, StiefelFlow, Trajectory, Unsolved, compare, solve, torus
-from veselova.mechanics.results.npz import read_archive
 from veselova.mechanics.results.trajectory import Provenance
 
 TIMES = np.linspace(0, 5, 11)
@@ -200,7 +199,7 @@ def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(kind: str
 def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_path: Path) -> None:
     trajectory.to_npz(tmp_path / "motion.npz")
     with np.load(tmp_path / "motion.npz") as archive:
-        again = read_archive(trajectory.problem, archive)
+        again = Trajectory.from_arrays(trajectory.problem, archive)
     assert again.provenance == trajectory.provenance
     for name, values in trajectory.columns().items():
         assert np.array_equal(again.columns()[name], values)

@@ -21,7 +21,7 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.remainders import split, split_grid
 from veselova.mechanics.core.times import TimeGrid, as_request
-from veselova.mechanics.results.npz import read_archive
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.answers.cache_entry import packed, unpacked
 from veselova.service.cli.main import app
 
@@ -200,7 +200,7 @@ def test_an_answer_says_what_its_doubles_leave() -> None:
     assert [float(text) for text in first.split(",")[:2]] == [1000000000.3, rest]
     stream = io.BytesIO()
     found.to_npz(stream)
-    read = read_archive(found.problem, np.load(io.BytesIO(stream.getvalue())))
+    read = Trajectory.from_arrays(found.problem, np.load(io.BytesIO(stream.getvalue())))
     assert read.remainders is not None
     assert read.remainders.tolist() == [rest, 0]
     content = packed({"problem": body().as_dict()}, found, 10**6)

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from draws import random_problem
 from problems import tagged
-from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Unsolved, Veselova, solve, torus
+from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Unsolved, Veselova, from_torus, solve, torus
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -18,7 +18,7 @@ def test_constants_and_phases_give_the_start_back(n: int, rng: np.random.Generat
     for _ in range(5):
         problem = random_problem(rng, n)
         found = torus(problem)
-        again = Veselova.from_torus(problem.A, found.energy, found.constants, found.phases, found.signs, problem.frame)
+        again = from_torus(problem.A, found.energy, found.constants, found.phases, found.signs, problem.frame)
         assert np.max(np.abs(again.q - problem.q)) < 1e-13
         assert np.max(np.abs(again.q_dot - problem.q_dot)) < 1e-13 * np.max(np.abs(problem.q_dot))
         back = torus(again)
@@ -31,7 +31,7 @@ def test_a_start_on_an_axis_comes_back_with_its_direction() -> None:
     problem = Veselova([3, 2, 1], [1, 0, 0], [0, -1, 0.5])
     found = torus(problem)
     assert found.signs.tolist() == [1, -1, 1]
-    again = Veselova.from_torus([3, 2, 1], found.energy, found.constants, found.phases, found.signs)
+    again = from_torus([3, 2, 1], found.energy, found.constants, found.phases, found.signs)
     assert np.allclose(again.q, problem.q, atol=1e-14)
     assert np.allclose(again.q_dot, problem.q_dot, atol=1e-14)
 
@@ -43,7 +43,7 @@ def test_phases_advance_by_the_frequencies() -> None:
     moved = torus(Veselova(problem.A, later.q[0], later.q_dot[0], normalize=True))
     expected = found.phases + found.frequencies_tau1 * later.tau1[0]
     assert np.max(np.abs(np.mod(moved.phases - expected + 0.5, 1) - 0.5)) < 1e-13
-    started = Veselova.from_torus(problem.A, found.energy, found.constants, expected, np.sign(later.q[0]).astype(int))
+    started = from_torus(problem.A, found.energy, found.constants, expected, np.sign(later.q[0]).astype(int))
     assert np.allclose(started.q, later.q[0], atol=1e-13)
 
 
@@ -90,7 +90,7 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(n: int, rng: n
         for sign in (1, -1):
             constants = found.constants.copy()
             constants[k] += sign * step
-            actions.append(torus(Veselova.from_torus(problem.A, 1, constants, found.phases, found.signs)).actions)
+            actions.append(torus(from_torus(problem.A, 1, constants, found.phases, found.signs)).actions)
         change = (actions[0] - actions[1]) / (2 * step)
         terms = 2 * np.pi * found.frequencies_tau1 * change
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
@@ -139,9 +139,9 @@ GOOD: dict[str, Any] = {"A": [3, 2, 1], "energy": 1, "constants": ["0.6"], "phas
     ],
 )
 def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[str, Any]) -> None:
-    Veselova.from_torus(**GOOD)
+    from_torus(**GOOD)
     with pytest.raises(InvalidInput) as raised:
-        Veselova.from_torus(**{**GOOD, **changes})
+        from_torus(**{**GOOD, **changes})
     assert raised.value.field == field
 
 

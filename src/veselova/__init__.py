@@ -18,6 +18,7 @@ from veselova.version import __version__ as __version__
 if TYPE_CHECKING:
     from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
+    from veselova.engines import from_torus as from_torus
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
     from veselova.mechanics.core.errors import BackendMissing as BackendMissing
@@ -76,6 +77,7 @@ _HOMES = {
     "VeselovaSO3": "veselova.mechanics.systems.veselova_so3",
     "closed_form": "veselova.engines",
     "compare": "veselova.engines",
+    "from_torus": "veselova.engines",
     "solve": "veselova.engines",
     "sweep": "veselova.service.cli.local_sweep",
     "torus": "veselova.engines",

@@ -7,7 +7,7 @@ difference is divided by it: as long as it is small it grows in proportion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.engines import solve
 from veselova.mechanics.core.errors import VeselovaError
 from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.problem import Problem
@@ -37,13 +38,14 @@ _VISIBLE = 4.0
 _DATA = ("A", "q", "q_dot", "q_prime", "X", "X_dot", "inertia", "gamma", "Omega")
 
 
-def conditioning(problem: Problem, times: Array, solve: Callable[[Problem, Array], Trajectory]) -> Array:
-    """Return the largest change of a bounded component at times (N,) when all data move by one rounding.
+def conditioning(trajectory: Trajectory) -> Array:
+    """Return the largest change of a bounded component at each time (N,) when all data move by one rounding.
 
     One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller; where a text or a Decimal has more
     digits than a double, it is one unit of the last digit given. Whole numbers and ratios are exact, and stay where they are,
     unless all data are. Problems whose data cannot be moved (systems without a closed form) have ε·max(1, turning·|t|).
     """
+    problem, times, engine = trajectory.problem, trajectory.times, trajectory.provenance.engine
     if "analytic" not in problem.engines or not problem.moves:
         return problem.conditioning_floor(times)
     found = np.zeros(times.size)
@@ -54,7 +56,7 @@ def conditioning(problem: Problem, times: Array, solve: Callable[[Problem, Array
             pair = []
             for side in (1, -1):
                 try:
-                    pair.append(solve(moved_by_roundings(problem, side * scale, pattern), times))
+                    pair.append(solve(moved_by_roundings(problem, side * scale, pattern), times, engine))
                 except VeselovaError:
                     break
             if len(pair) == 2:

@@ -17,7 +17,7 @@ from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
-from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.torus_problem import on_torus
 from veselova.version import __version__
 
 __all__ = ["closed_form"]
@@ -49,7 +49,7 @@ def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
     """
     if isinstance(accuracy, bool) or not isinstance(accuracy, (int, float)) or not _FINEST <= accuracy <= _COARSEST:
         raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", shown(accuracy))
-    problem: TorusProblem = given.on_torus()
+    problem = on_torus(given)
     solution = Solution(problem)
     if solution.separatrices:
         reason = "the start lies on a separatrix, which no torus describes for long; solve at times instead"

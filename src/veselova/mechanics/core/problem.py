@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import Flow
-
-if TYPE_CHECKING:
-    from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["Problem", "Series"]
 
@@ -103,12 +99,6 @@ class Problem(ABC):
     def has_torus(self) -> bool:
         """Return whether the motion runs on a torus that ``torus`` describes, or rests."""
         return self.has_tori
-
-    def on_torus(self) -> TorusProblem:
-        """Return the problem on whose torus the motion runs. Raises InvalidInput for a system without tori."""
-        raise InvalidInput(
-            ("problem",), "a system with a torus: veselova, veselova-so3, neumann, ellipsoid-geodesic", self.system
-        )
 
     @property
     def semiaxes(self) -> Array | None:

@@ -74,7 +74,10 @@ class Comparison:
         """Return a figure of the motion with the difference of the engines; raises BackendMissing without matplotlib."""
         from veselova.mechanics.results.plot import picture
 
-        return picture(self.analytic, self)
+        ordered = Comparison(self.analytic.in_order_of_time(), self.numeric.in_order_of_time())
+        differences = {name: ordered.difference(name) for name in self.analytic.problem.outputs}
+        errors = {"analytic": ordered.analytic.error, "numeric": ordered.numeric.error}
+        return picture(ordered.analytic, differences, errors, ordered.conditioning_floor)
 
     def _repr_html_(self) -> str:
         rows = "".join(

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from veselova.mechanics.results.comparison import Comparison
-    from veselova.mechanics.results.trajectory import Trajectory
+__all__ = ["Portrayable", "picture"]
 
-__all__ = ["picture"]
+Array = NDArray[np.float64]
 
 #: One colour per body axis or coordinate, told apart in print and by colour-blind readers (Okabe and Ito).
 _COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"]
@@ -25,64 +26,72 @@ _COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#
 _LEAST_DRAWN = 1e-17
 
 
-def picture(trajectory: Trajectory, comparison: Comparison | None = None) -> Figure:
+class Portrayable(Protocol):
+    """A motion as pictures need it, its times (N,) in increasing order."""
+
+    @property
+    def problem(self) -> Problem:
+        """Return the problem."""
+
+    @property
+    def times(self) -> Array:
+        """Return the times, (N,)."""
+
+    @property
+    def integrals(self) -> Mapping[str, Array]:
+        """Return the integrals of motion at each time, by name."""
+
+    @property
+    def provenance(self) -> Any:
+        """Return the provenance, which has ``engine`` and ``method``."""
+
+    def series(self, name: str) -> Array:
+        """Return one of the problem's outputs by name."""
+
+
+def picture(
+    motion: Portrayable,
+    differences: Mapping[str, Array] | None = None,
+    errors: Mapping[str, Array] | None = None,
+    floor: Array | None = None,
+) -> Figure:
     """Return the picture of a motion.
 
     First the series that the problem calls its portrait: a curve on the sphere with the frame axes at a few times where it has
     three components, else the components. Then the spheroconic coordinates, or where there are none the drift of the integrals.
-    With a comparison: the difference of the engines, their errors and the conditioning floor on a logarithmic axis.
+    For a comparison: the ``differences`` of each output, the ``errors`` of each engine and the conditioning ``floor``, (N,) each,
+    on a logarithmic axis.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    trajectory = _by_time(trajectory)
-    if comparison is not None:
-        comparison = replace(comparison, analytic=trajectory, numeric=_by_time(comparison.numeric))
-    rows, problem, provenance = 2 if comparison is None else 3, trajectory.problem, trajectory.provenance
+    rows, problem = 2 if differences is None else 3, motion.problem
     figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
-    portrait = trajectory.series(problem.portrait).reshape(trajectory.times.size, -1)
+    portrait = motion.series(problem.portrait).reshape(motion.times.size, -1)
     if portrait.shape[1] == 3:
         grid = figure.add_gridspec(rows, 1, height_ratios=[2] + [1] * (rows - 1))
-        _draw_sphere(figure.add_subplot(grid[0], projection="3d"), trajectory)
+        _draw_sphere(figure.add_subplot(grid[0], projection="3d"), motion)
         axes = [figure.add_subplot(grid[row]) for row in range(1, rows)]
     else:
         axes = list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
-        _draw_lines(axes[0], trajectory.times, portrait, problem.portrait, f"components of {problem.portrait}")
+        _draw_lines(axes[0], motion.times, portrait, problem.portrait, f"components of {problem.portrait}")
         axes = axes[1:]
     if "spheroconic" in problem.outputs:
-        _draw_lines(axes[0], trajectory.times, trajectory.spheroconic, r"\lambda", "spheroconic coordinates")
+        _draw_lines(axes[0], motion.times, motion.series("spheroconic"), r"\lambda", "spheroconic coordinates")
     else:
-        _draw_drift(axes[0], trajectory)
-    if comparison is not None:
-        _draw_difference(axes[1], comparison)
+        _draw_drift(axes[0], motion)
+    if differences is not None:
+        _draw_difference(axes[1], motion.times, differences, errors or {}, floor)
     axes[-1].set_xlabel(f"time {problem.time}")
-    figure.suptitle(f"{problem.title} ({provenance.engine}, {provenance.method})")
+    figure.suptitle(f"{problem.title} ({motion.provenance.engine}, {motion.provenance.method})")
     return figure
 
 
-def _by_time(trajectory: Trajectory) -> Trajectory:
-    """Return the trajectory in the order of time, in which lines are drawn; its doubles alone."""
-    order = np.argsort(trajectory.times, kind="stable")
-    if (np.diff(order) == 1).all():
-        return trajectory
-    arrays = {name: values[order] for name, values in trajectory.arrays.items()}
-    return replace(
-        trajectory,
-        times=trajectory.times[order],
-        error=trajectory.error[order],
-        arrays=arrays,
-        decimals=None,
-        remainders=None,
-    )
-
-
-def _draw_drift(axes: Axes, trajectory: Trajectory) -> None:
-    for i, (name, values) in enumerate(trajectory.integrals.items()):
+def _draw_drift(axes: Axes, motion: Portrayable) -> None:
+    for i, (name, values) in enumerate(motion.integrals.items()):
         change = np.max(np.abs(values - values[:1]).reshape(values.shape[0], -1), axis=1, initial=0.0)
-        axes.semilogy(
-            trajectory.times, np.maximum(change, _LEAST_DRAWN), color=_COLOURS[i % len(_COLOURS)], linewidth=1, label=name
-        )
+        axes.semilogy(motion.times, np.maximum(change, _LEAST_DRAWN), color=_COLOURS[i % len(_COLOURS)], linewidth=1, label=name)
     axes.set_ylabel("change of the integrals")
     axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)
 
@@ -94,22 +103,23 @@ def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) ->
     axes.legend(loc="upper right", ncols=min(8, values.shape[1]), fontsize="small", framealpha=0.9)
 
 
-def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
+def _draw_sphere(axes: Any, motion: Portrayable) -> None:
     """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six times, standing on the curve."""
     latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
-    name = trajectory.problem.portrait
-    curve = trajectory.series(name).reshape(-1, 3)
-    radii = trajectory.problem.semiaxes
+    name = motion.problem.portrait
+    curve = motion.series(name).reshape(-1, 3)
+    radii = motion.problem.semiaxes
     a, b, c = np.full(3, np.max(np.linalg.norm(curve, axis=1))) if radii is None else radii
     x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)
     axes.plot_wireframe(a * x, b * y, c * z, color="0.85", linewidth=0.4)
     axes.plot(*curve.T, color=_COLOURS[0], linewidth=1.2)
-    title = f"{name}({trajectory.problem.time})"
-    if "frame" in trajectory.problem.outputs:
+    title = f"{name}({motion.problem.time})"
+    if "frame" in motion.problem.outputs:
         title += ", with $e_1$ (blue), $e_2$ (red), $e_3$ (green) at six times"
-        for i in np.unique(np.linspace(0, trajectory.times.size - 1, 6).astype(int)):
+        frame = motion.series("frame")
+        for i in np.unique(np.linspace(0, motion.times.size - 1, 6).astype(int)):
             for k, colour in enumerate(_COLOURS[i] for i in (0, 1, 2)):
-                axes.quiver(*curve[i], *(0.3 * trajectory.frame[i, :, k]), color=colour, linewidth=1.4)
+                axes.quiver(*curve[i], *(0.3 * frame[i, :, k]), color=colour, linewidth=1.4)
     axes.set_aspect("equal")
     axes.set_xlabel(f"{name}_1")
     axes.set_ylabel(f"{name}_2")
@@ -117,14 +127,18 @@ def _draw_sphere(axes: Any, trajectory: Trajectory) -> None:
     axes.set_title(title, fontsize="medium")
 
 
-def _draw_difference(axes: Axes, comparison: Comparison) -> None:
-    times = comparison.analytic.times
-    for name, colour in zip(comparison.analytic.problem.outputs, _COLOURS, strict=False):
-        axes.semilogy(
-            times, np.maximum(comparison.difference(name), _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|"
-        )
-    axes.semilogy(times, comparison.analytic.error, color="0.4", linestyle="--", linewidth=1, label="error, analytic")
-    axes.semilogy(times, comparison.numeric.error, color="0.4", linestyle=":", linewidth=1, label="error, numeric")
-    axes.semilogy(times, comparison.conditioning_floor, color="0.7", linewidth=1, label="conditioning floor")
+def _draw_difference(
+    axes: Axes,
+    times: Array,
+    differences: Mapping[str, Array],
+    errors: Mapping[str, Array],
+    floor: Array | None,
+) -> None:
+    for (name, values), colour in zip(differences.items(), _COLOURS, strict=False):
+        axes.semilogy(times, np.maximum(values, _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|")
+    for (name, values), style in zip(errors.items(), ("--", ":"), strict=False):
+        axes.semilogy(times, values, color="0.4", linestyle=style, linewidth=1, label=f"error, {name}")
+    if floor is not None:
+        axes.semilogy(times, floor, color="0.7", linewidth=1, label="conditioning floor")
     axes.set_ylabel("difference of engines")
     axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)

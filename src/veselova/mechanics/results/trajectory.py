@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, did_you_mean, shown, unknown_name
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.npz import write_archive
+from veselova.mechanics.results.npz import decimal_arrays, read_decimals, write_archive
 from veselova.mechanics.results.table import Table, Target, flat_columns, opened, row_blocks
 from veselova.version import __version__
 
@@ -152,11 +153,8 @@ class Trajectory:
         ratios are exact. It is measured by motions from moved data, so it takes some solves when it is first asked for. ``error``
         is that of the motion of exactly these data; this says how much of the motion is that of others that read the same.
         """
-        from veselova.conditioning import conditioning
-        from veselova.engines import solve
-
-        engine = self.provenance.engine
-        found = conditioning(self.problem, self.times, lambda problem, times: solve(problem, times, engine))
+        # By name, as engines are: what solves stands above results, and is loaded when it is asked for.
+        found: Array = import_module("veselova.conditioning").conditioning(self)
         found.setflags(write=False)
         return found
 
@@ -204,7 +202,47 @@ class Trajectory:
         """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
         chosen = self._chosen(outputs)
         with opened(target) as stream:
-            write_archive(self, stream, chosen)
+            write_archive(stream, self._archive(chosen))
+
+    def _archive(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+        yield "provenance", np.array(json.dumps(self.provenance.as_dict()))
+        yield from self.named_arrays(outputs)
+        for name, values in self.integrals.items():
+            yield f"integral_{name}", values
+
+    def named_arrays(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Yield times, error and the chosen series by the names that an archive has for them, decimals as texts."""
+        yield "times", self.times
+        if self.remainders is not None:
+            yield "remainders", self.remainders
+        yield "error", self.error
+        for name in outputs:
+            yield name, self.series(name)
+            if self.decimals is not None:
+                yield from decimal_arrays(name, self.decimals).items()
+
+    @classmethod
+    def from_arrays(cls, problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
+        """Return the trajectory of an open archive, or of such arrays by name with the dictionary of their ``provenance``.
+
+        Raises KeyError unless it has every series that does not follow from others, and all decimals or none.
+        """
+        found = archive["provenance"]
+        provenance = Provenance(**(found if isinstance(found, dict) else json.loads(str(found))))
+        decimals = read_decimals(problem, archive, provenance.digits, bool(provenance.details.get("certified")))
+        # An open archive of NumPy has no ``get``.
+        remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401
+        series = {name: archive[name] for name in problem.stored}
+        return cls(problem, archive["times"], archive["error"], series, provenance, None, decimals, remainders)
+
+    def in_order_of_time(self) -> Trajectory:
+        """Return the trajectory with its times in increasing order: itself, or its doubles alone."""
+        order = np.argsort(self.times, kind="stable")
+        if (np.diff(order) == 1).all():
+            return self
+        arrays = {name: values[order] for name, values in self.arrays.items()}
+        times, error = self.times[order], self.error[order]
+        return replace(self, times=times, error=error, arrays=arrays, decimals=None, remainders=None)
 
     def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table as comma-separated values, one row per time: doubles to the last bit, or all of the decimals."""
@@ -242,7 +280,7 @@ class Trajectory:
         """Return a matplotlib figure of the motion; raises BackendMissing without matplotlib."""
         from veselova.mechanics.results.plot import picture
 
-        return picture(self)
+        return picture(self.in_order_of_time())
 
     def __repr__(self) -> str:
         span = f"{self.times.size} times from {self.times.min():g} to {self.times.max():g}"

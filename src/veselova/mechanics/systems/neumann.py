@@ -6,25 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
-from veselova.mechanics.core.errors import InvalidInput, shown
-from veselova.mechanics.core.exact_input import exact_number, read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import read_only, require_truth_value, stated, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
-from veselova.mechanics.geometry.integrals_of_motion import energy as veselova_energy
 from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues, norm, uhlenbeck_integrals
 from veselova.mechanics.geometry.natural_frame import moser_frame, refined
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, point_on_sphere, unit
+from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
-
-if TYPE_CHECKING:
-    from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["NeumannSystem"]
 
@@ -114,22 +110,6 @@ class NeumannSystem(TorusProblem):
         """Return the field (4.7) in units of this problem."""
         time_unit = 1 / self.turning
         return NeumannFlow(time_unit**2 / self.A, time_unit, np.concatenate([time_unit * self.q_prime, self.frame.ravel()]))
-
-    def veselova(self, energy: Any, frame: Any = None) -> Veselova:
-        """Return the Veselova problem of energy h > 0 whose motion this is in time τ₁ (Theorem LR→Nn), with a frame at the start.
-
-        q̇ = q' √(2h det A/(Aq,q)). Raises InvalidInput unless F_0 = 0, equation (4.8), to 1e-9 of (Aq,q).
-        """
-        from veselova.mechanics.systems.veselova import Veselova
-
-        h = float(exact_number(energy, ("energy",)))
-        if h <= 0:
-            raise InvalidInput(("energy",), "a number greater than 0", shown(energy))
-        q, v = self.q, self.q_prime
-        F0 = float(self.integrals(self.start)["F0"][0] / (q @ (self.A * q)))
-        if abs(F0) > INPUT_TOLERANCE:
-            raise InvalidInput(("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}")
-        return Veselova(self.A, q, v * np.sqrt(h / veselova_energy(self.A, q, v)), frame, normalize=True)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return q, the first column of the frame."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.geometry.sphere import ExactState
 
-__all__ = ["TorusProblem"]
+__all__ = ["TorusProblem", "on_torus"]
 
 Array = NDArray[np.float64]
 
@@ -65,3 +66,17 @@ class TorusProblem(Problem):
     def n(self) -> int:
         """Return the dimension."""
         return int(self.A.size)
+
+
+@runtime_checkable
+class _OnTorus(Protocol):
+    def on_torus(self) -> TorusProblem:
+        """Return the problem on whose torus the motion runs."""
+
+
+def on_torus(problem: Problem) -> TorusProblem:
+    """Return the problem on whose torus a motion runs. Raises InvalidInput for a system without tori."""
+    if not isinstance(problem, _OnTorus):
+        systems = "veselova, veselova-so3, neumann, ellipsoid-geodesic"
+        raise InvalidInput(("problem",), f"a system with a torus: {systems}", problem.system)
+    return problem.on_torus()

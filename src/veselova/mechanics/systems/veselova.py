@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
-from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.exact_input import exact_number, read_only, require_truth_value, stated, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
 from veselova.mechanics.geometry.natural_frame import moser_frame, refined
-from veselova.mechanics.geometry.sphere import ExactState, over_largest, point_on_sphere, unit
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -93,24 +93,24 @@ class Veselova(TorusProblem):
         self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
-    def from_torus(cls, A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
-        """Return the problem whose motion has these constants and phases, as ``veselova.torus`` gives them.
+    def from_neumann(cls, system: NeumannSystem, energy: Any, frame: Any = None) -> Veselova:
+        """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system (Theorem LR→Nn).
 
-        A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 = 0 and the sorted I_i
-                interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases (n−1,) z⁰ of the start, modulo 1
-        signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as above
-
-        Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A up to 100.
+        q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation (4.8), to 1e-9 of (Aq,q).
         """
-        from veselova.engines import start_on_torus
-
-        q, q_dot = start_on_torus(A, energy, constants, phases, signs)
-        return cls(A, q, q_dot, frame, normalize=True)
+        h = float(exact_number(energy, ("energy",)))
+        if h <= 0:
+            raise InvalidInput(("energy",), "a number greater than 0", shown(energy))
+        A, q, v = system.A, system.q, system.q_prime
+        F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
+        if abs(F0) > INPUT_TOLERANCE:
+            raise InvalidInput(("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}")
+        return cls(A, q, v * np.sqrt(h / integrals.energy(A, q, v)), frame, normalize=True)
 
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the principal axes; F_0 = 0.
 
-        q' = q̇ √((Aq,q)/(2h det A)); ``NeumannSystem.veselova`` is the way back. Raises InvalidInput for a body at rest.
+        q' = q̇ √((Aq,q)/(2h det A)); ``from_neumann`` is the way back. Raises InvalidInput for a body at rest.
         """
         if not self.moves:
             raise InvalidInput(("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector")

@@ -18,7 +18,6 @@ import orjson
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import VeselovaError
-from veselova.mechanics.results.npz import archived_series, read_archive
 from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.trajectory import Provenance, Trajectory
 from veselova.service.api.request_models import TrajectoryRequest
@@ -97,7 +96,7 @@ def _arrays(trajectory: Trajectory) -> Arrays:
     """Return what a trajectory is made of: what follows from it is computed again where it is asked for."""
     problem = trajectory.problem
     if trajectory.decimals is not None:
-        return dict(archived_series(trajectory, problem.outputs))
+        return dict(trajectory.named_arrays(problem.outputs))
     series = {name: values for name, values in trajectory.arrays.items() if name not in problem.derived}
     remainders = {} if trajectory.remainders is None else {"remainders": trajectory.remainders}
     return {"times": trajectory.times, **remainders, "error": trajectory.error, **series}
@@ -160,6 +159,6 @@ def unpacked(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
     asked = TrajectoryRequest.model_validate(header["request"])
     problem, provenance = asked.problem.problem(), header["provenance"]
     if header["decimals"]:
-        return asked, read_archive(problem, {**arrays, "provenance": provenance})
+        return asked, Trajectory.from_arrays(problem, {**arrays, "provenance": provenance})
     times, error, remainders = arrays.pop("times"), arrays.pop("error"), arrays.pop("remainders", None)
     return asked, Trajectory(problem, times, error, arrays, Provenance(**provenance), remainders=remainders)

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 from urllib.parse import quote
 
 from veselova.mechanics.core.errors import InvalidInput, ServiceError, shown
@@ -17,9 +17,6 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest, sweep_document
 from veselova.service.client.download import MEDIA_TYPES, sink_of
 from veselova.service.client.requests import Call
-
-if TYPE_CHECKING:
-    from veselova.service.client.client import AsyncClient, Client
 
 __all__ = ["Flow", "Pause", "RemoteJob", "sweep_flow"]
 
@@ -44,13 +41,20 @@ class Pause:
 Flow: TypeAlias = "Generator[Call[Any] | Pause, Any, Any]"
 
 
+class Runner(Protocol):
+    """A client: it carries out a flow of calls and pauses."""
+
+    def run(self, flow: Flow) -> Any:
+        """Carry out a flow, and return what it ends with: at once, or as something to be awaited."""
+
+
 class RemoteJob:
     """A sweep on a server. Every method of an AsyncClient's job is to be awaited; those of a Client's job return at once.
 
     ``id``: the same request has the same, so that ``client.job(id)`` finds it again.
     """
 
-    def __init__(self, client: Client | AsyncClient, job_id: str) -> None:
+    def __init__(self, client: Runner, job_id: str) -> None:
         if not isinstance(job_id, str) or not job_id.strip("."):  # no part of an address is empty, or dots alone
             raise InvalidInput(("job_id",), "the id of a job", shown(job_id))
         self._client = client
@@ -131,7 +135,7 @@ class RemoteJob:
 
 
 def sweep_flow(
-    client: Client | AsyncClient,
+    client: Runner,
     problem: Problem | Mapping[str, Any],
     vary: Mapping[str, Any],
     times: Any,
