@@ -58,7 +58,7 @@ def main(most: int) -> None:
         difference = np.max(np.abs(frame - finer.decimals.midpoints["frame"]))
         details, span = found.provenance.details, f"{times.size} to {times[-1]:g}"
         spent = "   ".join(f"{x:7.2f}" for x in seconds)
-        figures = f"{spent}   {details['working_digits']:7d}   {details['clock']:8s}   {details['clock_size']:11d}"
+        figures = f"{spent}   {details['working_digits']:7d}   {details['time_map']:8s}   {details['time_map_size']:11d}"
         errors = f"{max(found.decimals.error):8.1e}   {difference:8.1e}"
         print(f"{body.n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
 

@@ -52,10 +52,10 @@ def main() -> None:
         integrating = min(integration) * FAR / 1000
 
         solution = Solution(problem)
-        unguarded = solution.attitude(solution.fourier_clock(False).tau1(times)[1], "angles")
+        unguarded = solution.attitude(solution.fourier_time_map(False).tau1(times)[1], "angles")
         difference = np.max(np.abs(solution.states(unguarded)[2] - trajectory.frame))
         floor = problem.conditioning_floor(times)[0]
-        size = trajectory.provenance.details["clock_size"]
+        size = trajectory.provenance.details["time_map_size"]
         print(
             f"{n}   {size:6d}   {setup:8.3f}   {one * 1e3:15.2f}   {integrating:22.1f}   {integrating / one:8.1e}"
             f"   {trajectory.error[0]:8.1e}   {difference:17.1e}   {floor:6.1e}",

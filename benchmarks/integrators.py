@@ -62,7 +62,7 @@ def heyoka(problem: Veselova) -> np.ndarray:
 def heyoka_compiled_anew(problem: Veselova) -> np.ndarray:
     from heyoka import llvm_state
 
-    heyoka_peer.compiled.cache_clear()
+    heyoka_peer.compile_integrator.cache_clear()
     llvm_state.clear_memcache()
     return heyoka(problem)
 

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.dense_output.output_array import Filling
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.dense_output.output_array import OutputArray
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 
 
@@ -35,8 +35,8 @@ def problem(n: int) -> vs.Veselova:
 def clock(body: vs.Veselova, times: np.ndarray) -> None:
     """Take t to τ₁ as the method does, and nothing else."""
     solution = Solution(body)
-    chosen = Horizon(solution, times, "nufft").clock()
-    Filling(times, times.size + 1, chosen, solution.in_tau1.rates, lambda tau1, z: (tau1, (tau1,))).completed()
+    chosen = EvaluationPlan(solution, times, "nufft").time_map()
+    OutputArray(times, times.size + 1, chosen, solution.in_tau1.rates, lambda tau1, z: (tau1, (tau1,))).complete()
 
 
 def best(call: Callable[[], Any]) -> tuple[float, Any]:

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import random_problem
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.panels import PanelClock
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
 
 RUNS, CYCLES, PHASES = 3, 60, 200
 
@@ -37,7 +37,7 @@ def costs(solution: Solution) -> list[float]:
     for run in range(RUNS):
         for k, rate in enumerate(rates):
             began = time.process_time()
-            assert PanelClock(rate, solution.mean_rate, solution.in_tau1, 0.0, span).panels
+            assert ChebyshevTimeMap(rate, solution.mean_rate, solution.in_tau1, 0.0, span).panels
             seconds[run, k] = time.process_time() - began
     return [1e6 / CYCLES * float(least) for least in seconds.min(axis=0)]
 

@@ -36,7 +36,7 @@ def main(count: int, farthest: float) -> None:
             truth = solve(problem, times, digits=25)
             for clock, found in rows.items():
                 try:
-                    closed = solve_analytic(problem, times, clock=clock)
+                    closed = solve_analytic(problem, times, time_map=clock)
                 except Unsolved as refused:
                     print(f"{n}   {clock}: {refused}")
                     continue

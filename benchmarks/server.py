@@ -42,7 +42,7 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 
-from veselova.service.answers.rendering import Wanted, solved
+from veselova.service.answers.rendering import Representation, render_solution
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.workers.tasks import warm_up
 
@@ -136,7 +136,7 @@ def without_provenance(answer: bytes) -> dict[str, Any]:
 def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
     """Return the seconds of the same answer in this process, and the answer: the problem, the solve, the integrals, the text."""
     began = time.perf_counter()
-    delivery = solved(pickle.dumps(request), Wanted("json", "identity"), None)
+    delivery = render_solution(pickle.dumps(request), Representation("json", "identity"), None)
     seconds = time.perf_counter() - began
     assert delivery.body is not None
     return seconds, delivery.body

@@ -27,7 +27,7 @@ import numpy as np
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import local_settings, run_sweep
-from veselova.service.sweeps.chunk import computed_chunk
+from veselova.service.sweeps.chunk import compute_chunk
 from veselova.version import __version__
 
 BASE = {"system": "veselova", "A": [1, 1, 1], "q": [1, 0, 0], "q_dot": [0, 1, 0], "normalize": True}
@@ -58,7 +58,7 @@ def swept(sweep: SweepRequest, workers: int) -> float:
 
 def chunk(work: tuple[bytes, int, int]) -> int:
     """Return how many problems were solved: those of one chunk."""
-    return computed_chunk(*work, __version__).rows
+    return compute_chunk(*work, __version__).rows
 
 
 def pooled(sweep: SweepRequest, processes: int) -> float:

@@ -23,12 +23,12 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.dense_output.interpolation import Windows
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import UniformClock
+from veselova.analytic.time_map.rate import UniformTimeMap
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem, random_riemann_matrix
@@ -79,14 +79,14 @@ def along_orbit(genus: int, count: int) -> str:
     T, start, rates = np.array(solution.periods.riemann_matrix), solution.in_time.start, solution.in_time.rates
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
-    clock = UniformClock(LinearFlow.of(start, rates), 1.0)
-    fewest = Horizon(solution, times).costs.fewest_in_window(32, "panels")
+    clock = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
+    fewest = EvaluationPlan(solution, times).costs.fewest_in_window(32, "panels")
 
     def evaluation(_: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
 
     began = time.process_time()
-    ours = Windows(times, float(np.max(np.abs(rates))), fewest).along(clock, rates, evaluation).series[0][:, 0]
+    ours = Windows(times, float(np.max(np.abs(rates))), fewest).interpolate(clock, rates, evaluation).series[0][:, 0]
     each = (time.process_time() - began) / times.size
     chosen = np.linspace(0, times.size - 1, 40 if genus < 4 else 5).astype(int)
     ctx.prec = 128

@@ -107,4 +107,4 @@ def test_continuation_leads_where_newtons_method_loses_its_way() -> None:
     z = np.random.default_rng(1).uniform(0, 1, (2000, 3))
     assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 1e-12
     for point in z[:20]:
-        assert np.allclose(inversion._continued(point), inversion.invert(point[None])[0], atol=1e-6)
+        assert np.allclose(inversion._continue_angles(point), inversion.invert(point[None])[0], atol=1e-6)

@@ -19,7 +19,7 @@ from conftest import PATIENCE, Server, running_server, slow, wait_until
 from hostile import GOOD
 from test_http import is_problem, post
 from veselova import Trajectory, Veselova, solve
-from veselova.service.api.content_negotiation import accepted_coding, accepted_type
+from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS
 from veselova.service.api.problem_details import Refused
 
@@ -108,7 +108,7 @@ def test_what_is_on_offer_is_named_where_nothing_is_acceptable(own: Server) -> N
     document = is_problem(post(own, "/v1/trajectories", GOOD, accept="text/html"), 406, "not-acceptable")
     assert all(media_type in document["detail"] for media_type in TYPES.values())
     with pytest.raises(Refused, match="application/json"):
-        accepted_type("text/csv", ["application/json"])
+        negotiate_type("text/csv", ["application/json"])
 
 
 @pytest.mark.parametrize("coding", ["zstd", "gzip", "identity"])
@@ -143,7 +143,7 @@ def test_what_is_compressed_already_is_not_compressed_again(own: Server) -> None
     ],
 )
 def test_the_coding_is_the_one_that_a_client_prefers(header: str | None, coding: str) -> None:
-    assert accepted_coding(header) == coding
+    assert negotiate_coding(header) == coding
 
 
 def test_a_request_spelt_out_has_the_tag_of_the_short_one(own: Server) -> None:

@@ -15,21 +15,21 @@ import pytest
 from hostile import GOOD
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.answers.cache import Cache
-from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry, unpacked
-from veselova.service.answers.rendering import Wanted, restored, solved
+from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry, unpack
+from veselova.service.answers.rendering import Representation, render_kept, render_solution
 from veselova.service.answers.spool import Spool
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import TrajectoryRequest, read_request
-from veselova.service.workers.tasks import requested_trajectory
+from veselova.service.workers.tasks import solve_request
 
-IN_MEMORY = Wanted("json", "identity")
+IN_MEMORY = Representation("json", "identity")
 
 REQUEST = read_request(TrajectoryRequest, GOOD)
 
 
 @pytest.fixture(scope="module")
 def motion() -> Trajectory:
-    return requested_trajectory(REQUEST)
+    return solve_request(REQUEST)
 
 
 def put(cache: Cache, name: str, motion: Trajectory) -> int:
@@ -104,8 +104,8 @@ def full_disk(tmp_path: Path) -> str:
 
 def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk: str) -> None:
     answer = tmp_path / "answer"
-    delivery = solved(
-        pickle.dumps(GOOD), Wanted("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6)
+    delivery = render_solution(
+        pickle.dumps(GOOD), Representation("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6)
     )
     assert delivery.not_stored == "No space left on device"
     assert (delivery.stored, delivery.entry) == (0, None)
@@ -115,7 +115,7 @@ def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk
 
 def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> None:
     with pytest.raises(Refused) as raised:
-        solved(pickle.dumps(GOOD), Wanted("csv", "identity", full_disk), None)
+        render_solution(pickle.dumps(GOOD), Representation("csv", "identity", full_disk), None)
     assert raised.value.code == "storage-full"
     assert not Path(full_disk).is_symlink()
     assert Path("/dev/full").exists()
@@ -134,43 +134,43 @@ def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> N
 def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
     tmp_path: Path, changes: dict[str, Any], form: str
 ) -> None:
-    entry, wanted = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6), Wanted(form, "identity")
-    made = solved(pickle.dumps({**GOOD, **changes}), wanted, entry)
+    entry, wanted = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6), Representation(form, "identity")
+    made = render_solution(pickle.dumps({**GOOD, **changes}), wanted, entry)
     assert made.entry
     assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
     for again in (
-        restored(made.entry, wanted),
-        restored(entry.path, wanted),
-        solved(pickle.dumps({**GOOD, **changes}), wanted, entry),
+        render_kept(made.entry, wanted),
+        render_kept(entry.path, wanted),
+        render_solution(pickle.dumps({**GOOD, **changes}), wanted, entry),
     ):
-        assert (again.body, again.provenance, again.kept) == (made.body, made.provenance, True)
+        assert (again.body, again.provenance, again.cached) == (made.body, made.provenance, True)
         assert (again.stored, again.entry) == (0, None)
     with pytest.raises(FileNotFoundError):
-        restored(str(tmp_path / "none"), IN_MEMORY)
+        render_kept(str(tmp_path / "none"), IN_MEMORY)
 
 
 @pytest.mark.parametrize("content", [b"", b"1234", b"{}\n" + bytes(4), b"something else altogether"])
 def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "other").write_bytes(content)
     with pytest.raises(DamagedEntry):
-        restored(str(tmp_path / "other"), IN_MEMORY)
+        render_kept(str(tmp_path / "other"), IN_MEMORY)
     entry = Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6)
-    made = solved(pickle.dumps(GOOD), IN_MEMORY, entry)
-    assert (made.kept, made.damaged) == (False, True)
+    made = render_solution(pickle.dumps(GOOD), IN_MEMORY, entry)
+    assert (made.cached, made.damaged) == (False, True)
     assert made.entry
     assert entry.write_packed(made.entry)
-    assert restored(str(tmp_path / "other"), IN_MEMORY).body == made.body
+    assert render_kept(str(tmp_path / "other"), IN_MEMORY).body == made.body
 
 
 def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Path) -> None:
     """Spheroconic coordinates are kept where the engine found them; where it did not, they follow from the frame."""
     for method in ("theta", "angles"):
         request = {**GOOD, "method": method}
-        made = solved(
+        made = render_solution(
             pickle.dumps({**request, "outputs": ["q"]}), IN_MEMORY, Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
         )
         assert made.entry
-        kept, expected = unpacked(made.entry)[1], requested_trajectory(read_request(TrajectoryRequest, request))
+        kept, expected = unpack(made.entry)[1], solve_request(read_request(TrajectoryRequest, request))
         for name in expected.problem.outputs:
             assert np.array_equal(kept.series(name), expected.series(name)), name
 
@@ -178,10 +178,10 @@ def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Pa
 def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("veselova.service.answers.rendering._MOST_SENT", 100)
     entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
-    made = solved(pickle.dumps(GOOD), IN_MEMORY, entry)
+    made = render_solution(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert made.entry is None
     assert made.stored == (tmp_path / "kept").stat().st_size
-    assert solved(pickle.dumps(GOOD), IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
+    assert render_solution(pickle.dumps(GOOD), IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
     assert list(tmp_path.iterdir()) == [tmp_path / "kept"]
 
 

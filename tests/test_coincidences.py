@@ -13,8 +13,8 @@ import veselova as vs
 from conftest import slow
 from truth import true_motion
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.motion.drift_bound import Drift, expected_growth
-from veselova.analytic.spectrum.branch_points import resolved
+from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
+from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 
 SYMMETRIC = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
@@ -64,7 +64,7 @@ def test_certified_motions_of_equal_A_hold_the_integrated_ones(problem: vs.Vesel
 def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(problem: vs.Veselova, digits: int) -> None:
     """Equal A's drawn apart by 10^(−2·digits−10): the motions of the two bodies are at most so far from each other."""
     times, given = [-1, 1, 3], moving_part(problem)
-    moved = resolved(given, digits).moving
+    moved = resolve_spectrum(given, digits).moving
     A = list(problem.exact.A)
     for a, vector in zip(moved.A, moved.vectors, strict=True):
         (axis,) = [i for i, component in vector.items() if component]
@@ -72,7 +72,7 @@ def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(problem: vs.V
     other = vs.Veselova(A, problem.exact.q, problem.exact.tangent, problem.exact.frame, normalize=True)
     one, two = (vs.solve(p, times, digits=40).decimals for p in (problem, other))
     with balls(40) as xp:
-        drift = replace(Drift.of(given, moved, xp), frames=xp.number(0))
+        drift = replace(PerturbationBound.of(given, moved, xp), frames=xp.number(0))
         late, velocity, turned, _ = drift.bounds(xp.array(one.midpoints["tau1"].astype(float)), xp)
         found = {name: np.abs(one.midpoints[name] - two.midpoints[name]) for name in ("tau1", "q_dot", "q")}
         for name, bound in (("tau1", late), ("q_dot", velocity), ("q", turned)):
@@ -82,10 +82,10 @@ def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(problem: vs.V
 
 
 def test_growth_is_expected_as_it_is_bounded() -> None:
-    found = resolved(moving_part(FOUR), 20)
+    found = resolve_spectrum(moving_part(FOUR), 20)
     with balls(40) as xp:
-        drift = Drift.of(moving_part(FOUR), found.moving, xp)
-    assert expected_growth(found.spectrum, 30.0) == pytest.approx(drift.growth * 30 / np.log(10), abs=1)
+        drift = PerturbationBound.of(moving_part(FOUR), found.moving, xp)
+    assert estimate_growth(found.spectrum, 30.0) == pytest.approx(drift.growth * 30 / np.log(10), abs=1)
 
 
 def test_equal_A_are_not_certified_for_ever() -> None:
@@ -97,7 +97,7 @@ def test_equal_A_are_not_certified_for_ever() -> None:
 def test_a_separatrix_is_not_certified() -> None:
     """F_1 = v_1² + Σ (q_1v_j−q_jv_1)²/(I_1−I_j) vanishes at q = (0, 1, 1)/√2 with 1/A = 2, 1, 3, whatever the velocity."""
     problem = vs.Veselova(["1/2", 1, "1/3"], [0, 1, 1], [1, "0.5", "-0.5"], normalize=True)
-    assert resolved(moving_part(problem), 20).separatrices == (1,)
+    assert resolve_spectrum(moving_part(problem), 20).separatrices == (1,)
     with pytest.raises(vs.Unsolved, match="separatrix") as caught:
         vs.solve(problem, [1], certified=True)
     assert caught.value.outcome == "not-enclosed"

@@ -26,16 +26,16 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
-from veselova.analytic.spectrum.branch_points import resolved
-from veselova.analytic.spectrum.branch_points_balls import enclosed
+from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
+from veselova.analytic.spectrum.branch_points import resolve_spectrum
+from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.time_map.fourier_balls import EnclosedFourier
-from veselova.analytic.time_map.panels_balls import EnclosedClock
+from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
+from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
+from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
 
@@ -95,7 +95,7 @@ def test_thirty_digits_at_a_million_million() -> None:
     found, finer = (vs.solve(body3(), times, digits=digits) for digits in (30, 36))
     assert found.decimals is not None
     assert finer.decimals is not None
-    assert found.provenance.details["clock"] == "fourier"
+    assert found.provenance.details["time_map"] == "fourier"
     assert max(found.decimals.error) < Decimal("1e-30")
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-30
 
@@ -148,12 +148,12 @@ def test_a_separatrix_has_all_digits_of_exact_data() -> None:
 def test_many_digits_reach_far_next_to_a_separatrix() -> None:
     near = near_unstable_circle("1e-3", "1e-4")
     found, finer = (vs.solve(near, [50, 1e6], digits=digits) for digits in (16, 22))
-    assert found.provenance.details["clock"] == finer.provenance.details["clock"] == "fourier"
+    assert found.provenance.details["time_map"] == finer.provenance.details["time_map"] == "fourier"
     assert found.decimals is not None
     assert finer.decimals is not None
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-16
     soon = vs.solve(near, [50], digits=22)
-    assert soon.provenance.details["clock"] == "panels"
+    assert soon.provenance.details["time_map"] == "panels"
     assert soon.decimals is not None
     assert np.max(np.abs(soon.decimals.midpoints["frame"][0] - finer.decimals.midpoints["frame"][0])) < 1e-21
 
@@ -167,13 +167,13 @@ def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
 @pytest.mark.slow
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
-    solution = EnclosedSolution(Solution(body3()), 45, False, "angles")
+    solution = SolutionInBalls(Solution(body3()), 45, False, "angles")
     near = vs.solve(body3(), [20]).tau1 / float(solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit)))
     with solution.arithmetic as xp:
         times = xp.array([20])
-        by_panels = EnclosedClock(solution.orbit, near, False).tau1(times, near)
-        by_bounded_panels = EnclosedClock(solution.orbit, near, True).tau1(times, near)
-        by_modes = EnclosedFourier(solution.orbit).tau1(times, near)
+        by_panels = ChebyshevTimeMapInBalls(solution.orbit, near, False).tau1(times, near)
+        by_bounded_panels = ChebyshevTimeMapInBalls(solution.orbit, near, True).tau1(times, near)
+        by_modes = FourierTimeMapInBalls(solution.orbit).tau1(times, near)
         for other in (by_bounded_panels, by_modes):
             assert by_panels[0].overlaps(other[0])
             assert float(abs(by_panels[0] - other[0]).upper()) < 1e-40
@@ -243,15 +243,15 @@ def test_a_frame_given_to_many_digits_is_made_orthogonal_to_all_of_them() -> Non
 def test_the_rate_of_the_clock_is_one_theta_quotient(n: int, rng: np.random.Generator) -> None:
     solution = Solution(random_problem(rng, n, 100.0))
     z = rng.uniform(-1, 1, (50, n - 1))
-    ratio = solution.quotients.stretch(z) / solution.rate.at(solution.inversion.invert(z))
+    ratio = solution.quotients.time_rate(z) / solution.rate.at(solution.inversion.invert(z))
     assert np.max(np.abs(ratio / ratio[0] - 1)) < 1e-12
 
 
 def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> None:
     """At the edge of the strip, |Im v| = K'/2, the forms are evaluated with mpmath's elliptic functions."""
     with balls(20) as xp:
-        found = resolved(moving_part(random_problem(rng, 4)), 20)
-        curve = Curve.of(enclosed(found), xp)
+        found = resolve_spectrum(moving_part(random_problem(rng, 4)), 20)
+        curve = Curve.of(enclose_spectrum(found), xp)
         for left in range(2 * curve.genus):
             interval = Interval(curve, left)
             bound = [float(x) for x in interval.bound_in_strip()]
@@ -277,7 +277,7 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
 def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -> None:
     """Taylor coefficients of dt/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
     for n in (3, 5):
-        solution = EnclosedSolution(Solution(random_problem(rng, n)), 50, True, "angles")
+        solution = SolutionInBalls(Solution(random_problem(rng, n)), 50, True, "angles")
         with solution.arithmetic as xp:
             width, largest = solution.orbit.strip
             step = xp.number(width) / 40
@@ -289,7 +289,7 @@ def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -
 
 
 def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generator) -> None:
-    solution = EnclosedSolution(Solution(random_problem(rng, 5)), 40, True, "angles")
+    solution = SolutionInBalls(Solution(random_problem(rng, 5)), 40, True, "angles")
     inversion: AbelJacobi = solution.orbit.rate.inversion
     with solution.arithmetic as xp:
         psi = xp.array(rng.uniform(0, 6, (6, 4)))
@@ -427,7 +427,7 @@ def test_what_cannot_be_enclosed_says_which_step_failed() -> None:
 def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
     problem = body3()
     trajectory = vs.solve(problem, ["0.1", 2], digits=40, certified=True)
-    document = json.loads(encoded(trajectory_document(trajectory)))
+    document = json.loads(encode(trajectory_document(trajectory)))
     assert document["series"]["q"][1][0] == str(trajectory.decimals.midpoints["q"][1, 0])  # type: ignore[union-attr]
     back = trajectory_of(problem, document)
     assert back.decimals is not None

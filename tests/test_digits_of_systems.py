@@ -19,10 +19,10 @@ from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
 from test_cli import run
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
+from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
+from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 #: Points on the unit sphere and tangents, exactly; F_0 is not zero.
 POINTS = {
@@ -241,7 +241,7 @@ def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) ->
     stream = io.BytesIO()
     trajectory.to_npz(stream)
     stream.seek(0)
-    document = trajectory_of(problem, orjson.loads(encoded(trajectory_document(trajectory))))
+    document = trajectory_of(problem, orjson.loads(encode(trajectory_document(trajectory))))
     archive = Trajectory.from_arrays(problem, np.load(stream))
     for found in (document.decimals, archive.decimals, pickle.loads(pickle.dumps(trajectory)).decimals):
         assert found is not None
@@ -275,13 +275,13 @@ def test_the_command_line_answers_in_decimals() -> None:
     document = json.loads(answer.stdout)
     here = decimals(neumann(3), [Fraction(1, 3)], digits=40)
     assert document["series"]["q_prime"] == here.strings("q_prime")
-    assert document["provenance"]["details"]["clock"] == "uniform"
+    assert document["provenance"]["details"]["time_map"] == "uniform"
 
 
 def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
     """Taylor coefficients of ds/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
     for n in (3, 5):
-        solution = EnclosedSolution(Solution(geodesic(n)), 50, True, "angles")
+        solution = SolutionInBalls(Solution(geodesic(n)), 50, True, "angles")
         with solution.arithmetic as xp:
             width, largest = solution.orbit.strip
             step = xp.number(width) / 40

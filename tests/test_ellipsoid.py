@@ -11,7 +11,7 @@ from conftest import slow
 from truth import true_geodesic
 from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Veselova, solve
 from veselova.mechanics.geometry.confocal_quadrics import contacts, lax_matrix, lax_partner
-from veselova.mechanics.geometry.integrals_of_motion import clock_rate
+from veselova.mechanics.geometry.integrals_of_motion import time_rate
 from veselova.mechanics.systems.ellipsoid import normal_velocity
 
 Generator = np.random.Generator
@@ -95,7 +95,7 @@ def test_the_normal_is_neumanns_point_and_the_veselova_body(rng: Generator) -> N
     problem = drawn(rng, 4)
     found = solve(problem, [0.5, 3.0])
     velocity = normal_velocity(problem.A, problem.frame[:, 0], problem.X_dot)
-    q_prime = velocity / clock_rate(problem.A, problem.frame[:, 0], velocity)
+    q_prime = velocity / time_rate(problem.A, problem.frame[:, 0], velocity)
     neumann = solve(NeumannSystem(problem.A, problem.frame[:, 0], q_prime), found.tau1)
     assert np.allclose(neumann.q, found.frame[:, :, 0], atol=1e-13)
     assert np.allclose(neumann.integrals["F0"], 0, atol=1e-13)

@@ -222,8 +222,10 @@ def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator)
     """To a time of many cycles and, from the state there, home again: two curves, two starts, two clocks."""
     problem = random_problem(rng, n)
     t = cycles / float(np.max(np.abs(Solution(problem).in_time.rates)))
-    there = solve_analytic(problem, [t], clock="panels")
-    home = solve_analytic(Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True), [-t], clock="panels")
+    there = solve_analytic(problem, [t], time_map="panels")
+    home = solve_analytic(
+        Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True), [-t], time_map="panels"
+    )
     floor = problem.conditioning_floor(np.array([t]))[0]
     assert np.max(np.abs(home.frame[0] - problem.frame)) <= 100 * floor
     assert np.isclose(home.tau1[0], -there.tau1[0], rtol=1e-11)
@@ -237,7 +239,7 @@ def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
     found = solve(problem, times)
     assert found.provenance.details["guard_digits"]
     solution = Solution(problem)
-    unguarded = solution.fourier_clock(False)
+    unguarded = solution.fourier_time_map(False)
     attitude = solution.attitude(unguarded.tau1(times)[1], "angles")
     _, _, frame = solution.states(attitude)
     floor = problem.conditioning_floor(times)

@@ -327,7 +327,7 @@ def test_the_index_ranges_of_im3_belong_to_the_other_letters(n: int, rank: int, 
         rows = [np.outer(frame[i], frame[p]) - np.outer(frame[p], frame[i]) for i, p in pairs]
         return float(measure.restricted_determinant(system.inertia, group.coordinates(np.array(rows))))
 
-    true = float(measure.momentum_density(system.inertia, system.distribution.seen(frame)[0])) ** 2
+    true = float(measure.momentum_density(system.inertia, system.distribution.in_body(frame)[0])) ** 2
     assert np.isclose(determinant([(i, p) for i in range(rank) for p in range(i + 1, n)]), true)
     assert abs(determinant([(i, p) for p in range(rank) for i in range(n)])) < 1e-12 * true
     assert not np.isclose(determinant([(i, p) for p in range(rank) for i in range(p)]), true, rtol=1e-3)

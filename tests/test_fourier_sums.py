@@ -12,7 +12,7 @@ import pytest
 import veselova as vs
 from test_many_digits import in_rationals
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.arithmetic.fixed_point import Fixed
+from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion import time_map_balls
@@ -36,7 +36,7 @@ def complex_products(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
 def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np.random.Generator) -> None:
     count, unit = 40, Fraction(1, 2**bits)
     angles = rng.uniform(0, 7, 3)
-    first = Fixed.of([np.stack([np.cos(angles), np.sin(angles)])], bits)
+    first = FixedPoint.of([np.stack([np.cos(angles), np.sin(angles)])], bits)
     table = first[0, :].turns(first[1, :], count)
     found, w = np.array(in_rationals(table.parts()), dtype=object).reshape(2, count, 3), in_rationals(first.parts())
     power = [Fraction(1)] * 3 + [Fraction(0)] * 3
@@ -44,10 +44,10 @@ def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(bit
         for got, exact in zip(found[:, m].ravel(), power, strict=True):
             assert abs(got - exact) <= 3 * max(m - 1, 0) * unit, m
         power = complex_products(power, w)
-    x, y = Fixed(table.limbs[:, 0].swapaxes(1, 2)), Fixed(table.limbs[:, 1].swapaxes(1, 2))
+    x, y = FixedPoint(table.limbs[:, 0].swapaxes(1, 2)), FixedPoint(table.limbs[:, 1].swapaxes(1, 2))
     for n, got in enumerate(in_rationals(x.dot(y).parts())):
         assert abs(got - sum(found[0, :, n] * found[1, :, n])) <= count * unit
-    many = Fixed(np.tile(x.limbs[:, :1], (1, 1, 60)))  # more than one product of matrices takes
+    many = FixedPoint(np.tile(x.limbs[:, :1], (1, 1, 60)))  # more than one product of matrices takes
     once = sum(found[0, :, 0] ** 2)
     assert abs(in_rationals(many.dot(many).parts())[0] - 60 * once) <= 60 * count * unit
 
@@ -59,7 +59,7 @@ def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[A
     modes = rng.permutation(modes[first > 0]) * -1
     coefficients = xp.array(rng.normal(size=len(modes))) * xp.number(size) / xp.number(3)
     if size != 1:
-        coefficients[-1] = xp.widened(coefficients[-1], coefficients[-1] * xp.epsilon)
+        coefficients[-1] = xp.add_error(coefficients[-1], coefficients[-1] * xp.epsilon)
     return modes, coefficients, xp.midpoints(xp.array(rng.uniform(-2, 2, (11, genus))) / xp.number(7))
 
 
@@ -106,7 +106,7 @@ def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Gener
     for digits, size, slack, genus in ((300, 1, 0, 3), (30, 0, 0, 2), (30, 10**200, 0, 1), (30, 1, Fraction(1, 1000), 2)):
         with balls(digits, False) as xp:
             modes, coefficients, _ = drawn(genus, size, xp, rng)
-            turns = xp.turns(xp.widened(xp.array(rng.uniform(-1, 1, (4, genus))), xp.number(slack)))
+            turns = xp.turns(xp.add_error(xp.array(rng.uniform(-1, 1, (4, genus))), xp.number(slack)))
             weights = coefficients[None, :4]
             points = SumsOverPoints(turns, weights, 9, xp)
             assert points._in_fixed_point is None
@@ -125,7 +125,7 @@ def test_modes_take_over_where_panels_do_not_reach(A: list[str], monkeypatch: py
     by_panels = vs.solve(body, times, digits=20)
     monkeypatch.setattr(enclosed_clock, "_MOST_NODES", 10)
     by_modes = vs.solve(body, times, digits=20)
-    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
     assert by_panels.decimals is not None
     assert by_modes.decimals is not None
     difference = np.abs(by_panels.decimals.midpoints["frame"] - by_modes.decimals.midpoints["frame"])
@@ -141,7 +141,7 @@ def test_panels_take_over_where_there_are_too_many_modes(monkeypatch: pytest.Mon
     by_modes = vs.solve(body, [300], digits=20)
     monkeypatch.setattr(enclosed_fourier, "MOST_MODES", 30)
     by_panels = vs.solve(body, [300], digits=20)
-    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
     assert np.max(np.abs(by_panels.frame - by_modes.frame)) < 1e-15
 
 
@@ -167,7 +167,7 @@ def test_many_times_far_out_are_those_of_each() -> None:
     """Ten thousand times over [0, 1000] with 50 digits are more than panels reach; some of them here."""
     body, times = vs.Veselova([3, 2, 1], [1, 1, 1], [1, -2, 1], normalize=True), np.linspace(900, 1000, 600)
     many, single = vs.solve(body, times, digits=50), vs.solve(body, times[::100], digits=50)
-    assert many.provenance.details["clock"] == single.provenance.details["clock"] == "fourier"
+    assert many.provenance.details["time_map"] == single.provenance.details["time_map"] == "fourier"
     assert many.decimals is not None
     assert single.decimals is not None
     assert np.max(np.abs(many.decimals.midpoints["frame"][::100] - single.decimals.midpoints["frame"])) < 1e-50
@@ -178,7 +178,7 @@ def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) 
     by_modes = vs.solve(body, ["20"], digits=350)
     monkeypatch.setattr(time_map_balls, "MOST_MODES", 0)
     by_panels = vs.solve(body, ["20"], digits=350)
-    assert [found.provenance.details["clock"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
     assert by_panels.decimals is not None
     assert by_modes.decimals is not None
     assert max(by_modes.decimals.error) < Decimal("1e-350")
@@ -191,7 +191,7 @@ def test_modes_of_nearly_coinciding_phases_are_found(apart: list[str]) -> None:
     A = [1, *(1 + Fraction(x) / 10**16 for x in apart)]
     body = vs.Veselova(A, ["0.797", "0.1", "0.604", "0.3"][: len(A)], ["-0.5", "0.82", "0.69", "0.4"][: len(A)], normalize=True)
     by_modes, proven = vs.solve(body, [29, 1e5], digits=18), vs.solve(body, [29], digits=18, certified=True)
-    assert [found.provenance.details["clock"] for found in (by_modes, proven)] == ["fourier", "panels"]
+    assert [found.provenance.details["time_map"] for found in (by_modes, proven)] == ["fourier", "panels"]
     assert by_modes.decimals is not None
     assert proven.decimals is not None
     difference = np.max(np.abs(by_modes.decimals.midpoints["frame"][0] - proven.decimals.midpoints["frame"][0]))

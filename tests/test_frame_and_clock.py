@@ -12,15 +12,15 @@ import pytest
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import near_separatrix, tagged
 from veselova import EllipsoidGeodesic, Veselova, solve
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.numerics.monotone_root import increasing_root
 from veselova.analytic.solve import solve as solve_analytic
 from veselova.analytic.time_map import fourier as fourier_clock
-from veselova.analytic.time_map.fourier import ColumnsForModes, FourierClock
-from veselova.analytic.time_map.fourier_modes import grown
+from veselova.analytic.time_map.fourier import ColumnsForModes, FourierTimeMap
+from veselova.analytic.time_map.fourier_modes import find_significant_modes
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import PanelClock
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 DIMENSIONS = range(2, 9)
@@ -94,7 +94,7 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
     for _ in range(3):
         solution = Solution(random_problem(rng, n))
         times = np.sort(rng.uniform(-80, 80, 30))
-        fourier, panels = (Horizon(solution, times).clock(name) for name in ("fourier", "panels"))
+        fourier, panels = (EvaluationPlan(solution, times).clock(name) for name in ("fourier", "panels"))
         (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
         scale = np.max(np.abs(tau_panels))
         assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
@@ -107,7 +107,7 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
 def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Generator) -> None:
     solution = Solution(random_problem(rng, n))
     means = np.sort(rng.uniform(-40, 40, 30))
-    clocks = [Horizon(solution, np.array([-80.0, 80.0])).clock(name) for name in ("fourier", "panels")]
+    clocks = [EvaluationPlan(solution, np.array([-80.0, 80.0])).clock(name) for name in ("fourier", "panels")]
     (fourier, z_fourier), (panels, z_panels) = (clock.ahead(means) for clock in clocks)
     assert np.allclose(fourier, panels, rtol=0, atol=1e-12)
     assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
@@ -120,14 +120,14 @@ def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Gen
 def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Generator) -> None:
     """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at once."""
     solution = Solution(random_problem(rng, n))
-    clock = Horizon(solution, np.array([1.0])).clock("fourier")
-    assert isinstance(clock, FourierClock)
+    clock = EvaluationPlan(solution, np.array([1.0])).clock("fourier")
+    assert isinstance(clock, FourierTimeMap)
     z = rng.uniform(-1, 1, (40, n - 1))
     series = clock._sum.at(z - solution.in_tau1.start)[1]
     q = solution.attitude(z, "angles").q
     A = np.array([float(a) for a in solution.moving.A])
     start = np.array([float(x) for x in solution.spectrum.q]) ** 2 @ A
-    expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.clock_rate)
+    expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.time_rate)
     assert np.allclose(series, expected, rtol=1e-12)
     assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
     # What makes a step of the inverse clock one of fourth order: the derivatives of the rate along the flow.
@@ -164,7 +164,7 @@ def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: in
     assert solution.takes_rate_from_angles("angles", 100.0)
     found, in_angles = solve(problem, times), solve(problem, times, method="angles")
     assert found.provenance.method == in_angles.provenance.method == "angles"
-    assert found.provenance.details["clock"] == "panels"
+    assert found.provenance.details["time_map"] == "panels"
     assert np.any(found.tau1 != in_angles.tau1)
     assert np.all(np.abs(found.frame - in_angles.frame).max(axis=(1, 2)) < 1e-12)
 
@@ -189,13 +189,13 @@ def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
 def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
     solution = Solution(near_separatrix(gap).problem())
     times = np.linspace(-30, 30, 41)
-    tau_fourier, tau_panels = (Horizon(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels"))
+    tau_fourier, tau_panels = (EvaluationPlan(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels"))
     assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
 
 
 def test_panels_stretch_to_the_wanted_times() -> None:
     solution = Solution(tagged("generic")[3].problem())
-    clock = PanelClock(partial(solution.rate_at, in_angles=False), solution.mean_rate, solution.in_tau1, -0.5, 33.0)
+    clock = ChebyshevTimeMap(partial(solution.rate_at, in_angles=False), solution.mean_rate, solution.in_tau1, -0.5, 33.0)
     assert np.allclose(clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13)
 
 
@@ -261,8 +261,8 @@ def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float,
         return plain(modes, advance)
 
     for _ in range(12):
-        clock = Horizon(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock("fourier")
-        assert isinstance(clock, FourierClock)
+        clock = EvaluationPlan(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock("fourier")
+        assert isinstance(clock, FourierTimeMap)
         times = np.sort(rng.uniform(-20, 20, 40))
         together, _ = clock.tau1(times)
         off = clock.time(together) - times
@@ -304,7 +304,7 @@ def test_modes_that_are_met_again_are_not_taken_again(A: list[object], q: list[o
     """Next to the edge of the set a mode may be found large, or not, by the rounding of the nodes at hand."""
     problem = Veselova(A, q, q_dot, normalize=True)
     times = np.array([0.3, 1.0, 5.0]) / np.max(np.abs(Solution(problem).in_time.rates))
-    fourier, panels = (solve_analytic(problem, times, clock=clock) for clock in ("fourier", "panels"))
+    fourier, panels = (solve_analytic(problem, times, time_map=clock) for clock in ("fourier", "panels"))
     difference = np.max(np.abs(fourier.frame - panels.frame), axis=(1, 2))
     assert np.all(difference <= fourier.error + panels.error)
 
@@ -315,7 +315,7 @@ def test_modes_of_nearly_coinciding_phases_are_found(n: int, gap: float, rng: np
     """With all A's nearly equal the modes with Σm = 1 count, as far as slow differences reach, and neither Σm = 0 nor 2 does."""
     A = 1.7 * (1 + gap * np.cumsum(rng.uniform(0.5, 2, n)))
     solution = Solution(Veselova(A, rng.normal(size=n), rng.normal(size=n), normalize=True))
-    clocks = [Horizon(solution, np.array([0.0, 30.0])).clock(name) for name in ("fourier", "panels")]
+    clocks = [EvaluationPlan(solution, np.array([0.0, 30.0])).clock(name) for name in ("fourier", "panels")]
     fourier, panels = (clock.tau1(np.linspace(0, 30, 50))[0] for clock in clocks)
     assert np.max(np.abs(fourier - panels)) < 1e-13
 
@@ -331,7 +331,7 @@ def test_no_mode_is_looked_at_twice() -> None:
         looked_at.extend(rows)
         return np.ones(len(rows)), np.array(large)
 
-    modes, _, _ = grown(2, coefficients, most=2000)
+    modes, _, _ = find_significant_modes(2, coefficients, most=2000)
     assert len(set(looked_at)) == len(looked_at)
     assert len(set(map(tuple, modes.tolist()))) == len(modes) == (13 * 13 - 1) // 2 - 5
 
@@ -348,10 +348,10 @@ NEAR_A_SEPARATRIX = [
 def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
     problem = near_unstable_circle(q_2, q_dot_2)
     found = solve(problem, [2000.0, 1e6])
-    assert found.provenance.details["clock"] == "fourier"
-    assert found.provenance.details["clock_size"] < 4000
+    assert found.provenance.details["time_map"] == "fourier"
+    assert found.provenance.details["time_map_size"] < 4000
     assert np.max(found.error) < 1e-10
-    by_panels = solve_analytic(problem, [2000.0], clock="panels")
+    by_panels = solve_analytic(problem, [2000.0], time_map="panels")
     assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
 
 
@@ -360,9 +360,9 @@ def test_modes_end_where_one_column_stays_and_the_other_is_rounding() -> None:
     A, q = [1.0, 390.21320456884774, 1.6904640691868722], [1.4480029447187863, 1.8618863684064193, -9.235342032590449e-09]
     problem = Veselova(A, q, [-1.0297444583406776, 0.2868748135792803, 8.900348438623115e-11], normalize=True)
     found = solve(problem, [2000.0, 1e8])
-    assert found.provenance.details["clock_size"] < 8000
+    assert found.provenance.details["time_map_size"] < 8000
     assert np.max(found.error) < 1e-9
-    by_panels = solve_analytic(problem, [2000.0], clock="panels")
+    by_panels = solve_analytic(problem, [2000.0], time_map="panels")
     assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
 
 
@@ -380,9 +380,9 @@ def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:
     """Over twenty-five orders of A the least dt/dτ₁ is below the rounding of the mean, and sums over modes need not increase."""
     problem = Veselova([1e25, 30.0, 2.0, 1.0], [0.3, 0.5, 0.4, 0.7], [0.2, -0.4, 0.6, 0.1], normalize=True)
     with pytest.raises(Unsolved, match="beyond-floats: dt/dτ₁ may vary by"):
-        solve_analytic(problem, [0.1], clock="fourier")
+        solve_analytic(problem, [0.1], time_map="fourier")
     found = solve(problem, [0.1, 1.0])
-    assert found.provenance.details["clock"] == "panels"
+    assert found.provenance.details["time_map"] == "panels"
     assert np.max(found.error) < 1e-9
 
 

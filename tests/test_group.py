@@ -38,7 +38,7 @@ def test_the_product_of_a_group_is_invariant_and_its_brackets_close(name: str, r
     assert np.max(np.abs(jacobi)) < 1e-12
     assert np.allclose(group.element(group.adjoint(g, x)), g @ group.element(x) @ g.T, atol=1e-12)
     assert np.isclose(np.linalg.norm(group.adjoint(g, x)), np.linalg.norm(x))
-    assert np.allclose(group.seen(g).T @ x, group.adjoint(g.T, x), atol=1e-12)
+    assert np.allclose(group.adjoint_matrix(g).T @ x, group.adjoint(g.T, x), atol=1e-12)
     assert f"dimension {group.dimension}" in repr(group)
 
 
@@ -148,7 +148,7 @@ def test_in_three_dimensions_the_special_operator_is_any_inertia_tensor(rng: np.
 
 def test_an_operator_is_scaled_to_moments_near_one_by_a_power_of_two(rng: np.random.Generator) -> None:
     inertia = random_inertia(rng, 6)
-    scaled = Inertia.of_matrix(2.0**40 * inertia.matrix, 6).scaled()
+    scaled = Inertia.of_matrix(2.0**40 * inertia.matrix, 6).rescale()
     mantissa = np.log2(scaled.matrix[0, 0] / inertia.matrix[0, 0])
     assert mantissa == np.rint(mantissa)
     assert 0.5 < np.exp(np.mean(np.log(scaled.moments))) < 2

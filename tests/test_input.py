@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
-from veselova.mechanics.core.errors import VeselovaError, shown
+from veselova.mechanics.core.errors import VeselovaError, show
 from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.times import TimeGrid
 
 
 def test_numerals_given_as_texts_are_shown_as_texts() -> None:
-    assert [shown(value) for value in ("50", " 1e3", "inf", "", "None", "abc", 50, Fraction(1, 10), Decimal("0.5"))] == [
+    assert [show(value) for value in ("50", " 1e3", "inf", "", "None", "abc", 50, Fraction(1, 10), Decimal("0.5"))] == [
         "'50'", "' 1e3'", "'inf'", "''", "'None'", "abc", "50", "1/10", "0.5",
     ]  # fmt: skip
 

@@ -127,13 +127,13 @@ def test_both_fields_are_the_euler_poincare_equations(name: str, rng: np.random.
         step = flow.initial + 1e-30j * flow.field(flow.initial, flow.parameters, FLOATS)
         g, along = step[: group.size**2].reshape(group.size, -1), step[group.size**2 :]
         operator = flow.inertia.inverse if distribution.uses_inverse else flow.inertia.operator
-        rate = distribution.velocity(operator, *distribution.seen(g), along, flow.across).imag / 1e-30 / flow.time_unit**2
+        rate = distribution.velocity(operator, *distribution.in_body(g), along, flow.across).imag / 1e-30 / flow.time_unit**2
         field = other.field(other.initial, other.parameters, FLOATS) / flow.time_unit**2
         assert np.allclose(rate, field[: group.dimension], rtol=1e-11, atol=1e-11)
         assert system.potential is not None
         force = inertia(rate) - group.bracket(inertia(system.omega), system.omega)
         force = force + numerical_gradient(system)
-        W, F = distribution.seen(system.g)
+        W, F = distribution.in_body(system.g)
         assert np.allclose(W @ force, 0, atol=1e-6)
         assert np.allclose(F @ rate, 0, atol=1e-10)
         assert np.allclose(system.derive("multipliers", system.start)[0], F @ force, atol=1e-6)
@@ -169,7 +169,7 @@ def test_the_momentum_equation_and_its_projections_hold_on_so_n(n: int, rank: in
     for name in ("M", "Gamma", "along", "across"):
         bracket = here[name] @ here["omega"] - here["omega"] @ here[name]
         assert np.allclose(rate[name].imag / 1e-30 / flow.time_unit, bracket, atol=1e-11), name
-    W, _ = distribution.seen(system.g)
+    W, _ = distribution.in_body(system.g)
     expected = system.omega + ((inertia(system.omega) - system.omega) @ W.T) @ W
     assert np.allclose(group.coordinates(here["M"]), expected, atol=1e-13)
     again = distribution.momentum(inertia, system.g, system.omega)
@@ -253,7 +253,7 @@ def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(rn
     system = random_lr(rng, 3, 1, homogeneous=False, potential=potential)
     trajectory = solve(system, np.linspace(0, 10, 11))
     assert set(trajectory.integrals) == {"constraint", "momentum", "group"}
-    assert np.ptp(system._jacobi(*system._taken_apart(trajectory.arrays))) > 1e-3
+    assert np.ptp(system._jacobi(*system._split(trajectory.arrays))) > 1e-3
     still = LRSystem(3, 1, {"special": [3, 2, 1]}, None, np.zeros((3, 3)), potential)
     assert "energy" in solve(still, [0, 1]).integrals  # all constants are zero
 

@@ -45,7 +45,7 @@ def test_the_momentum_form_keeps_its_measure_in_both_its_variables(name: str, rn
     for m in {1, D // 2, D - 1}:
         distribution = Distribution.orthogonal_to(group, list(group.element(rng.normal(size=(m, D)))))
         g = group.exponential(rng.normal(size=D))
-        W, _ = distribution.seen(g)
+        W, _ = distribution.in_body(g)
         point = np.concatenate([rng.normal(size=D), W.ravel()])
 
         def field(state: Any) -> Any:
@@ -81,7 +81,7 @@ def test_the_fields_that_are_integrated_keep_these_measures(name: str, formulati
     flow, area = system.flow(formulation), group.size**2
 
     def density(state: Any) -> Any:
-        W, F = system.distribution.seen(state[-area:].reshape(group.size, group.size))
+        W, F = system.distribution.in_body(state[-area:].reshape(group.size, group.size))
         inertia = flow.inertia
         return 1 / measure.momentum_density(inertia, W) if formulation == "momentum" else measure.density(inertia, F)
 
@@ -97,7 +97,7 @@ def test_the_determinant_of_the_special_inertia_is_a_power_of_a_plucker_form(n: 
     """Theorem IM_A with ϱ = r(r+3)/2 − rn; (exp) and its dual with ϱ_1 = dim 𝔥; and the row e_1 … e_r by Cauchy–Binet."""
     A = np.exp(rng.normal(size=n))
     inertia, g = Inertia.special(A, n), np.linalg.qr(rng.normal(size=(n, n)))[0]
-    W, F = Distribution.of_rank(n, rank).seen(g)
+    W, F = Distribution.of_rank(n, rank).in_body(g)
     X, rest = g[:rank].T, g[rank:].T
     direct = measure.restricted_determinant(inertia, W)
     assert np.isclose(direct, measure.special_determinant(A, X), rtol=1e-11)
@@ -158,7 +158,7 @@ def test_for_rank_one_the_density_is_the_known_power_of_one_quadratic_form(rng: 
         ratios = []
         for _ in range(3):
             g = np.linalg.qr(rng.normal(size=(n, n)))[0]
-            ratios.append(measure.momentum_density(inertia, distribution.seen(g)[0]) / (g[0] @ (A * g[0])) ** ((n - 2) / 2))
+            ratios.append(measure.momentum_density(inertia, distribution.in_body(g)[0]) / (g[0] @ (A * g[0])) ** ((n - 2) / 2))
         assert np.allclose(ratios, ratios[0], rtol=1e-12)
 
 
@@ -167,7 +167,7 @@ def test_on_so_3_the_density_is_that_of_the_classical_veselova_system(rng: np.ra
     system = random_lr(rng, 3, 1)
     group, gamma = system.distribution.group, system.g[0]
     tensor = np.array([[group_vector(group, system.inertia(group_of(group, e)))[k] for k in range(3)] for e in np.eye(3)])
-    F = system.distribution.seen(system.g)[1]
+    F = system.distribution.in_body(system.g)[1]
     assert np.isclose(measure.density(system.inertia, F), np.sqrt(gamma @ np.linalg.solve(tensor, gamma)), rtol=1e-12)
 
 

@@ -11,7 +11,7 @@ import pytest
 from draws import random_problem
 from veselova import InvalidInput, Veselova
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalized
+from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize
 from veselova.mechanics.geometry.spheroconic import from_spheroconic, to_spheroconic
 
 DIMENSIONS = range(2, 9)
@@ -97,7 +97,7 @@ def test_the_field_is_the_extended_system_of_the_paper(n: int, rng: np.random.Ge
     assert np.allclose(derivative[:n] * p[0] / flow.initial[0], p_dot, rtol=1e-10, atol=1e-12 * np.max(np.abs(p_dot)))
     rate = np.sqrt(2 * problem.energy * det / (q @ (A * q)))
     assert np.isclose(derivative[-1] * np.sqrt(A[0] / flow.A[0]), rate, rtol=1e-12)
-    assert np.isclose(integrals.clock_rate(A, q, problem.q_dot), rate, rtol=1e-12)
+    assert np.isclose(integrals.time_rate(A, q, problem.q_dot), rate, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -214,7 +214,7 @@ def test_the_natural_frame_of_a_body_at_rest_is_a_frame() -> None:
 
 def test_orthonormalisation_squares_the_defect(rng: np.random.Generator) -> None:
     Q = np.linalg.qr(rng.normal(size=(5, 5)))[0]
-    near = orthonormalized(Q + 1e-9 * rng.normal(size=(5, 5)))
+    near = orthonormalize(Q + 1e-9 * rng.normal(size=(5, 5)))
     assert np.max(np.abs(near.T @ near - np.eye(5))) < 1e-15
 
 

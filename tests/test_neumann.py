@@ -77,7 +77,7 @@ def test_a_point_at_an_eigenvector_rests() -> None:
 def test_neumann_time_costs_the_same_anywhere(rng: Generator) -> None:
     problem = drawn(rng, 3)
     far = solve(problem, [1e9])
-    assert far.provenance.details["clock"] == "uniform"
+    assert far.provenance.details["time_map"] == "uniform"
     assert far.error[0] < 1e-6
     near = solve(problem, [10.0])
     turned = NeumannSystem(problem.A, near.q[0], near.q_prime[0], normalize=True)

@@ -33,7 +33,7 @@ from veselova.service.http.app import create_app
 from veselova.service.observability.logs import line_formatter
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
-from veselova.service.workers.worker_process import SIZE, answered
+from veselova.service.workers.worker_process import SIZE, answer
 from veselova.version import __version__
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
@@ -230,7 +230,7 @@ def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
     metrics, jobs = Metrics(), {"queued": 2.0}
     metrics.gauges("veselova_jobs", "Jobs by state", "state", lambda: jobs)
     for hit in (True, False, True):
-        metrics.cached(hit)
+        metrics.count_cached(hit)
     jobs["running"] = 1.0
     shown = samples(generate_latest(metrics.registry).decode())
     assert shown[("veselova_jobs", "queued")] == 2
@@ -361,7 +361,7 @@ def fail_with_what_cannot_be_made() -> None:
 
 
 def test_a_worker_says_what_happened_whatever_the_exception_is() -> None:
-    succeeded, error = pickle.loads(answered(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :])
+    succeeded, error = pickle.loads(answer(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :])
     assert not succeeded
     assert isinstance(error, RuntimeError)
     assert str(error) == "Unmakeable: what happened"

@@ -11,7 +11,7 @@ import anyio
 
 from conftest import PATIENCE
 from veselova.service.answers.cache import Cache
-from veselova.service.answers.write_behind import Pending
+from veselova.service.answers.write_behind import WriteBehind
 
 
 class SlowCache(Cache):
@@ -32,7 +32,7 @@ def content_of(cache: Cache, name: str) -> bytes | None:
     return None if path is None else Path(path).read_bytes()
 
 
-async def written(pending: Pending, name: str) -> None:
+async def written(pending: WriteBehind, name: str) -> None:
     """Wait until an entry is on its way no more."""
     with anyio.fail_after(PATIENCE):
         while pending.find(name) is not None:
@@ -42,7 +42,7 @@ async def written(pending: Pending, name: str) -> None:
 def test_an_entry_is_there_while_it_is_being_written_and_after(tmp_path: Path) -> None:
     async def run() -> None:
         cache = SlowCache(tmp_path / "cache")
-        pending = Pending(cache)
+        pending = WriteBehind(cache)
         async with pending.writing():
             assert await pending.keep("first", b"1")
             assert pending.find("first") is None, "the first is written before its answer leaves: nobody knows whether that works"
@@ -62,7 +62,7 @@ def test_an_entry_is_there_while_it_is_being_written_and_after(tmp_path: Path) -
 def test_an_entry_is_written_before_its_answer_where_too_many_are_on_their_way(tmp_path: Path) -> None:
     async def run() -> None:
         cache = SlowCache(tmp_path / "cache")
-        pending = Pending(cache, most=10)
+        pending = WriteBehind(cache, most=10)
         async with pending.writing(), anyio.create_task_group() as tasks:
             assert await pending.keep("first", b"1")
             cache.goes.clear()
@@ -93,7 +93,7 @@ def test_an_entry_that_cannot_be_written_stays_and_those_after_it_are_not_promis
     async def run() -> None:
         folder = tmp_path / "cache"
         cache = SlowCache(folder)
-        pending = Pending(cache)
+        pending = WriteBehind(cache)
         async with pending.writing():
             assert await pending.keep("first", b"1")
             (folder / "first.kept").unlink()
@@ -118,7 +118,7 @@ def test_an_entry_that_cannot_be_written_stays_and_those_after_it_are_not_promis
 def test_what_is_on_its_way_is_written_at_the_end(tmp_path: Path) -> None:
     async def run() -> None:
         cache = SlowCache(tmp_path / "cache")
-        pending = Pending(cache)
+        pending = WriteBehind(cache)
         async with pending.writing():
             assert await pending.keep("first", b"1")
             cache.goes.clear()
@@ -134,7 +134,7 @@ def test_what_is_on_its_way_is_written_at_the_end(tmp_path: Path) -> None:
 def test_the_cache_keeps_to_its_size_when_entries_are_written_together(tmp_path: Path) -> None:
     async def run() -> None:
         cache = SlowCache(tmp_path / "cache", size=1000)
-        pending = Pending(cache)
+        pending = WriteBehind(cache)
         async with pending.writing():
             for k in range(40):
                 assert await pending.keep(str(k), bytes(100))

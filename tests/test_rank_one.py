@@ -229,7 +229,7 @@ def test_the_steps_of_the_proof_of_the_reduction_to_neumann(n: int, rng: np.rand
     omega = wedge(q, v)
     omega_dot = (motion.omega[1] - motion.omega[0]) / (2 * step)
     mu = np.sqrt(qAq / (2 * h * det))
-    assert np.isclose(mu, 1 / integrals.clock_rate(A, q, v), rtol=1e-12)  # (4.9) against (4.6)
+    assert np.isclose(mu, 1 / integrals.time_rate(A, q, v), rtol=1e-12)  # (4.9) against (4.6)
     scale = np.max(np.abs(inertia(omega_dot))) + np.max(np.abs(inertia(omega)))
     left = wedge(inertia(omega_dot) @ q, q) + wedge(inertia(omega) @ v, q)
     assert np.max(np.abs(left)) < 1e-6 * scale  # (4.10)

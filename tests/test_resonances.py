@@ -12,7 +12,7 @@ from draws import near_resonance, random_problem
 from veselova import Veselova, VeselovaSO3, solve
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.analytic.time_map.fourier import FourierClock
+from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
 
 #: With A_2 = 1.6 times this 2f_1 = f_2, nearly to rounding.
@@ -24,7 +24,7 @@ def beside(distance: float) -> Veselova:
 
 
 def true_error(problem: Veselova, times: np.ndarray, clock: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    found, truth = solve_analytic(problem, times, clock=clock), solve(problem, times, digits=25)
+    found, truth = solve_analytic(problem, times, time_map=clock), solve(problem, times, digits=25)
     return np.max(np.abs(found.frame - truth.frame), axis=(1, 2)), found.error
 
 
@@ -104,6 +104,6 @@ def test_exact_resonances_are_served() -> None:
     rates = solution.in_tau1.rates.copy()
     rates[0] = rates[1] * np.rint(64 * rates[0] / rates[1]) / 64
     flow = LinearFlow(solution.in_tau1.start, rates, np.zeros(2))
-    clock = FourierClock(solution.rate, flow, LinearFlow.of(flow.start, rates / solution.mean_rate), solution.mean_rate)
+    clock = FourierTimeMap(solution.rate, flow, LinearFlow.of(flow.start, rates / solution.mean_rate), solution.mean_rate)
     tau1 = np.linspace(-50, 50, 11)
     assert np.allclose(clock.tau1(clock.time(tau1))[0], tau1, atol=1e-12)

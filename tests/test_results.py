@@ -86,7 +86,7 @@ def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory)
     assert document["engine"] == "analytic"
     assert document["method"] == "theta"
     assert document["seconds"] > 0
-    assert document["details"]["clock"] == "panels"
+    assert document["details"]["time_map"] == "panels"
     assert json.loads(json.dumps(document)) == document
     assert Provenance(**document) == trajectory.provenance
 

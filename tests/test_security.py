@@ -23,7 +23,7 @@ from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from hostile_bodies import hostile_bodies, hostile_sweeps
 from test_http import is_problem, post
-from veselova.service.api.json_text import decoded
+from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.http.connections import Connections
@@ -84,7 +84,7 @@ def test_repeated_names_are_found_in_linear_time() -> None:
         text = ("{" + ",".join(f'"{k // 2}":1' for k in range(count)) + "}").encode()
         began = time.process_time()
         with pytest.raises(ValueError, match="each field once"):
-            decoded(text)
+            decode(text)
         return time.process_time() - began
 
     seconds(1000)

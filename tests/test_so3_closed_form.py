@@ -13,7 +13,7 @@ import veselova as vs
 from conftest import Server
 from veselova import InvalidInput, Unsolved, VeselovaSO3
 from veselova.mechanics.core.decimals import Decimals
-from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
+from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 #: A body stated in decimals, and the same in doubles.
 TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])
@@ -131,7 +131,7 @@ def test_its_torus_is_that_of_the_rank_one_problem() -> None:
 def test_documents_give_every_decimal_back() -> None:
     problem = VeselovaSO3(*TEXTS)
     found = vs.solve(problem, [1.0, 2.5], digits=40)
-    back = trajectory_of(problem, orjson.loads(encoded(trajectory_document(found))))
+    back = trajectory_of(problem, orjson.loads(encode(trajectory_document(found))))
     assert found.decimals is not None
     assert back.decimals is not None
     for name in problem.outputs:

@@ -28,7 +28,7 @@ from veselova.mechanics.geometry.stiefel import (
     tangent_part,
     trace_integrals,
 )
-from veselova.service.api.json_documents import encoded, trajectory_of
+from veselova.service.api.json_documents import encode, trajectory_of
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.workers.tasks import TASKS
 
@@ -282,7 +282,7 @@ def test_the_service_answers_and_its_answer_is_the_trajectory() -> None:
     problem = {"system": "stiefel", "inertia": A, "X": X, "P": P}
     request = {"problem": problem, "times": [0, 1.5], "outputs": ["X", "P", "omega"], "formulation": "momentum"}
     model, compute = TASKS["trajectory"]
-    document = json.loads(encoded(compute(model.model_validate(request))))
+    document = json.loads(encode(compute(model.model_validate(request))))
     direct = solve(StiefelFlow(A, X, P), [0, 1.5], formulation="momentum")
     again = trajectory_of(StiefelFlow(A, X, P), document)
     for name in ("X", "P", "omega"):

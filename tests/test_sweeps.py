@@ -39,7 +39,7 @@ from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import chunk_dispatch as dispatch
 from veselova.service.sweeps import runner as running
-from veselova.service.sweeps.chunk import OtherVersion, computed_chunk, lost_chunk
+from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
 from veselova.service.sweeps.chunk_dispatch import answers
 from veselova.service.sweeps.cluster import open_cluster
 from veselova.service.sweeps.job_store import Job, Jobs
@@ -64,7 +64,7 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
 
     from pyarrow import parquet
 
-    table = parquet.read_table(io.BytesIO(computed_chunk(sweep.canonical, start, stop, __version__).table))
+    table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__).table))
     found: list[dict[str, Any]] = table.to_pylist()
     return found
 
@@ -211,7 +211,7 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
 
 def test_a_row_with_torus_and_motion_solves_its_problem_once(monkeypatch: pytest.MonkeyPatch) -> None:
     solved, construct = list[Any](), Solution.__init__
-    computed_chunk(request().canonical, 0, 1, __version__)  # both engines are loaded and have run
+    compute_chunk(request().canonical, 0, 1, __version__)  # both engines are loaded and have run
     monkeypatch.setattr(Solution, "__init__", lambda self, *rest: solved.append(rest) or construct(self, *rest))
     for times in (None, [0, 1]):
         solved.clear()
@@ -325,7 +325,7 @@ def test_a_problem_whose_worker_died_says_so() -> None:
 
 def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
     with pytest.raises(OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"):
-        computed_chunk(request().canonical, 0, 1, "0.0.0")
+        compute_chunk(request().canonical, 0, 1, "0.0.0")
 
 
 def test_a_finished_job_keeps_its_results_and_no_chunks(tmp_path: Path) -> None:
@@ -506,7 +506,7 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
         assert not cancelling.done()
         go_on.set()
         await cancelling
-        await sweeps.ended(job.id)
+        await sweeps.wait_ended(job.id)
         await sweeps.close()
 
     asyncio.run(run())
@@ -736,7 +736,7 @@ def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, 
     jobs = Jobs(Settings(data_dir=tmp_path))
     job = jobs.submit(request(times=[0, 1], outputs=["tau1"], trajectories=True))
     result = Result(jobs, job)
-    result.store(0, [computed_chunk(job.request, 0, 15, __version__)])
+    result.store(0, [compute_chunk(job.request, 0, 15, __version__)])
 
     def die(store: Path) -> None:
         for chunk in store.glob("tau1/c/**/*"):

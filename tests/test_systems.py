@@ -25,7 +25,7 @@ from veselova import (
     compare,
     solve,
 )
-from veselova.service.api.json_documents import encoded, trajectory_document, trajectory_of
+from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 
@@ -67,7 +67,7 @@ def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -
     assert again.as_dict() == problem.as_dict()
     found = solve(problem, TIMES)
     assert found.provenance.engine == next(iter(problem.engines))
-    back = trajectory_of(again, orjson.loads(encoded(trajectory_document(found, problem.stored))))
+    back = trajectory_of(again, orjson.loads(encode(trajectory_document(found, problem.stored))))
     for output, axes in problem.outputs.items():
         assert np.array_equal(back.series(output), found.series(output))
         assert found.series(output).ndim == 1 + len(axes)
@@ -194,16 +194,16 @@ def test_every_field_refuses_what_is_no_number(name: str) -> None:
     ],
 )
 def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], message: str) -> None:
-    from veselova.service.workers.tasks import requested_trajectory
+    from veselova.service.workers.tasks import solve_request
 
     with pytest.raises((InvalidInput, InvalidRequest)) as caught:
-        requested_trajectory(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
+        solve_request(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
     assert message in str(caught.value)
 
 
 def test_a_system_of_one_engine_cannot_be_compared() -> None:
-    from veselova.service.workers.tasks import requested_comparison
+    from veselova.service.workers.tasks import compare_request
 
     with pytest.raises(InvalidInput) as caught:
-        requested_comparison(read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES}))
+        compare_request(read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES}))
     assert str(caught.value) == "problem: required a system that both engines solve; given lr, which numeric alone solves."

@@ -22,7 +22,7 @@ from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.remainders import split, split_grid
 from veselova.mechanics.core.times import TimeGrid, as_request
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.answers.cache_entry import packed, unpacked
+from veselova.service.answers.cache_entry import pack, unpack
 from veselova.service.cli.main import app
 
 #: γ, q … at 10⁹ + 3/10, which is 4.8e-8 beyond the nearest double.
@@ -56,16 +56,16 @@ def test_every_method_takes_remainders(method: str, clock: str | None) -> None:
     from veselova.analytic.solve import solve
 
     times = ["100000.1", "200000.3"]
-    found, exact = solve(body(), times, method=method, clock=clock), vs.solve(body(), times, digits=20)
+    found, exact = solve(body(), times, method=method, time_map=clock), vs.solve(body(), times, digits=20)
     assert (np.abs(found.frame - exact.frame).max(axis=(1, 2)) <= found.error).all()
 
 
 def test_remainders_move_a_clock_by_panels() -> None:
-    from veselova.analytic.motion.evaluation_plan import Horizon
+    from veselova.analytic.motion.evaluation_plan import EvaluationPlan
     from veselova.analytic.motion.torus_solution import Solution
 
     times, remainders = np.array([20.0, 30.0]), np.array([1e-3, -2e-3])
-    clock = Horizon(Solution(body()), np.array([0.0, 31.0])).clock("panels")
+    clock = EvaluationPlan(Solution(body()), np.array([0.0, 31.0])).clock("panels")
     assert np.allclose(clock.tau1(times, remainders)[1], clock.tau1(times + remainders)[1], rtol=0, atol=1e-13)
 
 
@@ -203,9 +203,9 @@ def test_an_answer_says_what_its_doubles_leave() -> None:
     read = Trajectory.from_arrays(found.problem, np.load(io.BytesIO(stream.getvalue())))
     assert read.remainders is not None
     assert read.remainders.tolist() == [rest, 0]
-    content = packed({"problem": body().as_dict()}, found, 10**6)
+    content = pack({"problem": body().as_dict()}, found, 10**6)
     assert content is not None
-    kept = unpacked(content)[1]
+    kept = unpack(content)[1]
     assert kept.remainders is not None
     assert kept.remainders.tolist() == [rest, 0]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from veselova import Veselova, torus
-from veselova.analytic.arithmetic.double_double import Twofold
+from veselova.analytic.arithmetic.double_double import DoubleDouble
 from veselova.analytic.motion.invariant_torus_batch import Tori, tori
 
 Array = np.ndarray[Any, Any]
@@ -117,7 +117,7 @@ def test_what_needs_more_digits_is_left_out(A: list[float], q: list[float], q_do
 
 @pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])
 def test_twofold_numbers_have_thirty_digits(operation: Any, rng: np.random.Generator) -> None:
-    a, b = (Twofold.of(x) + rng.normal(size=200) * 1e-17 for x in rng.normal(size=(2, 200)))
+    a, b = (DoubleDouble.of(x) + rng.normal(size=200) * 1e-17 for x in rng.normal(size=(2, 200)))
     near = b * 1e-9 - a  # so that a + near cancels
     for left, right in ((a, b), (a, near), (b, a)):
         found = operation(left, right)
@@ -127,11 +127,11 @@ def test_twofold_numbers_have_thirty_digits(operation: Any, rng: np.random.Gener
 
 
 def test_twofold_roots_have_thirty_digits(rng: np.random.Generator) -> None:
-    squares = Twofold.of(rng.uniform(1e-30, 1e30, 200)) + 1e-3
+    squares = DoubleDouble.of(rng.uniform(1e-30, 1e30, 200)) + 1e-3
     roots = squares.sqrt()
     for i in range(200):
         assert abs(_exact(roots, i) ** 2 / _exact(squares, i) - 1) <= Fraction(1, 2**100)
 
 
-def _exact(number: Twofold, i: int) -> Fraction:
+def _exact(number: DoubleDouble, i: int) -> Fraction:
     return Fraction(float(number.high[i])) + Fraction(float(number.low[i]))

@@ -19,7 +19,7 @@ from veselova.analytic.dense_output import piecewise_polynomial as pieces
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.numerics.monotone_root import fourth_order_divisor
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.analytic.time_map.cost_model import Costs, expected_modes
+from veselova.analytic.time_map.cost_model import Costs, estimate_modes
 
 #: Fewer times than these are taken one by one.
 FEW = 100
@@ -61,9 +61,9 @@ def test_windows_serve_either_clock_and_route(method: str, clock: str) -> None:
     # Dense here, sparse there, and in both directions.
     times = np.unique(np.concatenate([np.linspace(-9, -7, 800), np.linspace(-5, 30, 50), np.geomspace(1e-6, 8, 900)]))
     chosen = np.arange(0, times.size, 20)
-    many = solve_analytic(problem, times, method=method, clock=clock)
+    many = solve_analytic(problem, times, method=method, time_map=clock)
     assert many.provenance.details["evaluations"] < times.size
-    assert_one_motion(many, solve_analytic(problem, times[chosen], method=method, clock=clock), chosen)
+    assert_one_motion(many, solve_analytic(problem, times[chosen], method=method, time_map=clock), chosen)
     identity = np.swapaxes(many.frame, 1, 2) @ many.frame
     assert np.max(np.abs(identity - np.eye(4))) < 1e-13
 
@@ -106,14 +106,14 @@ def test_the_clock_is_chosen_by_what_it_costs() -> None:
     problem = tagged("reference", "generic")[-1].problem()
     near, far = solve(problem, [1.0]), solve(problem, [100.0])
     for found in (near, far):
-        estimates = found.provenance.details["clock_estimates"]
-        assert found.provenance.details["clock"] == min(estimates, key=estimates.__getitem__)
-    assert near.provenance.details["clock"] == "panels"
+        estimates = found.provenance.details["time_map_estimates"]
+        assert found.provenance.details["time_map"] == min(estimates, key=estimates.__getitem__)
+    assert near.provenance.details["time_map"] == "panels"
 
 
 def test_panels_are_the_cheaper_clock_of_any_high_dimension() -> None:
     """Modes of the Fourier clock at n = 1000 are beyond any float, and so is det T at times."""
-    costs = Costs(genus=999, modes=expected_modes(999, -500.0), cycles=10.0)
+    costs = Costs(genus=999, modes=estimate_modes(999, -500.0), cycles=10.0)
     assert costs.modes > 1e25
     assert costs.seconds("fourier", 10) == np.inf
     assert costs.cheaper_clock(inversions=10) == "panels"
@@ -127,20 +127,20 @@ def test_windows_that_adjoin_tell_the_time_themselves(n: int, span: tuple[float,
     """With these A's the mean clock is far off at the ends of some spans."""
     problem = random_problem(np.random.default_rng(6), n, 100.0)
     times, chosen = np.linspace(*span, 3000) / problem.turning, np.arange(0, 3000, 37)
-    many = solve_analytic(problem, times, clock="panels")
-    assert many.provenance.details["clock_size"] <= many.provenance.details["evaluations"] < times.size
+    many = solve_analytic(problem, times, time_map="panels")
+    assert many.provenance.details["time_map_size"] <= many.provenance.details["evaluations"] < times.size
     for clock in ("panels", "fourier"):
-        assert_one_motion(many, solve_analytic(problem, times[chosen], clock=clock), chosen)
+        assert_one_motion(many, solve_analytic(problem, times[chosen], time_map=clock), chosen)
     at_zero = np.argmin(np.abs(times))
-    assert many.error[at_zero] <= 2 * solve_analytic(problem, times[[at_zero]], clock="panels").error[0]
+    assert many.error[at_zero] <= 2 * solve_analytic(problem, times[[at_zero]], time_map="panels").error[0]
 
 
 def test_windows_that_would_take_too_much_memory_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, times = random_problem(np.random.default_rng(6), 4), np.linspace(0, 30, 3000)
-    kept = solve_analytic(problem, times, clock="panels")
+    kept = solve_analytic(problem, times, time_map="panels")
     monkeypatch.setattr(track, "_MOST_KEPT", 10_000)
-    many = solve_analytic(problem, times, clock="panels")
-    assert many.provenance.details["clock_size"] != kept.provenance.details["clock_size"]
+    many = solve_analytic(problem, times, time_map="panels")
+    assert many.provenance.details["time_map_size"] != kept.provenance.details["time_map_size"]
     assert_one_motion(many, kept, np.arange(times.size))
 
 
@@ -148,7 +148,7 @@ def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     problem = random_problem(np.random.default_rng(301), 3, 30.0)
     cycle = 1 / np.max(np.abs(Solution(problem).in_time.rates))
     near = np.linspace(-0.3 * cycle, 0, 40)
-    far, alone = (solve_analytic(problem, times, clock="panels") for times in (np.append(-7000 * cycle, near), near))
+    far, alone = (solve_analytic(problem, times, time_map="panels") for times in (np.append(-7000 * cycle, near), near))
     difference = np.max(np.abs(far.frame[1:] - alone.frame), axis=(1, 2))
     assert np.all(difference <= far.error[1:] + alone.error)
 

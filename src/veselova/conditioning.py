@@ -21,7 +21,7 @@ from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
 
-__all__ = ["conditioning", "moved_by_roundings", "rounding_of"]
+__all__ = ["conditioning", "perturb_by_roundings", "rounding_of"]
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def conditioning(trajectory: Trajectory) -> Array:
             pair = []
             for side in (1, -1):
                 try:
-                    pair.append(solve(moved_by_roundings(problem, side * scale, pattern), times, engine))
+                    pair.append(solve(perturb_by_roundings(problem, side * scale, pattern), times, engine))
                 except VeselovaError:
                     break
             if len(pair) == 2:
@@ -76,7 +76,7 @@ def _largest_difference(one: Trajectory, other: Trajectory) -> Array:
     return np.asarray(np.max([np.max(np.abs(d.reshape(len(d), -1)), axis=1) for d in differences], axis=0))
 
 
-def moved_by_roundings(problem: Problem, multiple: int, pattern: int) -> Problem:
+def perturb_by_roundings(problem: Problem, multiple: int, pattern: int) -> Problem:
     """Return the problem with every number of its data moved by a multiple of one rounding, up or down by a pattern of signs."""
     signs, given = _signs(pattern), dict(problem.given)
     for name, values in _data(given).items():

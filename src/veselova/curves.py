@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.theta.characteristic import Characteristic
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_vector
 
 __all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
@@ -64,7 +64,7 @@ class RealHyperelliptic:
 
     def __init__(self, branch_points: ArrayLike | Sequence[Any], sign: int = -1) -> None:
         if isinstance(sign, bool) or sign not in (-1, 1):
-            raise InvalidInput(("sign",), "1 or −1", shown(sign))
+            raise InvalidInput(("sign",), "1 or −1", show(sign))
         points = _exact_points(branch_points)
         self._curve = RealCurve(points, int(sign))
         self.sign = int(sign)
@@ -196,7 +196,7 @@ class RealHyperelliptic:
         """
         phases = np.array(z, dtype=float)
         if phases.ndim not in (1, 2) or phases.shape[-1] != self.genus or not np.all(np.isfinite(phases)):
-            raise InvalidInput(("z",), f"a vector of {self.genus} finite real numbers, or rows of them", shown(z))
+            raise InvalidInput(("z",), f"a vector of {self.genus} finite real numbers, or rows of them", show(z))
         rows = np.atleast_2d(phases)
         curve = self._curve
         psi = curve.inversion.invert(rows - np.floor(rows))
@@ -214,14 +214,14 @@ class RealHyperelliptic:
         rows = [_numbers(row) for row in (points if np.ndim(points) == 2 else [points])]
         directions = np.atleast_2d(np.array(signs, dtype=float))
         if any(len(row) != self.genus for row in rows) or directions.shape != (len(rows), self.genus):
-            raise InvalidInput(("points",), f"rows of {self.genus} points with as many signs", shown(points))
+            raise InvalidInput(("points",), f"rows of {self.genus} points with as many signs", show(points))
         curve = self._curve
         exact = [[curve.to_mu(point) for point in row] for row in rows]
         for i, row in enumerate(exact):
             for s, mu in enumerate(row):
                 if isinstance(mu, complex) or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]:
                     low, high = self.cuts[s]
-                    raise InvalidInput(("points", i, s), f"a number on cut {s + 1}, {low:.6g} … {high:.6g}", shown(rows[i][s]))
+                    raise InvalidInput(("points", i, s), f"a number on cut {s + 1}, {low:.6g} … {high:.6g}", show(rows[i][s]))
         upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
         z = curve.inversion.map(curve.angles(exact, upwards))
         return np.asarray(np.mod(z, 1.0)[0] if np.ndim(points) == 1 else np.mod(z, 1.0))
@@ -258,7 +258,7 @@ def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[fl
 def _exact_points(given: Any) -> tuple[Fraction, ...]:
     """Return the branch points as rationals, increasing; raises InvalidInput."""
     if isinstance(given, np.ndarray) and np.iscomplexobj(given):
-        raise InvalidInput(("branch_points",), "real numbers (curves with complex branch points are not served)", shown(given))
+        raise InvalidInput(("branch_points",), "real numbers (curves with complex branch points are not served)", show(given))
     values = [Fraction(value) for value in exact_vector(given, ("branch_points",))]
     if not 3 <= len(values) <= 2 * _LARGEST_GENUS + 2:
         raise InvalidInput(("branch_points",), f"3 to {2 * _LARGEST_GENUS + 2} real numbers", str(len(values)))
@@ -279,7 +279,7 @@ def _numbers(given: Any) -> list[Fraction | complex]:
     for i, item in enumerate(items):
         if isinstance(item, complex) and item.imag:
             if not np.isfinite(item):
-                raise InvalidInput(("points", i), "a finite number", shown(item))
+                raise InvalidInput(("points", i), "a finite number", show(item))
             found.append(item)
         else:
             value = item.real if isinstance(item, complex) else item

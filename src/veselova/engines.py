@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, shown, unknown_name
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
 from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
@@ -72,7 +72,7 @@ def _solve(
     solution: Solution | None = None,
 ) -> Trajectory:
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
     if engine is None:  # what is asked for beyond double precision is asked of the closed form, which says why it has none
         engine = "analytic" if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False) else None
         engine = engine or problem.default_engine
@@ -125,7 +125,7 @@ def require_options(
         if method is not None and method not in system.engines[engine]:
             faults.found.append(unknown_name(("method",), method, system.engines[engine]))
         if formulation is not None and engine == "analytic":
-            faults.add(("formulation",), "none (the closed form has one)", shown(formulation))
+            faults.add(("formulation",), "none (the closed form has one)", show(formulation))
         elif formulation is not None and formulation not in system.formulations:
             faults.found.append(unknown_name(("formulation",), formulation, system.formulations))
         faults.attempt(_require_precision, engine, digits, certified)
@@ -135,7 +135,7 @@ def require_options(
 def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     """Raise InvalidInput unless the engine has these digits, and bounds where they are asked for."""
     if isinstance(digits, bool) or not isinstance(digits, (int, np.integer)) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
-        raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", shown(digits))
+        raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", show(digits))
     require_truth_value(certified, "certified")
     if engine != "analytic" and digits > FEWEST_DIGITS:
         raise InvalidInput(("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits))
@@ -175,7 +175,7 @@ def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
     bad arguments, Unsolved where theta functions do not serve (rest, a separatrix, too many modes).
     """
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     return closed_form_of(problem, accuracy)
@@ -188,7 +188,7 @@ def torus(problem: Problem) -> Torus:
 
 def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", shown(problem))
+        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
     from veselova.analytic.motion.invariant_torus import torus as torus_of
 
     return torus_of(on_torus(problem), solution)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 
 __all__ = ["ScaledTheta", "riemann_theta", "scaled_riemann_theta", "siegel_reduce", "theta_constants"]
 
@@ -73,7 +73,7 @@ def scaled_riemann_theta(
     points, single = _points(z, genus)
     halves, alone = _characteristics(characteristic, genus)
     if isinstance(derivatives, bool) or derivatives not in (0, 1, 2):
-        raise InvalidInput(("derivatives",), "0, 1 or 2", shown(derivatives))
+        raise InvalidInput(("derivatives",), "0, 1 or 2", show(derivatives))
     function = SiegelTheta(matrix)
     if not function.is_small:
         raise Unsolved("too-many-terms", f"the sum has about {function.terms:.1e} terms")
@@ -107,11 +107,11 @@ def _siegel(tau: Any) -> Complex:
     try:
         matrix = np.array(tau, dtype=complex)
     except (TypeError, ValueError):
-        raise InvalidInput(("tau",), "a square matrix of numbers", shown(tau)) from None
+        raise InvalidInput(("tau",), "a square matrix of numbers", show(tau)) from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not 1 <= len(matrix) <= _LARGEST_GENUS:
         raise InvalidInput(("tau",), f"a g × g matrix, g = 1 … {_LARGEST_GENUS}", f"shape {matrix.shape}")
     if not np.all(np.isfinite(matrix)):
-        raise InvalidInput(("tau",), "finite numbers", shown(tau))
+        raise InvalidInput(("tau",), "finite numbers", show(tau))
     defect = float(np.max(np.abs(matrix - matrix.T)))
     if defect > _SYMMETRY * float(np.max(np.abs(matrix))):
         raise InvalidInput(("tau",), "a symmetric matrix", f"one that differs from its transpose by {defect:.3g}")
@@ -127,11 +127,11 @@ def _points(z: Any, genus: int) -> tuple[Complex, bool]:
     try:
         points = np.array(z, dtype=complex)
     except (TypeError, ValueError):
-        raise InvalidInput(("z",), f"a vector of {genus} numbers, or rows of them", shown(z)) from None
+        raise InvalidInput(("z",), f"a vector of {genus} numbers, or rows of them", show(z)) from None
     if points.ndim not in (1, 2) or points.shape[-1] != genus:
         raise InvalidInput(("z",), f"a vector of {genus} numbers, or rows of them", f"shape {points.shape}")
     if not np.all(np.isfinite(points)):
-        raise InvalidInput(("z",), "finite numbers", shown(z))
+        raise InvalidInput(("z",), "finite numbers", show(z))
     return np.atleast_2d(points), points.ndim == 1
 
 
@@ -140,14 +140,14 @@ def _characteristics(given: Any, genus: int) -> tuple[NDArray[np.float64], bool]
     if given is None:
         return np.zeros((1, 2, genus)), True
     try:
-        halves = np.array([[[float(x) for x in row] for row in one] for one in _listed(given)])
+        halves = np.array([[[float(x) for x in row] for row in one] for one in _to_list(given)])
     except (TypeError, ValueError):
         halves = np.empty(0)
     alone = np.ndim(given) == 2
     if halves.ndim != 3 or halves.shape[1:] != (2, genus) or not np.all(np.isfinite(halves)):
-        raise InvalidInput(("characteristic",), f"[ε, δ] of {genus} real numbers each, or a list of those", shown(given))
+        raise InvalidInput(("characteristic",), f"[ε, δ] of {genus} real numbers each, or a list of those", show(given))
     return halves, alone
 
 
-def _listed(given: Any) -> Any:
+def _to_list(given: Any) -> Any:
     return [given] if np.ndim(given) == 2 else given

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.motion.base import Motion
-from veselova.analytic.motion.evaluator import METHODS, Route
+from veselova.analytic.motion.evaluator import METHODS, Evaluator
 from veselova.analytic.motion.rank_one_so3 import motion_of_body
 from veselova.analytic.motion.separatrix import DepartureBound
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show, unknown_name
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory
@@ -49,17 +49,19 @@ def solve(
     times: Any,
     *,
     method: str | None = None,
-    clock: str | None = None,
+    time_map: str | None = None,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
     solution: Solution | None = None,
+    clock: str | None = None,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
     ``method``: ``theta`` (every entry of the attitude a theta quotient; many times from few, in windows), ``products`` (the same
     at every time, by products of matrices), ``nufft`` (at every time, by nonuniform FFTs, extra ``fast``) or ``angles``
     (Abel–Jacobi inversion, then the algebraic frame; windows too); None takes the cheaper of ``theta`` and ``angles``.
-    ``clock``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same with the Fourier clock. Every start is
+    ``time_map``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same by ``fourier``. ``clock`` is its name
+    in version 0.1. Every start is
     served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is that of starts a rounding away,
     and grows like e^(rate·t); near one sums by ``nufft`` cancel, which is in their error.
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
@@ -69,30 +71,31 @@ def solve(
     ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about 1e-14 at t of order 10².
     """
     grid = TimeGrid.of(times, beyond_double(digits, certified))
-    for field, value, names in (("method", method, METHODS), ("clock", clock, ("fourier", "panels"))):
+    time_map = time_map or clock
+    for field, value, names in (("method", method, METHODS), ("time_map", time_map, ("fourier", "panels"))):
         if value is not None and value not in names:
             raise unknown_name((field,), value, names)
     if isinstance(problem, VeselovaSO3) and problem.has_torus:
         _require_exact_axes(problem, digits, certified)
-        options: Any = {"method": method, "clock": clock, "digits": digits, "certified": certified, "solution": solution}
+        options: Any = {"method": method, "time_map": time_map, "digits": digits, "certified": certified, "solution": solution}
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
         return motion_of_body(problem, solve(point, grid, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
-        return _separable_motion(problem, grid, method, clock, beyond_double(digits, certified))
+        return _separable_motion(problem, grid, method, time_map, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
-        motion = _TorusMotion(problem, method, clock)
+        motion = _TorusMotion(problem, method, time_map)
         if solution is not None:  # no field of the motion: pickling leaves behind what can be computed again
             vars(motion)["_solution"] = solution
-        return motion.along(grid)
+        return motion.evaluate(grid)
     served = ("angles",) if certified else ("theta", "angles")
     if method is not None and method not in served:
         precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
-        raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", shown(method))
-    if clock is not None:
-        raise InvalidInput(("clock",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", shown(clock))
-    from veselova.analytic.motion.motion_balls import EnclosedMotion
+        raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", show(method))
+    if time_map is not None:
+        raise InvalidInput(("time_map",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", show(time_map))
+    from veselova.analytic.motion.motion_balls import MotionInBalls
 
-    return EnclosedMotion(problem, digits, certified, method)(grid)
+    return MotionInBalls(problem, digits, certified, method)(grid)
 
 
 def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
@@ -104,20 +107,24 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
 
 
 def _separable_motion(
-    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, method: str | None, clock: str | None, beyond: bool
+    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, method: str | None, time_map: str | None, beyond: bool
 ) -> Trajectory:
     """Return the motion in a separable potential; it has one method, one choice of clocks and 15 digits."""
-    for field, given, allowed in (("method", method, (None, "angles")), ("clock", clock, (None,)), ("digits", beyond, (False,))):
+    for field, given, allowed in (
+        ("method", method, (None, "angles")),
+        ("time_map", time_map, (None,)),
+        ("digits", beyond, (False,)),
+    ):
         if given not in allowed:
-            required = {"method": "angles", "clock": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
-            raise InvalidInput((field,), f"{required} for system {problem.system}", shown(given))
-    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)).along(grid)
+            required = {"method": "angles", "time_map": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
+            raise InvalidInput((field,), f"{required} for system {problem.system}", show(given))
+    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)).evaluate(grid)
 
 
 @dataclass(frozen=True)
 class _TorusMotion(Motion[TorusProblem]):
     method: str | None
-    clock: str | None
+    time_map: str | None
 
     @cached_property
     def _solution(self) -> Solution:
@@ -135,17 +142,17 @@ class _TorusMotion(Motion[TorusProblem]):
             raise
 
     @cached_property
-    def _route(self) -> Route:
-        return Route(self._solution, self.method)
+    def _evaluator(self) -> Evaluator:
+        return Evaluator(self._solution, self.method)
 
     @cached_property
     def _departure(self) -> DepartureBound | None:
         """Return how far starts a rounding away part from the motion, where it is on a separatrix."""
         if not self._solution.separatrices:
             return None
-        neighbours = (Route(Solution(self.problem, sign * _DATA_ROUNDING), self._route.method) for sign in (1, -1))
-        routes = (self._route, *neighbours)
-        return DepartureBound(partial(_frames, routes, self.clock), self.problem.turning, _NO_DIGIT)
+        neighbours = (Evaluator(Solution(self.problem, sign * _DATA_ROUNDING), self._evaluator.method) for sign in (1, -1))
+        evaluators = (self._evaluator, *neighbours)
+        return DepartureBound(partial(_frames, evaluators, self.time_map), self.problem.turning, _NO_DIGIT)
 
     @property
     def _cause(self) -> str:
@@ -155,36 +162,38 @@ class _TorusMotion(Motion[TorusProblem]):
         further = "; ask for more digits, which come from the exact data" if self.problem.axes is None else ""
         return f"on a separatrix the data determine the motion, and doubles do not{further}"
 
-    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        route = self._route
-        horizon = route.to(grid)
-        clock = horizon.clock(self.clock)
-        along, error = route.along(horizon, clock)
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        evaluator = self._evaluator
+        plan = evaluator.to(grid)
+        time_map = plan.time_map(self.time_map)
+        along, error = evaluator.evaluate(plan, time_map)
         if self._departure is not None:
             apart = self._departure.at(grid.doubles)
             error = np.maximum(error, self.problem.bound({"frame": along.series[1]}, apart))
         if not error.max() <= _NO_DIGIT:  # or it is no number
             lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
-            cause = self._cause + _OR_CANCELLATION * (route.method == "nufft")
+            cause = self._cause + _OR_CANCELLATION * (evaluator.method == "nufft")
             raise Unsolved("no-digit-left", f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
-        solution = route.solution
+        solution = evaluator.solution
         details = {
             "regime": solution.regime,
-            "clock": clock.name,
-            "clock_size": clock.size,
+            "time_map": time_map.name,
+            "time_map_size": time_map.size,
             "evaluations": along.evaluations,
-            "clock_estimates": horizon.costs.estimates(horizon.inversions) if clock.name != "uniform" else {},
-            "guard_digits": horizon.is_guarded,
+            "time_map_estimates": plan.costs.estimates(plan.inversions) if time_map.name != "uniform" else {},
+            "guard_digits": plan.is_guarded,
             "quadrature_nodes": solution.periods.quadrature_nodes,
-            "theta_terms": route.terms,
+            "theta_terms": evaluator.terms,
         }
         states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
-        return self.problem.completed(dict(zip(_SERIES, states, strict=False))), error, route.method, details
+        return self.problem.complete(dict(zip(_SERIES, states, strict=False))), error, evaluator.method, details
 
 
-def _frames(routes: Sequence[Route], clock: str | None, instants: Array) -> list[Array]:
+def _frames(evaluators: Sequence[Evaluator], time_map: str | None, instants: Array) -> list[Array]:
     """Return the frames of several motions at increasing times."""
     grid = TimeGrid.of(instants)
-    horizons = [route.to(grid) for route in routes]
-    return [route.along(horizon, horizon.clock(clock))[0].series[1] for route, horizon in zip(routes, horizons, strict=True)]
+    plans = [evaluator.to(grid) for evaluator in evaluators]
+    return [
+        evaluator.evaluate(plan, plan.time_map(time_map))[0].series[1] for evaluator, plan in zip(evaluators, plans, strict=True)
+    ]

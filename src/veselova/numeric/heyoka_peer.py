@@ -38,7 +38,7 @@ class HeyokaPeer:
     def __init__(self, problem: Veselova) -> None:
         flow = problem.flow()
         n = flow.n
-        self._flow, self._integrator = flow, compiled(n)
+        self._flow, self._integrator = flow, compile_integrator(n)
         self._integrator.pars[:] = flow.parameters
         p, frame = flow.initial[:n], flow.initial[n:-1].reshape(n, n)
         basis = np.linalg.qr(np.column_stack([frame[:, 0], p, np.eye(n)]))[0][:, :n]
@@ -105,7 +105,7 @@ class HeyokaPeer:
 
 
 @cache
-def compiled(n: int) -> Any:
+def compile_integrator(n: int) -> Any:
     """Return heyoka's integrator of (q, p, u₃, …, uₙ, τ₁), or (q, p, τ₁) for n ≤ 3, with the parameters A, A⁻¹ and W."""
     import heyoka as hy
 

@@ -79,7 +79,7 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
         further = ", the closed form farther" if "analytic" in problem.engines else ""
         raise Unsolved("too-far", f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}{further}")
     series, error, steps = _integrate_twice(flow, problem.bounded, grid, backend)
-    series, details = problem.completed(series), {**details, "steps": steps}
+    series, details = problem.complete(series), {**details, "steps": steps}
     provenance = Provenance.since(began, "numeric", method, details)
     return Trajectory.on_grid(problem, grid, problem.bound(series, error), series, provenance, again)
 

@@ -34,7 +34,7 @@ class Taylor(Integrator):
     method: ClassVar[str] = "taylor"
 
     def __init__(self, flow: Flow, tolerance: float) -> None:
-        self._integrator = copy.copy(_compiled(flow, tolerance))
+        self._integrator = copy.copy(_compile(flow, tolerance))
         used = len(self._integrator.pars)  # the last ones may have dropped out of the field
         self._integrator.pars[:] = flow.parameters[:used]
         self._flow = flow
@@ -71,7 +71,7 @@ class Taylor(Integrator):
 _known: dict[tuple[Hashable, float], Any] = {}
 
 
-def _compiled(flow: Flow, tolerance: float) -> Any:
+def _compile(flow: Flow, tolerance: float) -> Any:
     """Return heyoka's compiled integrator of a field, its parameters left open; one is kept for every structure."""
     try:
         import heyoka as hy

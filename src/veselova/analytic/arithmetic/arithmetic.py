@@ -23,7 +23,7 @@ from scipy.special import ellipkm1, elliprf
 
 from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
 
-__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended"]
+__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended_arithmetic"]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
@@ -86,7 +86,7 @@ class Arithmetic(ABC):
         """Return the natural logarithm of the precision, 10^digits."""
         return self.digits * math.log(10)
 
-    def widened(self, values: Any, bound: Any) -> Any:
+    def add_error(self, values: Any, bound: Any) -> Any:
         """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
         return values
 
@@ -105,25 +105,25 @@ class Arithmetic(ABC):
         orders = self.array(list(range(coefficients.shape[1])))
 
         def sums(psi: Values) -> Values:
-            waves = self.cos(psi[..., None] * orders)
-            return np.stack([waves[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2)
+            exponentials = self.cos(psi[..., None] * orders)
+            return np.stack([exponentials[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2)
 
         return sums
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
         count = values.shape[-1]
-        coefficients = self.product(values, self._waves(count)) * 2 / count
+        coefficients = self.product(values, self._exponentials(count)) * 2 / count
         coefficients[..., 0] = np.sum(values, axis=-1) / count
         return np.asarray(coefficients)
 
-    def _waves(self, count: int) -> Values:
+    def _exponentials(self, count: int) -> Values:
         """Return cos mψ at the N nodes, shape (N, N)."""
         table = self.cos(np.arange(4 * count) * (self.pi / (2 * count)))
         return np.asarray(table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)])
 
     @staticmethod
-    def bounded_tail(largest: Any, decay: Any, count: int) -> Any:
+    def bound_tail(largest: Any, decay: Any, count: int) -> Any:
         """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the aliases in those, at any real ψ.
 
         M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤ 2Mρ^m.
@@ -131,7 +131,7 @@ class Arithmetic(ABC):
         return 6 * largest * decay**count / (1 - decay)
 
     @staticmethod
-    def estimated_tail(series: Values) -> Values:
+    def estimate_tail(series: Values) -> Values:
         """Return what cosine series leave out judging by their last coefficients, shape (K,) for (K, N)."""
         return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
@@ -167,8 +167,8 @@ class Double(Arithmetic):
     sine_sums = staticmethod(sine_sums)
     cosine_sums = staticmethod(cosine_sums)
 
-    def _waves(self, count: int) -> Values:
-        return _kept_waves(count) if count <= _LARGEST_KEPT else super()._waves(count)
+    def _exponentials(self, count: int) -> Values:
+        return _kept_waves(count) if count <= _LARGEST_KEPT else super()._exponentials(count)
 
     def number(self, value: Any) -> float:
         """Return the nearest double."""
@@ -286,7 +286,7 @@ class _ExtendedOfThread(threading.local):
 _extended_of_thread = _ExtendedOfThread()
 
 
-def extended(digits: int) -> Extended:
+def extended_arithmetic(digits: int) -> Extended:
     """Return this thread's extended arithmetic of the given digits; making one costs a millisecond."""
     known = _extended_of_thread.by_digits
     if digits not in known:
@@ -297,4 +297,4 @@ def extended(digits: int) -> Extended:
 #: The double-precision arithmetic; it has no state, so one serves all.
 DOUBLE = Double()
 
-_kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._waves, DOUBLE))
+_kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._exponentials, DOUBLE))

@@ -118,7 +118,7 @@ class Balls(Arithmetic):
         """Return the matrix product."""
         return self._array(_matrix(a) * _matrix(b))
 
-    def widened(self, values: Any, bound: Any) -> Any:
+    def add_error(self, values: Any, bound: Any) -> Any:
         """Return the balls with their radii enlarged by |bound|."""
         return values + _around_zero(bound)
 
@@ -126,11 +126,11 @@ class Balls(Arithmetic):
         """Return the ball arithmetic of other digits."""
         return balls(digits, self.certified)
 
-    def around_zero(self, values: Values) -> Values:
+    def zero_ball(self, values: Values) -> Values:
         """Return balls around zero that hold the values."""
         return np.asarray(_around_zero(values))
 
-    def at_most(self, values: Values) -> Values:
+    def upper_bound(self, values: Values) -> Values:
         """Return exact upper bounds of |values|."""
         return np.asarray(_upper(values))
 
@@ -138,7 +138,7 @@ class Balls(Arithmetic):
         """Return exact lower bounds of positive values."""
         return np.asarray(_lower(values))
 
-    def inside(self, inner: Values, outer: Values) -> Values:
+    def contained_in(self, inner: Values, outer: Values) -> Values:
         """Return which balls lie in the interior of their partners."""
         return np.asarray(_contained(inner, outer), dtype=bool)
 
@@ -195,7 +195,7 @@ class Balls(Arithmetic):
         """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
         return _products(exponents, bases, lambda w: 1 / w)
 
-    def waves(self, modes: Values, turns: Values) -> tuple[Values, Values]:
+    def exponentials(self, modes: Values, turns: Values) -> tuple[Values, Values]:
         """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
 
         A power comes from up to log₂|m| products in a row, each of which loses up to half a bit.
@@ -225,7 +225,7 @@ class _Series:
         with arithmetic.at(_COARSE_DIGITS):
             size = np.abs(middle + flint.arb(0))
             self._slack = np.sum(_around_zero(coefficients - middle), axis=1).T
-            self._steepness = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
+            self._sensitivity = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
             self._beyond = _around_zero(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
 
     def __call__(self, psi: Values, part: str) -> Values:
@@ -242,7 +242,7 @@ class _Series:
                 for k, whole in enumerate(self._polynomials[s]):
                     series = whole.truncate(terms) if terms < self._terms else whole
                     result[:, k, s] = [getattr(series(point), part) for point in points]
-        result = result + self._slack + spread[:, None, :] * self._steepness
+        result = result + self._slack + spread[:, None, :] * self._sensitivity
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 

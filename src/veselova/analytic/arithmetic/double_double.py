@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.remainders import exact_sum
 
-__all__ = ["Twofold", "exact_product", "exact_sum", "halves", "stacked", "where"]
+__all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves", "stack_double_doubles", "where"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _SPLITTER = 134217729.0
 
 
 @dataclass(frozen=True)
-class Twofold:
+class DoubleDouble:
     """The numbers high + low, of which high is the nearest double."""
 
     high: Array
@@ -34,57 +34,57 @@ class Twofold:
     __array_ufunc__ = None
 
     @classmethod
-    def of(cls, value: Any) -> Twofold:
+    def of(cls, value: Any) -> DoubleDouble:
         """Return doubles as such numbers."""
-        if isinstance(value, Twofold):
+        if isinstance(value, DoubleDouble):
             return value
         high = np.asarray(value, dtype=np.float64)
         return cls(high, np.zeros_like(high))
 
-    def __getitem__(self, index: Any) -> Twofold:
-        return Twofold(self.high[index], self.low[index])
+    def __getitem__(self, index: Any) -> DoubleDouble:
+        return DoubleDouble(self.high[index], self.low[index])
 
-    def __neg__(self) -> Twofold:
-        return Twofold(-self.high, -self.low)
+    def __neg__(self) -> DoubleDouble:
+        return DoubleDouble(-self.high, -self.low)
 
-    def __add__(self, other: Any) -> Twofold:
-        other = Twofold.of(other)
+    def __add__(self, other: Any) -> DoubleDouble:
+        other = DoubleDouble.of(other)
         high, error = exact_sum(self.high, other.high)
         low, rest = exact_sum(self.low, other.low)
-        high, error = _ordered_sum(high, error + low)
-        return Twofold(*_ordered_sum(high, error + rest))
+        high, error = _fast_two_sum(high, error + low)
+        return DoubleDouble(*_fast_two_sum(high, error + rest))
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> Twofold:
-        return self + -Twofold.of(other)
+    def __sub__(self, other: Any) -> DoubleDouble:
+        return self + -DoubleDouble.of(other)
 
-    def __rsub__(self, other: Any) -> Twofold:
-        return Twofold.of(other) + -self
+    def __rsub__(self, other: Any) -> DoubleDouble:
+        return DoubleDouble.of(other) + -self
 
-    def __mul__(self, other: Any) -> Twofold:
-        other = Twofold.of(other)
+    def __mul__(self, other: Any) -> DoubleDouble:
+        other = DoubleDouble.of(other)
         high, error = exact_product(self.high, other.high)
-        return Twofold(*_ordered_sum(high, error + (self.high * other.low + self.low * other.high)))
+        return DoubleDouble(*_fast_two_sum(high, error + (self.high * other.low + self.low * other.high)))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Twofold:
-        divisor = Twofold.of(other)
-        first = Twofold.of(self.high / divisor.high)
+    def __truediv__(self, other: Any) -> DoubleDouble:
+        divisor = DoubleDouble.of(other)
+        first = DoubleDouble.of(self.high / divisor.high)
         rest = self - first * divisor
-        second = Twofold.of(rest.high / divisor.high)
-        return first + second + Twofold.of((rest - second * divisor).high / divisor.high)
+        second = DoubleDouble.of(rest.high / divisor.high)
+        return first + second + DoubleDouble.of((rest - second * divisor).high / divisor.high)
 
-    def __rtruediv__(self, other: Any) -> Twofold:
-        return Twofold.of(other) / self
+    def __rtruediv__(self, other: Any) -> DoubleDouble:
+        return DoubleDouble.of(other) / self
 
-    def sqrt(self) -> Twofold:
+    def sqrt(self) -> DoubleDouble:
         """Return the roots of positive numbers, by one step of Newton's method from that of the double."""
-        first = Twofold.of(np.sqrt(self.high))
+        first = DoubleDouble.of(np.sqrt(self.high))
         return first + (self - first * first).high / (2 * first.high)
 
-    def total(self) -> Twofold:
+    def total(self) -> DoubleDouble:
         """Return the sum over the last axis."""
         result = self[..., 0]
         for i in range(1, self.high.shape[-1]):
@@ -92,14 +92,14 @@ class Twofold:
         return result
 
 
-def stacked(values: Sequence[Twofold]) -> Twofold:
+def stack_double_doubles(values: Sequence[DoubleDouble]) -> DoubleDouble:
     """Return numbers along a new last axis."""
-    return Twofold(np.stack([x.high for x in values], axis=-1), np.stack([x.low for x in values], axis=-1))
+    return DoubleDouble(np.stack([x.high for x in values], axis=-1), np.stack([x.low for x in values], axis=-1))
 
 
-def where(condition: Any, chosen: Twofold, other: Twofold) -> Twofold:
+def where(condition: Any, chosen: DoubleDouble, other: DoubleDouble) -> DoubleDouble:
     """Return the chosen number where the condition holds, and the other one elsewhere."""
-    return Twofold(np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low))
+    return DoubleDouble(np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low))
 
 
 def exact_product(a: Array, b: Array, halves_of_b: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
@@ -116,7 +116,7 @@ def halves(x: Array) -> tuple[Array, Array]:
     return high, x - high
 
 
-def _ordered_sum(a: Array, b: Array) -> tuple[Array, Array]:
+def _fast_two_sum(a: Array, b: Array) -> tuple[Array, Array]:
     """Return the same where |a| ≥ |b|."""
     total = a + b
     return total, b - (total - a)

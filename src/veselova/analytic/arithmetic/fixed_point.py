@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LARGEST", "LEAST", "UPWARDS", "Fixed"]
+__all__ = ["LARGEST", "LEAST", "UPWARDS", "FixedPoint"]
 
 Array = NDArray[np.float64]
 
@@ -42,13 +42,13 @@ UPWARDS = 1 + 1e-6
 
 
 @dataclass(frozen=True)
-class Fixed:
+class FixedPoint:
     """A table of numbers below 2⁸, ``limbs`` of shape (L, …)."""
 
     limbs: Array
 
     @classmethod
-    def of(cls, parts: Sequence[Array], bits: int) -> Fixed:
+    def of(cls, parts: Sequence[Array], bits: int) -> FixedPoint:
         """Return sums of doubles, exact but for the last bit; no operation on them adds an error above 2^−bits."""
         limbs = np.zeros((math.ceil((bits + _DROPPED_BITS) / _BITS) + 1, *parts[0].shape))
         for rest in parts:
@@ -56,10 +56,10 @@ class Fixed:
                 whole = np.rint(rest * _BASE**i)
                 limb += whole
                 rest = rest - whole * _OF_BASE**i
-        return cls(_carried(limbs))
+        return cls(_carry(limbs))
 
     @classmethod
-    def of_numbers(cls, values: NDArray[Any], bits: int) -> Fixed:
+    def of_numbers(cls, values: NDArray[Any], bits: int) -> FixedPoint:
         """Return numbers of any kind that turn into doubles, and of which doubles can be taken off."""
         parts = []
         for _ in range(math.ceil(bits / _PART_BITS) + 1):
@@ -72,39 +72,39 @@ class Fixed:
         weighted = self.limbs * _OF_BASE ** np.arange(len(self.limbs)).reshape(-1, *(1,) * (self.limbs.ndim - 1))
         return [weighted[:3].sum(axis=0), *(weighted[i : i + 2].sum(axis=0) for i in range(3, len(weighted), 2))]
 
-    def carried(self) -> Fixed:
+    def carry(self) -> FixedPoint:
         """Return the same numbers with limbs that products take."""
-        return Fixed(_carried(self.limbs.copy()))
+        return FixedPoint(_carry(self.limbs.copy()))
 
-    def __add__(self, other: Fixed) -> Fixed:
-        return Fixed(self.limbs + other.limbs)
+    def __add__(self, other: FixedPoint) -> FixedPoint:
+        return FixedPoint(self.limbs + other.limbs)
 
-    def __mul__(self, other: Fixed) -> Fixed:
-        return Fixed(_carried(_products(self.limbs, other.limbs))[:-1])
+    def __mul__(self, other: FixedPoint) -> FixedPoint:
+        return FixedPoint(_carry(_products(self.limbs, other.limbs))[:-1])
 
-    def __getitem__(self, where: tuple[slice | int | None, ...]) -> Fixed:
-        return Fixed(self.limbs[:, *where])
+    def __getitem__(self, where: tuple[slice | int | None, ...]) -> FixedPoint:
+        return FixedPoint(self.limbs[:, *where])
 
-    def part_of_product(self, other: Fixed, part: int) -> Fixed:
+    def part_of_product(self, other: FixedPoint, part: int) -> FixedPoint:
         """Return the real part (0) or the imaginary part (1) of products of complex numbers, whose parts come first, (2, …)."""
         a, b = self.limbs, other.limbs
         if part == 0:
             sums = _products(a[:, 0], b[:, 0]) - _products(a[:, 1], b[:, 1])
         else:
             sums = _products(a[:, 0], b[:, 1]) + _products(a[:, 1], b[:, 0])
-        return Fixed(_carried(sums)[:-1])
+        return FixedPoint(_carry(sums)[:-1])
 
-    def polynomials(self, count: int) -> Fixed:
+    def polynomials(self, count: int) -> FixedPoint:
         """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i − T_{h−i} for a whole range of i."""
         table = np.zeros((len(self.limbs), max(count, 2), self.limbs.shape[1]))
         table[0, 0], table[:, 1] = 1, self.limbs
         for last, rows in _ranges(count):
             sums = _products(2 * table[:, last : last + 1], table[:, 1 : rows + 1])
             sums[:-1] -= table[:, last - rows : last][:, ::-1]
-            table[:, last + 1 : last + 1 + rows] = _carried(sums)[:-1]
-        return Fixed(table[:, :count])
+            table[:, last + 1 : last + 1 + rows] = _carry(sums)[:-1]
+        return FixedPoint(table[:, :count])
 
-    def turns(self, sines: Fixed, count: int) -> Fixed:
+    def turns(self, sines: FixedPoint, count: int) -> FixedPoint:
         """Return cos mφ and sin mφ, m = 0 … count−1, shape (2, count, N), of cosines (N,) and sines: w^{h+i} = w^h w^i.
 
         For |w| ≤ 1 the error of w^m is mε + (m−1)δ, but for products of errors, with that of w, ε, and that of two operations in
@@ -113,10 +113,10 @@ class Fixed:
         table = np.zeros((len(self.limbs), 2, max(count, 2), self.limbs.shape[1]))
         table[0, 0, 0], table[:, 0, 1], table[:, 1, 1] = 1, self.limbs, sines.limbs
         for last, rows in _ranges(count):
-            known, power = Fixed(table[:, :, 1 : rows + 1]), Fixed(table[:, :, last : last + 1])
+            known, power = FixedPoint(table[:, :, 1 : rows + 1]), FixedPoint(table[:, :, last : last + 1])
             for part in (0, 1):
                 table[:, part, last + 1 : last + 1 + rows] = known.part_of_product(power, part).limbs
-        return Fixed(table[:, :, :count])
+        return FixedPoint(table[:, :, :count])
 
     @staticmethod
     def growth(count: int, error: float) -> Array:
@@ -131,7 +131,7 @@ class Fixed:
             errors[last + 1 : last + 1 + rows] = sums
         return errors
 
-    def dot(self, other: Fixed) -> Fixed:
+    def dot(self, other: FixedPoint) -> FixedPoint:
         """Return Σ_k x_…k y_…k over the last axis."""
         count, terms = len(self.limbs), self.limbs.shape[-1]
         x, y, most = np.moveaxis(self.limbs, 0, -2), np.moveaxis(other.limbs, 0, -1), _EXACT // count
@@ -142,18 +142,18 @@ class Fixed:
             for i in range(count):
                 placed = np.moveaxis(pairs[..., i, : count + 1 - i], -1, 0)
                 sums[i : i + len(placed)] += placed
-            total += _carried(sums)[:-1]
-        return Fixed(_carried(total))
+            total += _carry(sums)[:-1]
+        return FixedPoint(_carry(total))
 
-    def weighted(self, weights: Fixed) -> Fixed:
+    def weighted_sums(self, weights: FixedPoint) -> FixedPoint:
         """Return Σ_k x_kn w_kj, shape (N, J), for numbers (K, N) and weights (K, J)."""
         count, terms, columns = weights.limbs.shape
         most = min(terms, _EXACT // count)
         width = max(1, _SPREAD // (count * (count + 1) * most))
-        parts = [self._weighted(weights.limbs[:, :, first : first + width], most) for first in range(0, columns, width)]
-        return Fixed(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
+        parts = [self._sum_block(weights.limbs[:, :, first : first + width], most) for first in range(0, columns, width)]
+        return FixedPoint(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
 
-    def _weighted(self, weights: Array, most: int) -> Array:
+    def _sum_block(self, weights: Array, most: int) -> Array:
         """Return limbs of the sums, which take so many terms at a time."""
         count, terms, columns = weights.shape
         size = self.limbs.shape[2]
@@ -167,8 +167,8 @@ class Fixed:
                 placed = np.moveaxis(table[: count + 1 - i], 0, 1)
                 shifted[i, :, i : i + placed.shape[1]] = placed
             sums = factors.reshape(-1, size).T @ shifted.reshape(-1, (count + 1) * columns)
-            total += _carried(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
-        return _carried(total) if terms > most else total
+            total += _carry(np.moveaxis(sums.reshape(size, count + 1, columns), 1, 0).copy())[:count]
+        return _carry(total) if terms > most else total
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
@@ -190,7 +190,7 @@ def _products(a: Array, b: Array) -> Array:
     return sums
 
 
-def _carried(limbs: Array) -> Array:
+def _carry(limbs: Array) -> Array:
     """Return limbs at most half the base, in place, but for the first; the last one is exact."""
     for i in range(len(limbs) - 1, 0, -1):
         over = np.rint(limbs[i] * _OF_BASE)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cosine_sums", "powers", "sine_sums", "turns", "waves", "waves_at"]
+__all__ = ["cosine_sums", "exponentials", "powers", "sine_sums", "turns", "waves_at"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -40,7 +40,7 @@ def turns(angles: Array, largest: int) -> Complex:
     return np.concatenate([forward, np.conj(forward[:0:-1])])
 
 
-def waves(turns: Complex, orders: Integers) -> Complex:
+def exponentials(turns: Complex, orders: Integers) -> Complex:
     """Return e^{i k·φ} for orders (K, d) from the ``turns`` of the angles, shape (K, N)."""
     result: Complex = turns[orders[:, 0], 0]
     for j in range(1, orders.shape[1]):
@@ -52,7 +52,7 @@ def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = 
     """Return cos k·φ and sin k·φ for angles (N, d) and orders (K, d) of entries to ``largest``, shape (2, K, N)."""
     result = np.empty((2, orders.shape[0], angles.shape[0])) if out is None else out
     if angles.shape[0] * orders.shape[0] > _FEW:
-        found = waves(turns(angles, largest), orders)
+        found = exponentials(turns(angles, largest), orders)
         result[0], result[1] = found.real, found.imag
     else:
         phases = orders @ angles.T

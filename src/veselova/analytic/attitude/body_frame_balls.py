@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.frame_balls import along_axes, directions, orthonormal
+from veselova.analytic.attitude.frame_balls import directions, orthonormal, to_axes
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -41,16 +41,16 @@ class BodyFrame:
         """Return D, (n, m)."""
         return directions(self.moving, self.arithmetic)
 
-    def along_axes(self, vectors: Values) -> Values:
+    def to_axes(self, vectors: Values) -> Values:
         """Return vectors (N, m, …) along the directions that move by their components along the principal axes, (N, n, …)."""
-        return along_axes(self.moving, self.directions, vectors)
+        return to_axes(self.moving, self.directions, vectors)
 
     def frames(self, attitude: Attitude) -> Values:
         """Return the frames (N, n, n) of an attitude along the directions that move."""
         n = self.moving.n
         result = np.empty((len(attitude.q), n, n), dtype=object)
-        result[:, :, 0] = self.along_axes(attitude.q)
-        result[:, :, 1:] = self.along_axes(attitude.normals @ self._rotation)
+        result[:, :, 0] = self.to_axes(attitude.q)
+        result[:, :, 1:] = self.to_axes(attitude.normals @ self._rotation)
         if self.moving.frozen:
             result[:, :, 1:] += self.start - self.directions @ (self.directions.T @ self.start)
         return result
@@ -143,6 +143,6 @@ class BodyFrame:
             inverse = sum((1 / abs(constants[i] - constants[j]) for i, j in pairs), xp.number(1))
             result = matrix * (1 + 3 * g * inverse)
         if self.given:
-            apart = np.sum(xp.at_most(other - self.directions @ self.q))
+            apart = np.sum(xp.upper_bound(other - self.directions @ self.q))
             result = 8 * self.moving.n * (result + apart)
         return result

@@ -57,7 +57,7 @@ class Attitude:
         return Attitude(*(getattr(self, f.name)[rows].copy() for f in fields(self)))
 
     @classmethod
-    def joined(cls, parts: list[Attitude]) -> Attitude:
+    def concatenate(cls, parts: list[Attitude]) -> Attitude:
         """Return the attitudes one after the other."""
         return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
@@ -73,7 +73,7 @@ class Frame:
         """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π as they do in time."""
         size = max(1, _BLOCK // (self.periods.genus * (2 * self.periods.genus + 1)))
         blocks = [_attitude(self, psi[first : first + size]) for first in range(0, max(psi.shape[0], 1), size)]
-        return blocks[0] if len(blocks) == 1 else Attitude.joined(blocks)
+        return blocks[0] if len(blocks) == 1 else Attitude.concatenate(blocks)
 
     def at_each(self, *sets: Values) -> list[Attitude]:
         """Return the attitudes at sets of angles, in one evaluation."""
@@ -170,8 +170,8 @@ class _Point:
     def roots_between(self) -> Values:
         """Return √|λ_s−λ_j|, (g, g, N), one for s = j: of what is above λ_s on its cut, the stretch between, and below λ_j."""
         (below, above), g = self.on_cuts, self.curve.genus
-        cuts, stretch = np.arange(g), self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
-        forward = above[:, None] + stretch[:, :, None] + below
+        cuts, time_rate = np.arange(g), self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
+        forward = above[:, None] + time_rate[:, :, None] + below
         result = np.where((cuts[:, None] < cuts)[:, :, None], forward, np.swapaxes(forward, 0, 1))
         result[cuts, cuts] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(result))

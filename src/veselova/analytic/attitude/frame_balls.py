@@ -10,7 +10,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.spectrum.moving_part import Moving
 
-__all__ = ["across", "along_axes", "directions", "frame_around", "orthonormal"]
+__all__ = ["across", "directions", "frame_around", "orthonormal", "to_axes"]
 
 
 def directions(moving: Moving, arithmetic: Any) -> Values:
@@ -22,7 +22,7 @@ def directions(moving: Moving, arithmetic: Any) -> Values:
     return np.asarray(columns)
 
 
-def along_axes(moving: Moving, columns: Values, vectors: Values) -> Values:
+def to_axes(moving: Moving, columns: Values, vectors: Values) -> Values:
     """Return vectors (N, m, …) along the ``columns``, the directions that move, by components along principal axes, (N, n, …).
 
     Where every direction is that of an axis, and all move, components change their places and signs alone.
@@ -58,4 +58,4 @@ def orthonormal(frame: Values, arithmetic: Any) -> Values:
         nearly = arithmetic.midpoints(nearly @ (3 * one - nearly.T @ nearly) / 2)
     product = nearly.T @ frame
     bound = np.sum(np.abs(nearly.T @ nearly - one)) + 2 * np.sum(np.abs(product - product.T))
-    return np.asarray(arithmetic.widened(nearly, bound))
+    return np.asarray(arithmetic.add_error(nearly, bound))

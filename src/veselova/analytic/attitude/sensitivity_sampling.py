@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude, Differences, Frame
-from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.periods import Periods
 
-__all__ = ["BETWEEN", "FEW", "Survey", "drawn_phases"]
+__all__ = ["BETWEEN", "FEW", "SensitivitySampling", "sample_phases"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ BETWEEN = 1.25
 
 
 @lru_cache
-def _drawn_angles(genus: int) -> Array:
+def _sample_angles(genus: int) -> Array:
     """Return the points of the torus at which the steepness is sampled, (N, g), always the same ones, read-only."""
     count = _SAMPLES if genus <= FEW else _FEW_SAMPLES
     result = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (count, genus))
@@ -39,13 +39,13 @@ def _drawn_angles(genus: int) -> Array:
     return np.asarray(result)
 
 
-def drawn_phases(genus: int) -> Array:
+def sample_phases(genus: int) -> Array:
     """Return phases at which the steepness is sampled where angles do not serve, (N, g)."""
-    return _drawn_angles(genus) / np.pi
+    return _sample_angles(genus) / np.pi
 
 
 @dataclass(frozen=True)
-class Survey:
+class SensitivitySampling:
     """The frame around a torus, from the angles (g,) of its start.
 
     rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half periods, and the steepness, are
@@ -61,17 +61,17 @@ class Survey:
     point: Callable[[Array], Array] | None = None
 
     @cached_property
-    def _found(self) -> tuple[Attitude, Attitude | None, Steepness | None, Steepness | None]:
+    def _found(self) -> tuple[Attitude, Attitude | None, Sensitivity | None, Sensitivity | None]:
         start = self.angles[None, :]
         differences = self._differences() if self.steep else None
         half_periods = np.pi * self.frame.half_periods if self.half_periods else start[:0]
         ends = start[:0] if differences is None else differences.ends
         at_start, at_half_periods, at_ends = self.frame.at_each(start, half_periods, ends)
-        steepness = None if differences is None else self._steepness(BETWEEN * differences.slopes(at_ends))
+        sensitivity = None if differences is None else self._sensitivity(BETWEEN * differences.slopes(at_ends))
         of_point = None
         if differences is not None and self.point is not None:
-            of_point = self._steepness(BETWEEN * differences.quotients(self.point(at_ends.q)))
-        return at_start, at_half_periods if self.half_periods else None, steepness, of_point
+            of_point = self._sensitivity(BETWEEN * differences.quotients(self.point(at_ends.q)))
+        return at_start, at_half_periods if self.half_periods else None, sensitivity, of_point
 
     @property
     def start(self) -> Attitude:
@@ -84,29 +84,29 @@ class Survey:
         return self._found[1]
 
     @property
-    def steepness(self) -> Steepness | None:
+    def sensitivity(self) -> Sensitivity | None:
         """Return how fast the frame turns with the phases, and more for what lies between the sampled points; None as above."""
         return self._found[2]
 
     @property
-    def steepness_of_point(self) -> Steepness | None:
+    def steepness_of_point(self) -> Sensitivity | None:
         """Return how fast the point of ``point`` moves with the phases, in the same way; None where there is none."""
         return self._found[3]
 
     def _differences(self) -> Differences:
         genus = self.rates.size
-        psi = np.concatenate([_drawn_angles(genus), self.angles[None, :]])
+        psi = np.concatenate([_sample_angles(genus), self.angles[None, :]])
         to_angles = np.linalg.inv(self.inversion.jacobian(psi))
         if genus > FEW:
             signs = np.sign(np.random.default_rng(genus).normal(size=(genus, FEW)))
             to_angles = to_angles @ np.column_stack([signs, self.rates])
         return Differences(psi, to_angles)
 
-    def _steepness(self, slopes: Array) -> Steepness:
+    def _sensitivity(self, slopes: Array) -> Sensitivity:
         genus = self.rates.size
         if genus <= FEW:
-            return Steepness.of(slopes, self.rates)
+            return Sensitivity.of(slopes, self.rates)
         # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
         spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
         by_phase = np.full(genus, spread / np.sqrt(genus))
-        return Steepness(by_phase, float(np.max(np.abs(slopes[:, :, -1]))), spread, float(np.abs(self.rates) @ by_phase))
+        return Sensitivity(by_phase, float(np.max(np.abs(slopes[:, :, -1]))), spread, float(np.abs(self.rates) @ by_phase))

@@ -75,7 +75,7 @@ class AbelJacobi(Generic[P]):
 
     def _complete(self, sums: Values) -> Values:
         """Return sums of series, last axis k, with what they leave out."""
-        return self.arithmetic.widened(sums, self.periods.series_truncation) if self.arithmetic.has_radii else sums
+        return self.arithmetic.add_error(sums, self.periods.series_truncation) if self.arithmetic.has_radii else sums
 
     def invert(self, z: Values) -> Values:
         """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
@@ -114,10 +114,10 @@ class AbelJacobi(Generic[P]):
             stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
         for i in open_:
-            psi[i] = self._continued(z[i])
+            psi[i] = self._continue_angles(z[i])
         return psi
 
-    def _continued(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _continue_angles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the angles of one point, led there along the line of phases from those of 2πz: the map is one-to-one.
 
         Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way. It serves in a
@@ -128,7 +128,9 @@ class AbelJacobi(Generic[P]):
         stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         while done < 1 and step > _LEAST_STRETCH:
             reached = min(1.0, done + step)
-            found = self._settled(_extrapolated(stations, reached) if len(stations) == 2 else psi, begin + reached * (z - begin))
+            found = self._iterate_newton(
+                _extrapolate(stations, reached) if len(stations) == 2 else psi, begin + reached * (z - begin)
+            )
             if found is None:
                 step /= 4
                 continue
@@ -144,7 +146,7 @@ class AbelJacobi(Generic[P]):
             )
         raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
 
-    def _settled(self, psi: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def _iterate_newton(self, psi: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return the angles to which plain Newton steps from nearby settle, None where they do not."""
         tolerance, last = _SETTLED * DOUBLE.epsilon, np.inf
         for _ in range(_NEAR_STEPS):
@@ -174,20 +176,20 @@ class AbelJacobi(Generic[P]):
                     inverses, known = _inverses(self.jacobian(psi), working), digits
             digits += known - _LOST_DIGITS
             with xp.at(digits + _LOST_DIGITS) as working:
-                psi = working.midpoints(psi - _applied(inverses, self.map(psi) - centre))
+                psi = working.midpoints(psi - _apply(inverses, self.map(psi) - centre))
         excess = self.map(psi) - z
         with xp.at(digits) as working:
-            reach = working.around_zero(2 * _applied(inverses, excess))
+            reach = working.zero_ball(2 * _apply(inverses, excess))
             slopes = self.jacobian(psi + reach)
             inverses = _inverses(slopes, working)
-            rest = _applied(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
-        step = rest - _applied(inverses, excess)
-        if not xp.inside(step, reach).all():
+            rest = _apply(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
+        step = rest - _apply(inverses, excess)
+        if not xp.contained_in(step, reach).all():
             raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
         return np.asarray(psi + step)
 
 
-def _extrapolated(stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float) -> NDArray[np.float64]:
+def _extrapolate(stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float) -> NDArray[np.float64]:
     """Return the value at ``reached`` of the cubic with the values and slopes of two stations (place, value, slope)."""
     (first, early, rise), (second, late, climb) = stations
     length = second - first
@@ -203,5 +205,5 @@ def _inverses(matrices: Values, arithmetic: Any) -> Values:
     return np.stack([arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix))) for matrix in matrices])
 
 
-def _applied(matrices: Values, vectors: Values) -> Values:
+def _apply(matrices: Values, vectors: Values) -> Values:
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -20,11 +20,11 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
-from veselova.analytic.spectrum.branch_points import COINCIDE, Resolved, resolved
+from veselova.analytic.spectrum.branch_points import COINCIDE, Resolved, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Periods", "resolved_periods"]
+__all__ = ["Periods", "resolve_periods"]
 
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
@@ -120,9 +120,9 @@ class Periods(AngleSeries):
         Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
-        return self.nodes if self.nodes is not None else int(np.max(self.needed_nodes(interval)))
+        return self.nodes if self.nodes is not None else int(np.max(self.count_nodes(interval)))
 
-    def needed_nodes(self, interval: Interval) -> Any:
+    def count_nodes(self, interval: Interval) -> Any:
         """Return that number; of many curves, or intervals, a column of them."""
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
@@ -143,7 +143,7 @@ class Periods(AngleSeries):
         """Return how many coefficients hold the forms, λ−b_1, and the forms, on all intervals of one curve in doubles."""
         found = list[tuple[int, Values, Values]]()
         for block in self._blocks:
-            counts = self.needed_nodes(block)[:, 0].astype(int).tolist()
+            counts = self.count_nodes(block)[:, 0].astype(int).tolist()
             found += zip(counts, *self._forms_at_nodes(block), strict=True)
         return found
 
@@ -164,7 +164,7 @@ class Periods(AngleSeries):
     def _mean(self, interval: Interval, forms: Values) -> Values:
         """Return h_0, shape (..., g)."""
         mean = np.sum(forms, axis=-1) / forms.shape[-1]
-        return np.asarray(self.arithmetic.widened(mean, self._bound(interval, 2)) if self.arithmetic.certified else mean)
+        return np.asarray(self.arithmetic.add_error(mean, self._bound(interval, 2)) if self.arithmetic.certified else mean)
 
     def _bound(self, interval: Interval, times: int) -> Values:
         """Return the bound of what the forms' series leave out after times·N coefficients, shape (g,).
@@ -173,7 +173,7 @@ class Periods(AngleSeries):
         """
         xp, count = self.arithmetic, self.node_count(interval)
         decay = xp.exp(xp.number(-interval.strip))
-        return np.asarray(xp.bounded_tail(interval.bound_in_strip(), decay, times * count))
+        return np.asarray(xp.bound_tail(interval.bound_in_strip(), decay, times * count))
 
     @cached_property
     def series_truncation(self) -> Values:
@@ -183,7 +183,7 @@ class Periods(AngleSeries):
         """
         if self.arithmetic.certified:
             return np.asarray(sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts))
-        return np.asarray(sum(np.abs(self.inverse_cycles) @ self.arithmetic.estimated_tail(series) for series in self.cut_series))
+        return np.asarray(sum(np.abs(self.inverse_cycles) @ self.arithmetic.estimate_tail(series) for series in self.cut_series))
 
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:
@@ -225,13 +225,13 @@ class Periods(AngleSeries):
         return np.asarray((raw + np.swapaxes(raw, -1, -2)) / 2)
 
 
-def resolved_periods(moving: Moving, distance: Fraction | None) -> tuple[Resolved, Periods]:
+def resolve_periods(moving: Moving, distance: Fraction | None) -> tuple[Resolved, Periods]:
     """Return the spectrum of what moves, and the periods of its curve in doubles, whose moduli are doubles too.
 
     ``distance`` is that of ``resolved``.
     """
     for coincide in (COINCIDE, _COINCIDE_BESIDE):
-        found = resolved(moving, DOUBLE.digits, distance, coincide=coincide)
+        found = resolve_spectrum(moving, DOUBLE.digits, distance, coincide=coincide)
         periods = Periods(Curve.of(found.spectrum, DOUBLE))
         if periods.has_moduli:
             break

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Cells, Evaluation, Trial
-from veselova.analytic.dense_output.output_array import Filling
-from veselova.analytic.dense_output.piecewise_polynomial import ORDER, Pieces
+from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.output_array import OutputArray
+from veselova.analytic.dense_output.piecewise_polynomial import ORDER, PiecewisePolynomial
 from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.linear_flow import LinearFlow
 
-__all__ = ["Track"]
+__all__ = ["AdjoiningWindows"]
 
 Array = NDArray[np.float64]
 
@@ -26,45 +26,47 @@ class _Part:
     """Windows of one trial that are resolved: columns of their panels, their pieces and tails."""
 
     panels: tuple[Array, ...]
-    pieces: Pieces
+    polynomials: PiecewisePolynomial
     tails: Array
 
 
-class Track:
+class AdjoiningWindows:
     """A motion on windows that adjoin, each resolved in so many pieces or halved."""
 
-    def __init__(self, filling: Filling, evaluation: Evaluation, in_tau1: LinearFlow) -> None:
-        self._filling, self._evaluation, self._in_tau1 = filling, evaluation, in_tau1
+    def __init__(self, output: OutputArray, evaluation: Evaluation, in_tau1: LinearFlow) -> None:
+        self._output, self._evaluation, self._in_tau1 = output, evaluation, in_tau1
         self._parts: list[_Part] = []
-        self._kept = self._columns = 0
+        self._selected = self._columns = 0
 
-    def trial(self, cells: Cells) -> Trial:
+    def batch(self, window_grid: WindowGrid) -> WindowBatch:
         """Return windows of Neumann time."""
-        z, rates = self._in_tau1.phases(cells.starts), self._in_tau1.rates
-        trial = self._filling.noted(Trial.of(self._evaluation, cells.starts, z, cells.length, rates, cells.tails))
-        self._columns = 1 + trial.series.shape[2]
-        return trial
+        z, rates = self._in_tau1.phases(window_grid.starts), self._in_tau1.rates
+        batch = self._output.count_evaluations(
+            WindowBatch.of(self._evaluation, window_grid.starts, z, window_grid.length, rates, window_grid.tails)
+        )
+        self._columns = 1 + batch.series.shape[2]
+        return batch
 
-    def extend(self, cells: Cells, count: int) -> bool:
+    def extend(self, window_grid: WindowGrid, count: int) -> bool:
         """Add windows; return whether all could be resolved in so many pieces, and kept."""
         for _ in range(MOST_HALVINGS):
-            if self._kept + len(cells) * count * ORDER * self._columns > _MOST_KEPT:
+            if self._selected + len(window_grid) * count * ORDER * self._columns > _MOST_KEPT:
                 return False
-            cells = cells.left_by(lambda some: self._unresolved(some, count))
-            if not len(cells):
+            window_grid = window_grid.remaining(lambda some: self._select_unresolved(some, count))
+            if not len(window_grid):
                 return True
-            cells = cells.halved()
+            window_grid = window_grid.halve()
         return False
 
-    def _unresolved(self, cells: Cells, count: int) -> Cells:
-        trial = self.trial(cells)
-        pieces, tails = trial.in_pieces(count)
-        settled = trial.settled(tails)
-        starts, rates = trial.starts[settled], trial.rates[settled]
-        panels = (starts, np.full(starts.size, trial.stretch), rates, trial.rate_tails[settled], rates[:, 0])
-        self._parts.append(_Part(panels, pieces[settled], tails[settled]))
-        self._kept += starts.size * count * ORDER * self._columns
-        return Cells(cells.length, cells.starts, tails)[~settled]
+    def _select_unresolved(self, window_grid: WindowGrid, count: int) -> WindowGrid:
+        batch = self.batch(window_grid)
+        polynomials, tails = batch.in_pieces(count)
+        resolved = batch.is_resolved(tails)
+        starts, rates = batch.starts[resolved], batch.rates[resolved]
+        panels = (starts, np.full(starts.size, batch.length_tau1), rates, batch.rate_tails[resolved], rates[:, 0])
+        self._parts.append(_Part(panels, polynomials[resolved], tails[resolved]))
+        self._selected += starts.size * count * ORDER * self._columns
+        return WindowGrid(window_grid.length, window_grid.starts, tails)[~resolved]
 
     def panels(self) -> Panels:
         """Return t(τ₁) on the windows."""
@@ -77,4 +79,4 @@ class Track:
             low, high = panels.values[k], panels.values[k + 1]
             first, last = np.searchsorted(times, [low, high])
             last[high == panels.values[-1]] = times.size
-            self._filling.fill(part.pieces, first, last, low, np.zeros_like(low), part.tails)
+            self._output.fill(part.polynomials, first, last, low, np.zeros_like(low), part.tails)

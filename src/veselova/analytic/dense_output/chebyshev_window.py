@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.dense_output.piecewise_polynomial import Pieces
+from veselova.analytic.dense_output.piecewise_polynomial import PiecewisePolynomial
 from veselova.analytic.time_map.chebyshev_panels import are_settled
 
-__all__ = ["MOST_HALVINGS", "NODES", "SUM_ROUNDING", "Cells", "Evaluation", "Trial"]
+__all__ = ["MOST_HALVINGS", "NODES", "SUM_ROUNDING", "Evaluation", "WindowBatch", "WindowGrid"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _OFFSETS, _TO_COEFFICIENTS = (np.cos(DOUBLE.nodes(NODES)) + 1) / 2, DOUBLE.cosin
 
 
 @dataclass(frozen=True)
-class Cells:
+class WindowGrid:
     """W windows of one length: the times u at which they start, of any clock; ``tails`` (W,) of longer ones there."""
 
     length: float
@@ -47,31 +47,31 @@ class Cells:
     def __len__(self) -> int:
         return int(self.starts.size)
 
-    def __getitem__(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Cells:
-        return Cells(self.length, self.starts[chosen], self.tails[chosen])
+    def __getitem__(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> WindowGrid:
+        return WindowGrid(self.length, self.starts[chosen], self.tails[chosen])
 
     @classmethod
-    def untried(cls, length: float, first: int, last: int, tail: float = np.inf) -> Cells:
+    def uniform(cls, length: float, first: int, last: int, tail: float = np.inf) -> WindowGrid:
         """Return the windows from first·length to last·length."""
         return cls(length, np.arange(first, last, dtype=float) * length, np.full(last - first, tail))
 
     @classmethod
-    def joined(cls, parts: Sequence[Cells]) -> Cells:
+    def concatenate(cls, parts: Sequence[WindowGrid]) -> WindowGrid:
         """Return all windows of the parts."""
         return cls(parts[0].length, *(np.concatenate([getattr(part, name) for part in parts]) for name in ("starts", "tails")))
 
-    def left_by(self, attempt: Callable[[Cells], Cells]) -> Cells:
+    def remaining(self, attempt: Callable[[WindowGrid], WindowGrid]) -> WindowGrid:
         """Return the windows that attempts at a few at once leave."""
-        return Cells.joined([attempt(self[first : first + _AT_ONCE]) for first in range(0, len(self), _AT_ONCE)])
+        return WindowGrid.concatenate([attempt(self[first : first + _AT_ONCE]) for first in range(0, len(self), _AT_ONCE)])
 
-    def halved(self) -> Cells:
+    def halve(self) -> WindowGrid:
         """Return the halves, in their order."""
         length = self.length / 2
-        return Cells(length, (self.starts[:, None] + np.array([0.0, length])).ravel(), np.repeat(self.tails, 2))
+        return WindowGrid(length, (self.starts[:, None] + np.array([0.0, length])).ravel(), np.repeat(self.tails, 2))
 
 
 @dataclass(frozen=True)
-class Trial:
+class WindowBatch:
     """W windows in Neumann time: Chebyshev coefficients of dt/dτ₁ (W, NODES) and of the series (W, NODES, C).
 
     starts (W,) and stretch: where they start and how long they are, in τ₁ · sizes (C,) of the series, of the ``shapes``
@@ -81,22 +81,24 @@ class Trial:
     rates: Array
     series: Array
     starts: Array
-    stretch: float
+    length_tau1: float
     sizes: Array
     shapes: list[tuple[int, ...]]
     before: Array
 
     @classmethod
-    def of(cls, evaluation: Evaluation, starts: Array, z: Array, stretch: float, frequencies: Array, before: Array) -> Trial:
+    def of(
+        cls, evaluation: Evaluation, starts: Array, z: Array, length_tau1: float, frequencies: Array, before: Array
+    ) -> WindowBatch:
         """Return the windows at whose starts the phases are z (W, g), and move with the frequencies."""
-        offsets = _OFFSETS * stretch
+        offsets = _OFFSETS * length_tau1
         nodes = z[:, None, :] + offsets[:, None] * frequencies
         rate, series = evaluation((starts[:, None] + offsets).ravel(), nodes.reshape(-1, z.shape[1]))
         columns = [part.reshape(starts.size, NODES, -1) for part in series]
         sizes = np.repeat([float(np.max(np.abs(part))) or 1.0 for part in series], [part.shape[2] for part in columns])
         in_tau1 = _TO_COEFFICIENTS @ np.concatenate(columns, axis=2)
         rates = rate.reshape(-1, NODES) @ _TO_COEFFICIENTS.T
-        return cls(rates, in_tau1, starts, stretch, sizes, [part.shape[1:] for part in series], before)
+        return cls(rates, in_tau1, starts, length_tau1, sizes, [part.shape[1:] for part in series], before)
 
     @cached_property
     def rate_tails(self) -> Array:
@@ -108,14 +110,14 @@ class Trial:
         """Return the largest of the last coefficients of anything against its size, (W,)."""
         return np.asarray(np.maximum(self.rate_tails, np.max(np.max(np.abs(self.series[:, -3:]), axis=1) / self.sizes, axis=1)))
 
-    def settled(self, tails: Array) -> NDArray[np.bool_]:
+    def is_resolved(self, tails: Array) -> NDArray[np.bool_]:
         """Return which windows are resolved, by the tails of anything that was made of them."""
         return are_settled(tails, self.before, _NOISE_TAIL)
 
-    def in_pieces(self, count: int) -> tuple[Pieces, Array]:
+    def in_pieces(self, count: int) -> tuple[PiecewisePolynomial, Array]:
         """Return the pieces in time, of τ₁ and the series, and their tails or those of the windows, whichever are larger."""
-        pieces = Pieces.of(self.rates, self.series, self.sizes, self.stretch, count)
-        tables = pieces.tables
-        tables[:, :, 0] *= self.stretch
+        polynomials = PiecewisePolynomial.of(self.rates, self.series, self.sizes, self.length_tau1, count)
+        tables = polynomials.tables
+        tables[:, :, 0] *= self.length_tau1
         tables[:, :, 0, 0] += self.starts[:, None]
-        return pieces, np.maximum(self.tails, pieces.tails)
+        return polynomials, np.maximum(self.tails, polynomials.tails)

@@ -19,11 +19,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.adjoining_windows import Track
-from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Cells, Evaluation, Trial
-from veselova.analytic.dense_output.output_array import AT_ONCE, Along, Filling
-from veselova.analytic.time_map.panels import PanelClock
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.dense_output.adjoining_windows import AdjoiningWindows
+from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.output_array import AT_ONCE, OutputArray, Samples
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.time_map.rate import TimeMap
 
 __all__ = ["FEW_TIMES", "Windows"]
 
@@ -106,72 +106,76 @@ class Windows:
         """Return how often the clock will be asked at least: at the starts of windows, and at times in none."""
         return int(self._times.size) - self._stretches.held + self._stretches.windows
 
-    def along(self, clock: Clock, rates: Array, evaluation: Evaluation) -> Along:
+    def interpolate(self, time_map: TimeMap, rates: Array, evaluation: Evaluation) -> Samples:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         if not self._stretches.windows and self._times.size <= AT_ONCE:
-            tau1, z = clock.tau1(self._times, self._remainders)
-            return Along(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
-        filling = Filling(self._times, self._fewest, clock, rates, evaluation, self._remainders)
-        if self._stretches.windows and not (isinstance(clock, PanelClock) and self._tracked(filling, clock, evaluation)):
-            cells, count = self._over_stretches(filling, clock)
+            tau1, z = time_map.tau1(self._times, self._remainders)
+            return Samples(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
+        output = OutputArray(self._times, self._fewest, time_map, rates, evaluation, self._remainders)
+        if self._stretches.windows and not (
+            isinstance(time_map, ChebyshevTimeMap) and self._fill_adjoining(output, time_map, evaluation)
+        ):
+            window_grid, count = self._over_stretches(output, time_map)
             for _ in range(MOST_HALVINGS):
-                cells = cells.left_by(lambda some: filling.by_windows(some, count)).halved()
-                if not len(cells):
+                window_grid = window_grid.remaining(lambda some: output.by_windows(some, count)).halve()
+                if not len(window_grid):
                     break
-        return filling.completed()
+        return output.complete()
 
-    def _over_stretches(self, filling: Filling, clock: Clock) -> tuple[Cells, int]:
+    def _over_stretches(self, output: OutputArray, time_map: TimeMap) -> tuple[WindowGrid, int]:
         """Return windows of a length at which most are resolved, and in how many pieces."""
         dense = self._times[np.stack([self._stretches.first, self._stretches.last])]
-        ends = clock.tau1(dense.ravel())[0].reshape(dense.shape) * clock.mean
+        ends = time_map.tau1(dense.ravel())[0].reshape(dense.shape) * time_map.mean
 
-        def over(length: float, tail: float) -> Cells:
+        def over(length: float, tail: float) -> WindowGrid:
             pairs = np.floor(ends / length) + np.array([[0.0], [1.0]])
             starts = np.unique(np.concatenate([np.arange(*pair) for pair in pairs.T])) * length
-            return Cells(length, starts, np.full(starts.size, tail))
+            return WindowGrid(length, starts, np.full(starts.size, tail))
 
-        return _resolving(over, filling.trial, self._length)
+        return _resolving(over, output.batch, self._length)
 
-    def _tracked(self, filling: Filling, clock: PanelClock, evaluation: Evaluation) -> bool:
+    def _fill_adjoining(self, output: OutputArray, time_map: ChebyshevTimeMap, evaluation: Evaluation) -> bool:
         """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether that could be done."""
         ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
         if self._stretches.windows < _COVERED * float(np.ptp(ends)) / self._length:
             return False
-        low, high = ends / clock.mean
+        low, high = ends / time_map.mean
 
-        def over(length: float, tail: float) -> Cells:
-            return Cells.untried(length, math.floor(low / length), math.ceil(high / length), tail)
+        def over(length: float, tail: float) -> WindowGrid:
+            return WindowGrid.uniform(length, math.floor(low / length), math.ceil(high / length), tail)
 
-        track = Track(filling, evaluation, clock.in_tau1)
-        cells, count = _resolving(over, track.trial, _few_bits(self._length / clock.mean))
-        while len(cells):
-            if not track.extend(cells, count):
+        adjoining = AdjoiningWindows(output, evaluation, time_map.in_tau1)
+        window_grid, count = _resolving(over, adjoining.batch, _few_bits(self._length / time_map.mean))
+        while len(window_grid):
+            if not adjoining.extend(window_grid, count):
                 return False
-            panels = track.panels()
-            length, (first, last) = cells.length, np.rint(panels.borders[[0, -1]] / cells.length).astype(int).tolist()
+            panels = adjoining.panels()
+            length, (first, last) = window_grid.length, np.rint(panels.borders[[0, -1]] / window_grid.length).astype(int).tolist()
             more = max(1, (last - first) // 8)  # the ends were those of the mean clock
-            before = Cells.untried(length, first - more, first) if panels.values[0] > self._times[0] else cells[:0]
-            after = Cells.untried(length, last, last + more) if panels.values[-1] < self._times[-1] else cells[:0]
-            cells = Cells.joined([before, after])
-        clock.panels = panels
-        track.fill(self._times, panels)
+            before = WindowGrid.uniform(length, first - more, first) if panels.values[0] > self._times[0] else window_grid[:0]
+            after = WindowGrid.uniform(length, last, last + more) if panels.values[-1] < self._times[-1] else window_grid[:0]
+            window_grid = WindowGrid.concatenate([before, after])
+        time_map.panels = panels
+        adjoining.fill(self._times, panels)
         return True
 
 
-def _resolving(over: Callable[[float, float], Cells], trial: Callable[[Cells], Trial], length: float) -> tuple[Cells, int]:
+def _resolving(
+    over: Callable[[float, float], WindowGrid], batch: Callable[[WindowGrid], WindowBatch], length: float
+) -> tuple[WindowGrid, int]:
     """Return the windows ``over`` all times of a length, the first tried or below, at which most are resolved, and in how many
     pieces; ``over`` takes the length, and the tail of the ones before."""
     tail, count = np.inf, _PIECES[-1]
     for k in range(_MOST_LENGTHS):
-        cells = over(length, tail)
-        tried = trial(cells[np.unique(np.linspace(0, len(cells) - 1, _FIRST_WINDOWS).astype(int))])
+        window_grid = over(length, tail)
+        tried = batch(window_grid[np.unique(np.linspace(0, len(window_grid) - 1, _FIRST_WINDOWS).astype(int))])
         enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
-        if np.mean(tried.settled(tried.tails)) >= enough:
+        if np.mean(tried.is_resolved(tried.tails)) >= enough:
             for count in _PIECES:
-                if np.mean(tried.settled(tried.in_pieces(count)[1])) >= enough:
-                    return cells, count
+                if np.mean(tried.is_resolved(tried.in_pieces(count)[1])) >= enough:
+                    return window_grid, count
         tail, length = float(np.max(tried.tails)), _shorter(length) if k < _CLOSE_LENGTHS else length / 2
-    return cells, count
+    return window_grid, count
 
 
 def _few_bits(length: float) -> float:

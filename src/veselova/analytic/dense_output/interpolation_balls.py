@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.numerics.chebyshev_balls import EnclosedSeries
-from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, expected_terms
+from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
+from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, estimate_terms
 
-__all__ = ["EnclosedWindows"]
+__all__ = ["WindowsInBalls"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _SPARE, _SPARE_DIGITS, _SPARE_GROWTH = 1.08, 59, 0.13
 
 
 @dataclass(frozen=True)
-class EnclosedWindows:
+class WindowsInBalls:
     """``count`` windows from ``first`` on, each 2·half long with so many Chebyshev points: t = centre − half·cos θ."""
 
     arithmetic: Any
@@ -49,7 +49,7 @@ class EnclosedWindows:
     @classmethod
     def worth_while(
         cls, times: Values, cycles: float, sampled: Callable[[Array], Array], arithmetic: Any
-    ) -> EnclosedWindows | None:
+    ) -> WindowsInBalls | None:
         """Return the windows by which increasing times (N,), over so many cycles of the fastest phase, cost least; None without.
 
         ``sampled``: the motion in double precision at increasing times, columns (N, K) of size one.
@@ -61,7 +61,7 @@ class EnclosedWindows:
         spare, choices = _SPARE + _SPARE_GROWTH * math.log(xp.digits / _SPARE_DIGITS), {}
         for length in (2.0, 1.0, 0.5, 0.25):
             count = max(1, math.ceil(cycles / length))
-            nodes = math.ceil(spare * expected_terms(_samples(first, last, count, sampled), xp.digits))
+            nodes = math.ceil(spare * estimate_terms(_samples(first, last, count, sampled), xp.digits))
             choices[len(times) * nodes * _TERM + count * nodes * _NODE] = count, nodes
         cost = min(choices)
         if not cost < len(times):
@@ -69,7 +69,7 @@ class EnclosedWindows:
         count, nodes = choices[cost]
         return cls(xp, times[0], (times[-1] - times[0]) / (2 * count), count, nodes)
 
-    def finer(self) -> EnclosedWindows:
+    def finer(self) -> WindowsInBalls:
         """Return the windows with more nodes."""
         return replace(self, nodes=math.ceil(MORE * self.nodes))
 
@@ -89,16 +89,16 @@ class EnclosedWindows:
         result = np.empty((len(times), columns), dtype=object)
         table = np.moveaxis(values.reshape(self.count, self.nodes, columns), 1, 2).reshape(-1, self.nodes)
         middle = xp.midpoints(table)
-        open_ = np.max(xp.at_most(table - middle), axis=1)
+        open_ = np.max(xp.upper_bound(table - middle), axis=1)
         series = xp.cosine_series(middle)
-        if not are_resolved(series, open_, np.max(xp.at_most(middle), axis=1), xp):
+        if not are_resolved(series, open_, np.max(xp.upper_bound(middle), axis=1), xp):
             return None
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
-        slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimated_tail(series)
-        sums, slack = EnclosedSeries(series.reshape(self.count, columns, -1), xp), slack.reshape(self.count, columns)
+        slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimate_tail(series)
+        sums, slack = ChebyshevSeriesInBalls(series.reshape(self.count, columns, -1), xp), slack.reshape(self.count, columns)
         for w, rows in self._rows(times):
             x = (self._centres[w] - times[rows]) / self.half
-            result[rows] = xp.widened(sums(w, x), slack[w])
+            result[rows] = xp.add_error(sums(w, x), slack[w])
         return result
 
     def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:

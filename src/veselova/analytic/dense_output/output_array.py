@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.chebyshev_window import SUM_ROUNDING, Cells, Evaluation, Trial
-from veselova.analytic.dense_output.piecewise_polynomial import Pieces
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.dense_output.chebyshev_window import SUM_ROUNDING, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.piecewise_polynomial import PiecewisePolynomial
+from veselova.analytic.time_map.rate import TimeMap
 
-__all__ = ["AT_ONCE", "Along", "Filling"]
+__all__ = ["AT_ONCE", "OutputArray", "Samples"]
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -22,7 +22,7 @@ AT_ONCE = 32768
 
 
 @dataclass(frozen=True)
-class Along:
+class Samples:
     """A motion at N times: τ₁ (N,), its series, and the error (N,) that interpolation adds, relative to their size.
 
     evaluations: how often the motion was evaluated
@@ -34,7 +34,7 @@ class Along:
     evaluations: int
 
 
-class Filling:
+class OutputArray:
     """The answer while it is filled: a row for τ₁ and one for every component of the series, along the times.
 
     So the answer is written by long rows, in three fifths of the time of short ones, and functions of many states run along them.
@@ -44,12 +44,12 @@ class Filling:
         self,
         times: Array,
         fewest: int,
-        clock: Clock,
+        time_map: TimeMap,
         rates: Array,
         evaluation: Evaluation,
         remainders: Array | None = None,
     ) -> None:
-        self._times, self._fewest, self._clock, self._rates, self._evaluation = times, fewest, clock, rates, evaluation
+        self._times, self._fewest, self._time_map, self._rates, self._evaluation = times, fewest, time_map, rates, evaluation
         self._remainders = remainders
         self._error, self._open = np.zeros(times.size), np.ones(times.size, dtype=bool)
         self._shapes: list[tuple[int, ...]] = []
@@ -59,12 +59,12 @@ class Filling:
     def _states(self) -> Array:
         return np.empty((1 + sum(int(np.prod(shape)) for shape in self._shapes), self._times.size))
 
-    def completed(self) -> Along:
+    def complete(self) -> Samples:
         """Return the answer, with what is still open evaluated time by time."""
         rest = np.flatnonzero(self._open)
         for k in range(0, rest.size, AT_ONCE):
             rows = rest[k : k + AT_ONCE]
-            tau1, z = self._clock.tau1(self._times[rows], self._remainders_at(rows))
+            tau1, z = self._time_map.tau1(self._times[rows], self._remainders_at(rows))
             _, series = self._evaluation(tau1, z)
             self._evaluations += rows.size
             self._shapes = [part.shape[1:] for part in series]
@@ -75,42 +75,50 @@ class Filling:
             np.moveaxis(self._states[a:b].reshape(*shape, -1), -1, 0)
             for a, b, shape in zip(ends[:-1], ends[1:], self._shapes, strict=True)
         )
-        return Along(self._states[0], series, self._error, self._evaluations)
+        return Samples(self._states[0], series, self._error, self._evaluations)
 
-    def trial(self, cells: Cells, z: Array | None = None) -> Trial:
+    def batch(self, window_grid: WindowGrid, z: Array | None = None) -> WindowBatch:
         """Return windows of mean time; z (W, g) are the phases at their starts."""
-        z = self._clock.ahead(cells.starts)[1] if z is None else z
-        mean = self._clock.mean
-        return self.noted(Trial.of(self._evaluation, cells.starts / mean, z, cells.length / mean, self._rates, cells.tails))
+        z = self._time_map.ahead(window_grid.starts)[1] if z is None else z
+        mean = self._time_map.mean
+        return self.count_evaluations(
+            WindowBatch.of(
+                self._evaluation, window_grid.starts / mean, z, window_grid.length / mean, self._rates, window_grid.tails
+            )
+        )
 
-    def noted(self, trial: Trial) -> Trial:
+    def count_evaluations(self, batch: WindowBatch) -> WindowBatch:
         """Return the trial, with its evaluations counted."""
-        self._evaluations += trial.rates.size
-        self._shapes = trial.shapes
-        return trial
+        self._evaluations += batch.rates.size
+        self._shapes = batch.shapes
+        return batch
 
-    def by_windows(self, cells: Cells, count: int) -> Cells:
+    def by_windows(self, window_grid: WindowGrid, count: int) -> WindowGrid:
         """Fill the times of the windows that are resolved in so many pieces; return the others that hold times enough."""
-        ends, places = np.unique(np.concatenate([cells.starts, cells.starts + cells.length]), return_inverse=True)
-        ahead, z = self._clock.ahead(ends)
+        ends, places = np.unique(
+            np.concatenate([window_grid.starts, window_grid.starts + window_grid.length]), return_inverse=True
+        )
+        ahead, z = self._time_map.ahead(ends)
         first, last = np.searchsorted(self._times, ends + ahead)[places].reshape(2, -1)
         held = last - first >= self._fewest
         if not np.any(held):
-            return cells[held]
-        cells, first, last, places = cells[held], first[held], last[held], places[: len(cells)][held]
-        trial = self.trial(cells, z[places])
-        pieces, tails = trial.in_pieces(count)
-        done = trial.settled(tails)
-        self.fill(pieces[done], first[done], last[done], cells.starts[done], ahead[places][done], tails[done])
-        return Cells(cells.length, cells.starts, tails)[~done]
+            return window_grid[held]
+        window_grid, first, last, places = window_grid[held], first[held], last[held], places[: len(window_grid)][held]
+        batch = self.batch(window_grid, z[places])
+        polynomials, tails = batch.in_pieces(count)
+        done = batch.is_resolved(tails)
+        self.fill(polynomials[done], first[done], last[done], window_grid.starts[done], ahead[places][done], tails[done])
+        return WindowGrid(window_grid.length, window_grid.starts, tails)[~done]
 
-    def fill(self, pieces: Pieces, first: Places, last: Places, starts: Array, ahead: Array, tails: Array) -> None:
+    def fill(
+        self, polynomials: PiecewisePolynomial, first: Places, last: Places, starts: Array, ahead: Array, tails: Array
+    ) -> None:
         """Fill the times, from the first up to the last, of W windows, which start at starts + ahead; (W,) all of them."""
         begins = np.flatnonzero(first != np.append(-1, last[:-1])).tolist()
         for run in map(slice, begins, [*begins[1:], first.size]):  # windows that adjoin
             rows = slice(first[run][0], last[run][-1])
             out, remainders = self._states[:, rows], self._remainders_at(rows)
-            pieces[run].fill(self._times[rows], starts[run], ahead[run], out, remainders)
+            polynomials[run].fill(self._times[rows], starts[run], ahead[run], out, remainders)
             self._open[rows] = False
             self._error[rows] = np.repeat(2 * tails[run] + SUM_ROUNDING, (last - first)[run])
 

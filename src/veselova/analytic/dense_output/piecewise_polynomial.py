@@ -18,7 +18,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import exact_sum
 from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor, increasing_root
 
-__all__ = ["ORDER", "Pieces"]
+__all__ = ["ORDER", "PiecewisePolynomial"]
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def _restriction(nodes: int, count: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class PiecewisePolynomial:
     """The pieces of W windows.
 
     borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers; the first row is the part of
@@ -65,13 +65,13 @@ class Pieces:
     tails: Array
 
     @classmethod
-    def of(cls, rates: Array, series: Array, sizes: Array, stretch: float, count: int) -> Pieces:
+    def of(cls, rates: Array, series: Array, sizes: Array, length_tau1: float, count: int) -> PiecewisePolynomial:
         """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns).
 
         sizes (columns,) of the series · stretch: how long a window is in τ₁
         """
         windows, nodes = rates.shape
-        restriction, half = _restriction(nodes, count), stretch / (2 * count)
+        restriction, half = _restriction(nodes, count), length_tau1 / (2 * count)
         pace = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
         durations, slope = _INTEGRALS @ pace, _TO_POWERS @ pace
         elapsed = polynomial.polyint(slope, lbnd=-1)
@@ -100,10 +100,10 @@ class Pieces:
         tables = (coefficients.T @ _TO_POWERS.T).reshape(windows, count, -1, ORDER)
         return cls(borders, np.asarray(tables), tails)
 
-    def __getitem__(self, chosen: slice | NDArray[np.bool_]) -> Pieces:
+    def __getitem__(self, chosen: slice | NDArray[np.bool_]) -> PiecewisePolynomial:
         if isinstance(chosen, np.ndarray) and chosen.all():
             return self
-        return Pieces(self.borders[chosen], self.tables[chosen], self.tails[chosen])
+        return PiecewisePolynomial(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
     def fill(self, times: Array, starts: Array, ahead: Array, out: Array, remainders: Array | None = None) -> None:
         """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start at starts + ahead, (W,) both.
@@ -128,8 +128,8 @@ class Pieces:
         """Fill ``out`` (C, N) with the sums of powers at x (N,), so many of them in each piece."""
         tables, ends = self.tables.reshape(-1, *self.tables.shape[2:]), np.cumsum(counts)
         cuts = np.unique(np.concatenate([[0], ends, np.arange(0, x.size, _TIMES)]))
-        pieces, room = np.searchsorted(ends, cuts[:-1], side="right").tolist(), np.empty((ORDER, min(x.size, _TIMES)))
-        for piece, begin, end in zip(pieces, cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        polynomials, room = np.searchsorted(ends, cuts[:-1], side="right").tolist(), np.empty((ORDER, min(x.size, _TIMES)))
+        for piece, begin, end in zip(polynomials, cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
             if begin % _TIMES == 0:
                 base, powers = begin, _powers(x[begin : begin + _TIMES], room)
             np.matmul(tables[piece], powers[:, begin - base : end - base], out=out[:, begin:end])

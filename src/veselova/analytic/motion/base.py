@@ -37,15 +37,15 @@ class Motion(ABC, Generic[P]):
 
     def __call__(self, times: Any) -> Trajectory:
         """Return the trajectory at times."""
-        return self.along(TimeGrid.of(times))
+        return self.evaluate(TimeGrid.of(times))
 
-    def along(self, grid: TimeGrid) -> Trajectory:
+    def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times, in the order in which they were asked for."""
         began = time.perf_counter()
         if self._rests:
             provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
-        series, error, method, details = self._evaluated(grid)
+        series, error, method, details = self._evaluate(grid)
         provenance = Provenance.since(began, "analytic", method, details)
         return Trajectory.on_grid(self.problem, grid, _SAFETY * error, series, provenance, self)
 
@@ -55,5 +55,5 @@ class Motion(ABC, Generic[P]):
         return not self.problem.moves
 
     @abstractmethod
-    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         """Return the series of a problem that moves, their error before the safety factor, the method and its details."""

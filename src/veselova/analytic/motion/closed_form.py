@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.motion.evaluator import Route
+from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
-from veselova.analytic.time_map.fourier import significant_modes
-from veselova.analytic.time_map.rate import STRETCH_POWERS
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, shown
+from veselova.analytic.time_map.fourier import find_modes
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
@@ -48,7 +48,7 @@ def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
     number, Unsolved at rest, on a separatrix (``no-closed-form``) and where theta functions or modes are too many.
     """
     if isinstance(accuracy, bool) or not isinstance(accuracy, (int, float)) or not _FINEST <= accuracy <= _COARSEST:
-        raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", shown(accuracy))
+        raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy))
     problem = on_torus(given)
     solution = Solution(problem)
     if solution.separatrices:
@@ -94,7 +94,7 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
         "mean_rate": solution.mean_rate / unit,
         "modes": modes.tolist(),
         "coefficients": coefficients,
-        "rate": {"characteristic": of_gamma, "constant": solution.rate_constant / unit, "power": STRETCH_POWERS[time]},
+        "rate": {"characteristic": of_gamma, "constant": solution.rate_constant / unit, "power": TIME_RATE_POWERS[time]},
         "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
     }
 
@@ -108,21 +108,23 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     g = solution.curve.genus
     if solution.problem.time == "tau1":
         return np.empty((0, g), dtype=np.int64), []
-    solution.fourier_clock(False)  # raises where the rate varies too much, or modes are too many
-    modes, coefficients, *_ = significant_modes(solution.rate)
+    solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
+    modes, coefficients, *_ = find_modes(solution.rate)
     pace = np.abs(modes @ solution.in_tau1.rates)
-    reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate) * solution.steepness.along_flow
+    reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate) * solution.sensitivity.along_flow
     effects = np.abs(coefficients) * reach
     order = np.argsort(-effects)
     left_out = np.cumsum(effects[order][::-1])[::-1]
-    kept = order[left_out > accuracy / 2]
-    if len(kept) > _MOST_MODES:
-        raise Unsolved("too-many-modes", f"the time map has {len(kept)} modes above {accuracy:g}, and {_MOST_MODES} can be kept")
+    selected = order[left_out > accuracy / 2]
+    if len(selected) > _MOST_MODES:
+        raise Unsolved(
+            "too-many-modes", f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} can be kept"
+        )
     # Each may be off by its part of what is left of the accuracy.
-    finest = accuracy / (4 * max(1, len(kept)) * np.maximum(reach[kept], np.finfo(float).tiny)) / solution.tau1_unit
-    values = coefficients[kept] / solution.tau1_unit
+    finest = accuracy / (4 * max(1, len(selected)) * np.maximum(reach[selected], np.finfo(float).tiny)) / solution.tau1_unit
+    values = coefficients[selected] / solution.tau1_unit
     places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
-    return modes[kept], [round(float(value), place) for value, place in zip(values, places, strict=True)]
+    return modes[selected], [round(float(value), place) for value, place in zip(values, places, strict=True)]
 
 
 def _reduction(solution: Solution) -> dict[str, Any] | None:
@@ -131,16 +133,16 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
     if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
         return None
     coordinates = Theta(T).coordinates
-    return {"basis": coordinates.U.tolist(), "waves": list(coordinates.waves)}
+    return {"basis": coordinates.U.tolist(), "waves": list(coordinates.harmonics)}
 
 
 def _error(solution: Solution, accuracy: float) -> dict[str, float]:
     """Return the bound of q and the frame: that of the engine at t = 0, and how it grows, and what modes left out may make."""
-    route, far = Route(solution, "theta"), _CYCLES / solution.fastest
+    evaluator, far = Evaluator(solution, "theta"), _CYCLES / solution.fastest
     errors = []
     for time in (0.0, far):
-        horizon = route.to(TimeGrid.of([time]))
+        plan = evaluator.to(TimeGrid.of([time]))
         name = None if solution.problem.time == "tau1" else "fourier"
-        errors.append(_OWN_ROUNDING * float(route.along(horizon, horizon.clock(name))[1][0]))
+        errors.append(_OWN_ROUNDING * float(evaluator.evaluate(plan, plan.time_map(name))[1][0]))
     growth = max(0.0, errors[1] - errors[0])
     return {"at_start": errors[0] + accuracy, "per_unit_time": growth / far, "per_cycle": growth / _CYCLES}

@@ -22,9 +22,9 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.spectrum.branch_points import Spectrum, tangent
 from veselova.analytic.spectrum.moving_part import Moving
-from veselova.analytic.time_map.rate import STRETCH_POWERS
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 
-__all__ = ["Drift", "expected_growth"]
+__all__ = ["PerturbationBound", "estimate_growth"]
 
 #: More than what a dozen operations in double precision round.
 _UP = 1 + 1e-12
@@ -34,12 +34,12 @@ _TIMES, _BESIDE = 6, 120
 
 
 @dataclass(frozen=True)
-class Drift:
+class PerturbationBound:
     """The bounds for one start, in units where the largest I of the moved one is 1; small numbers are balls, others doubles.
 
     apart: |u(0)| + |w(0)|/μ + f/M · matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
     frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| · bend: one of |q''|
-    clocks, clock_slope: |ρ₀−ρ₁| ≤ clocks + clock_slope·|u| · slowest: the least d(time)/dτ₁ · inverses: δ · highest: max a
+    time_maps, clock_slope: |ρ₀−ρ₁| ≤ clocks + clock_slope·|u| · slowest: the least d(time)/dτ₁ · inverses: δ · highest: max a
     """
 
     apart: Any
@@ -48,14 +48,14 @@ class Drift:
     growth: float
     speed: float
     bend: float
-    clocks: Any
+    time_maps: Any
     clock_slope: float
     slowest: float
     inverses: Any
     highest: float
 
     @classmethod
-    def of(cls, given: Moving, moved: Moving, arithmetic: Any) -> Drift:
+    def of(cls, given: Moving, moved: Moving, arithmetic: Any) -> PerturbationBound:
         """Return the bounds for a start and the one that it was moved to, frames set aside."""
         with arithmetic.at(_TIMES * arithmetic.digits + _BESIDE) as xp:
             unit = xp.sqrt(xp.number(moved.unit / given.unit))
@@ -63,7 +63,7 @@ class Drift:
             p0, rate0 = p0 * unit, rate0 / unit
             a0 = xp.array([moved.unit / (a * given.unit) for a in given.A])
             q1, p1, rate1 = tangent(moved, xp)
-            places, signs = _matched(given, moved)
+            places, signs = _match_directions(given, moved)
             a1, (q1, p1) = a0.copy(), (_spread(x * signs, places, len(q0)) for x in (q1, p1))
             a1[places] = xp.array([1 / a for a in moved.A])
             energies = [np.sum(p * p) + np.sum(a * q * q) for a, q, p in ((a0, q0, p0), (a1, q1, p1))]
@@ -80,23 +80,23 @@ class Drift:
             bounds = {
                 "apart": u + w / growth + force / (level / _UP**2),
                 "matrix": inverses + (4 * high + 2) * _UP * u + 2 * speed * w,
-                "clocks": rates.apart * rates.largest_power(low, high) + steepest * A,
+                "time_maps": rates.apart * rates.largest_power(low, high) + steepest * A,
                 "inverses": inverses,
             }
-            small = {name: xp.at_most(value).item() for name, value in bounds.items()}
+            small = {name: xp.upper_bound(value).item() for name, value in bounds.items()}
         coarse = {"growth": growth, "speed": speed, "bend": bend, "slowest": rates.slowest(low, high), "highest": high}
         return cls(frames=arithmetic.number(0), clock_slope=2 * steepest / low * _UP, **coarse, **small)
 
     def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
         """Return how far τ₁, q̇, the frame (as an operator, so each entry) and the λ's may be from those at Neumann times (N,)
         of the moved start, at the same times of the clock, each (N,)."""
-        steps = xp.at_most(np.abs(tau1))
+        steps = xp.upper_bound(np.abs(tau1))
         apart = self.apart * xp.exp(self.growth * steps)
-        late = (steps * self.clocks + self.clock_slope * apart / self.growth) / self.slowest
-        turned = self.frames + 2 * (1 + self.speed / self.growth) * apart + self.speed * late
-        slope = (self.clocks + self.clock_slope * turned) / self.slowest / self.slowest
+        late = (steps * self.time_maps + self.clock_slope * apart / self.growth) / self.slowest
+        rotated = self.frames + 2 * (1 + self.speed / self.growth) * apart + self.speed * late
+        slope = (self.time_maps + self.clock_slope * rotated) / self.slowest / self.slowest
         velocity = (self.growth * apart + self.bend * late) / self.slowest + self.speed * slope
-        return late, velocity, turned, 4 * self.highest * turned + self.inverses
+        return late, velocity, rotated, 4 * self.highest * rotated + self.inverses
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class _Rates:
         """Return the rates of motions with dτ₁/d(time) and (q,Aq) at the start."""
         powers = {"t": xp.sqrt, "s": lambda x: 1 / x, "tau1": lambda x: xp.number(1)}
         constants = [1 / (rate * powers[time](value)) for rate, value in zip(rates, values, strict=True)]
-        return cls(STRETCH_POWERS[time] / 2, abs(constants[0] - constants[1]), *_range(constants))
+        return cls(TIME_RATE_POWERS[time] / 2, abs(constants[0] - constants[1]), *_range(constants))
 
     def largest_power(self, low: float, high: float) -> float:
         """Return a bound of (q,Aq)^p."""
@@ -132,7 +132,7 @@ class _Rates:
         return self.most * abs(self.power) * float(high ** (1 - self.power)) * _UP
 
 
-def expected_growth(spectrum: Spectrum, tau1: float) -> int:
+def estimate_growth(spectrum: Spectrum, tau1: float) -> int:
     """Return the digits by which two motions part until a Neumann time, by the bound above."""
     inverse, q, p = (x.astype(float) for x in (spectrum.inverse, spectrum.q, spectrum.q_prime))
     low, energy = float(inverse[0]), float(np.sum(p * p) + np.sum(inverse * q * q))
@@ -146,7 +146,7 @@ def _bend_and_level(low: float, high: float, least: float, most: float) -> tuple
     return bend, (bend + 2 * (high - low)) * _UP
 
 
-def _matched(given: Moving, moved: Moving) -> tuple[list[int], Values]:
+def _match_directions(given: Moving, moved: Moving) -> tuple[list[int], Values]:
     """Return where the directions that are left were among the given ones, and the signs of those that were turned round."""
     places, signs = [], []
     for vector in moved.vectors:

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import Steepness
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.attitude.sensitivity import Sensitivity
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.time_map.rate import TimeMap
 
 __all__ = ["ErrorBound"]
 
@@ -52,30 +52,30 @@ class ErrorBound:
     solution: Solution
     method: str
 
-    def at(self, horizon: Horizon, tau1: Array, clock: Clock) -> Array:
+    def at(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap) -> Array:
         """Return the bound at each time of a horizon, (N,), from the Neumann times there."""
-        solution, steepness, at_once = self.solution, self.solution.steepness, self._at_once
+        solution, sensitivity, at_once = self.solution, self.solution.sensitivity, self._at_once
         if self._is_looked_at:
             rows = np.linspace(0, tau1.size - 1, min(tau1.size, _ON_ORBIT)).astype(int)
-            steepness = steepness.joined(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
-            at_once = self._of_one_evaluation(steepness)
-        rounding = _GUARDED_RATE if horizon.is_guarded else _RATE * _EPSILON
-        lag = self._lag(horizon, tau1, clock, rounding)
+            sensitivity = sensitivity.maximum(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
+            at_once = self._of_one_evaluation(sensitivity)
+        rounding = _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
+        lag = self._lag(plan, tau1, time_map, rounding)
         error = self._of_point(tau1, lag, rounding) if solution.problem.time == "s" else np.zeros_like(tau1)
         if (slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))) is not None:
             lag *= slowness
         # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
-        lag *= steepness.along_flow
-        lag += (rounding * steepness.by_rates) * np.abs(tau1) + at_once
+        lag *= sensitivity.along_flow
+        lag += (rounding * sensitivity.by_rates) * np.abs(tau1) + at_once
         np.maximum(error, lag, out=error)
         if solution.problem.axes is not None:  # back along the body axes, scalar products of n terms
             error += (solution.problem.n + _AXES_ROUNDING) * _EPSILON
         return error
 
-    def _lag(self, horizon: Horizon, tau1: Array, clock: Clock, rounding: float) -> Array:
+    def _lag(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap, rounding: float) -> Array:
         """Return the error of t over F_0, (N,): the rounding of dt/dτ₁ is one of the time elapsed, not of F_0|τ₁|."""
-        of_clock, drift = clock.error(tau1, self._of_start, rounding * self._frequencies)
-        result = np.abs(horizon.times / self.solution.mean_rate)
+        of_clock, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
+        result = np.abs(plan.times / self.solution.mean_rate)
         result *= rounding + drift
         result += of_clock
         return result
@@ -85,9 +85,9 @@ class ErrorBound:
 
         X_i is as accurate relative to √A_i as the normal is: on a flat side both q_i and √(q,Aq) are small.
         """
-        solution, steepness = self.solution, self.solution.steepness_of_point
-        at_once = self._of_one_evaluation(steepness, size=float(np.sqrt(np.max(solution.problem.A))))
-        moved = (rounding * steepness.by_rates) * np.abs(tau1)
+        solution, sensitivity = self.solution, self.solution.steepness_of_point
+        at_once = self._of_one_evaluation(sensitivity, size=float(np.sqrt(np.max(solution.problem.A))))
+        moved = (rounding * sensitivity.by_rates) * np.abs(tau1)
         return np.asarray(lag * solution.mean_rate + moved + at_once)
 
     @cached_property
@@ -105,19 +105,19 @@ class ErrorBound:
 
     @cached_property
     def _at_once(self) -> float:
-        return self._of_one_evaluation(self.solution.steepness)
+        return self._of_one_evaluation(self.solution.sensitivity)
 
-    def _of_one_evaluation(self, steepness: Steepness, size: float = 1.0) -> float:
+    def _of_one_evaluation(self, sensitivity: Sensitivity, size: float = 1.0) -> float:
         """Return the error of one evaluation at phases that are known to a few roundings, of numbers of that size.
 
         Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are, and
         so does the clock.
         """
         solution, evaluation = self.solution, size * _EVALUATION[self.method]
-        result = _PHASE[self.method] * _EPSILON * steepness.together
+        result = _PHASE[self.method] * _EPSILON * sensitivity.together
         if self.method == "angles":
             return result + evaluation * _EPSILON
-        result += float(solution.start_rounding @ steepness.by_phase) + size * solution.quotients.rounding
+        result += float(solution.start_rounding @ sensitivity.by_phase) + size * solution.quotients.rounding
         return result + evaluation * max(1.0, solution.largest_period) * _EPSILON
 
 

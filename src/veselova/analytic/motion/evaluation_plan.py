@@ -11,11 +11,11 @@ from veselova.analytic.dense_output.chebyshev_window import NODES
 from veselova.analytic.dense_output.interpolation import FEW_TIMES, Windows
 from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
 from veselova.analytic.time_map.cost_model import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
-from veselova.analytic.time_map.panels import PanelClock
-from veselova.analytic.time_map.rate import Clock, UniformClock
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.time_map.rate import TimeMap, UniformTimeMap
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Horizon"]
+__all__ = ["EvaluationPlan"]
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _MOST_CYCLES = 1e28
 
 
-class Horizon:
+class EvaluationPlan:
     """Times (N,), increasing, at which one solution is wanted; ``method``: the route to the attitude, None for the default.
 
     remainders: what exact times are beyond the doubles · cycles: the most that any phase makes between t = 0 and the times
@@ -54,13 +54,13 @@ class Horizon:
         """Return how often a Fourier clock is asked at least: at every time, or at the starts of windows."""
         return self.times.size if self.times.size < FEW_TIMES else self.windows("fourier").inversions
 
-    def windows(self, clock: str) -> Windows:
+    def windows(self, time_map: str) -> Windows:
         """Return the windows in which many times are interpolated where that is cheaper with the clock and the method has any."""
         none = self.times.size < FEW_TIMES or self.method in ("products", "nufft")
-        fewest = self.times.size + 1 if none else self.costs.fewest_in_window(NODES, clock)
+        fewest = self.times.size + 1 if none else self.costs.fewest_in_window(NODES, time_map)
         return Windows(self.times, self.solution.fastest, fewest, self.remainders)
 
-    def clock(self, name: str | None = None) -> Clock:
+    def time_map(self, name: str | None = None) -> TimeMap:
         """Return a clock for the times: ``fourier`` or ``panels``, by cost where no name is given.
 
         Panels take dt/dτ₁ along the orbit by the method that is given, or by the cheaper one. Raises Unsolved (``too-far``,
@@ -71,14 +71,14 @@ class Horizon:
             known = f"frequencies are known to {GUARD_DIGITS} digits"
             raise Unsolved("too-far", f"{self.cycles:.3g} cycles of the fastest phase; {known}")
         if solution.problem.time == "tau1":
-            return UniformClock(solution.guarded[1] if self.is_guarded else solution.in_time, solution.mean_rate)
+            return UniformTimeMap(solution.precise_flows[1] if self.is_guarded else solution.in_time, solution.mean_rate)
         if name is None and solution.moving.rate_variation > WIDEST_RATE:
             name = "fourier" if self.cycles > PANEL_CYCLES else "panels"
         if (name or self.costs.cheaper_clock(self.inversions, not solution.near_separatrix)) == "fourier":
-            return solution.fourier_clock(self.is_guarded)
+            return solution.fourier_time_map(self.is_guarded)
         if self.cycles > PANEL_CYCLES:
             reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
             raise Unsolved("too-far", f"{self.cycles:.3g} cycles of the fastest phase at n = {solution.problem.n}; {reached}")
-        in_tau1 = solution.guarded[0] if self.is_guarded else solution.in_tau1
+        in_tau1 = solution.precise_flows[0] if self.is_guarded else solution.in_tau1
         rate = partial(solution.rate_at, in_angles=self._in_angles)
-        return PanelClock(rate, solution.mean_rate, in_tau1, *self.windows("panels").span)
+        return ChebyshevTimeMap(rate, solution.mean_rate, in_tau1, *self.windows("panels").span)

@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.output_array import Along
+from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.error_bound import ErrorBound
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["METHODS", "Route"]
+__all__ = ["METHODS", "Evaluator"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ METHODS = ("theta", "products", "nufft", "angles")
 
 
 @dataclass(frozen=True)
-class Route:
+class Evaluator:
     """A solution, and the method of its attitudes; None for its default one."""
 
     solution: Solution
@@ -35,21 +35,21 @@ class Route:
         """Return the method."""
         return self.given or self.solution.default_method()
 
-    def to(self, times: TimeGrid) -> Horizon:
+    def to(self, times: TimeGrid) -> EvaluationPlan:
         """Return what the times ask for."""
-        return Horizon(self.solution, times.doubles, self.given, times.remainders)
+        return EvaluationPlan(self.solution, times.doubles, self.given, times.remainders)
 
-    def along(self, horizon: Horizon, clock: Clock) -> tuple[Along, Array]:
+    def evaluate(self, plan: EvaluationPlan, time_map: TimeMap) -> tuple[Samples, Array]:
         """Return the motion, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
 
         Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
         does not.
         """
-        windows = horizon.windows(clock.name)
-        with_coordinates = self.method == "angles" and windows.inversions == horizon.times.size
+        windows = plan.windows(time_map.name)
+        with_coordinates = self.method == "angles" and windows.inversions == plan.times.size
         evaluation = self._with_coordinates if with_coordinates else self._states
-        along = windows.along(clock, self.solution.in_tau1.rates, evaluation)
-        error = self._bound.at(horizon, along.tau1, clock)
+        along = windows.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
+        error = self._bound.at(plan, along.tau1, time_map)
         error += along.error
         if self.method == "nufft":
             error += along.series[2]

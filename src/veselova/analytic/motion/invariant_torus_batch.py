@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.arithmetic.double_double import Twofold, stacked
+from veselova.analytic.arithmetic.double_double import DoubleDouble, stack_double_doubles
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.invariant_torus import actions
 from veselova.analytic.spectrum.branch_points_batch import Spectra
-from veselova.analytic.time_map.rate import ClockRate, rate_factor
+from veselova.analytic.time_map.rate import TimeRate, rate_factor
 
 __all__ = ["Tori", "tori"]
 
@@ -122,7 +122,7 @@ def _stacks(spectra: Spectra) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]
 
 def _branch_points(
     spectra: Spectra, members: NDArray[np.intp], lower: NDArray[np.bool_]
-) -> tuple[Twofold, tuple[BranchPoint, ...]]:
+) -> tuple[DoubleDouble, tuple[BranchPoint, ...]]:
     """Return b_0 < … < b_{2g} and where they come from, where c_s < I_s for the s = 2…g that ``lower`` marks."""
     order = [BranchPoint("c", 0), BranchPoint("I", 0)]
     for s, constant_first in enumerate(lower, start=1):
@@ -130,21 +130,21 @@ def _branch_points(
         order += pair if constant_first else pair[::-1]
     order.append(BranchPoint("I", lower.size + 1))
     values = {"c": spectra.constants[members], "I": spectra.inverse[members]}
-    return stacked([values[origin.kind][:, origin.index] for origin in order]), tuple(order)
+    return stack_double_doubles([values[origin.kind][:, origin.index] for origin in order]), tuple(order)
 
 
 def _node_counts(periods: Periods) -> NDArray[np.int_]:
     """Return how many nodes each of many curves needs on its intervals, 0 where that is too many."""
-    needed = np.max([periods.needed_nodes(cut)[:, 0] for cut in periods.cuts], axis=0)
+    needed = np.max([periods.count_nodes(cut)[:, 0] for cut in periods.cuts], axis=0)
     place = np.searchsorted(_NODES, needed)
     return np.asarray(np.append(_NODES, 0)[place])
 
 
-def _numbers(spectra: Spectra, members: NDArray[np.intp], points: Twofold, periods: Periods) -> dict[str, Any]:
+def _numbers(spectra: Spectra, members: NDArray[np.intp], points: DoubleDouble, periods: Periods) -> dict[str, Any]:
     """Return the fields of ``Tori`` for the members of one stack."""
     unit, spheroconic = spectra.unit[members, None], spectra.spheroconic[members]
     root = np.sqrt(unit)
-    rate = _clock_rate(spectra.clock_rate[members], spheroconic, periods)
+    rate = _clock_rate(spectra.time_rate[members], spheroconic, periods)
     mean = np.asarray(rate.mean)[:, None]
     frequencies = periods.frequencies
     start = _phases(_angles(spheroconic, points, spectra.increasing[members], periods), periods)
@@ -167,15 +167,15 @@ def _numbers(spectra: Spectra, members: NDArray[np.intp], points: Twofold, perio
     }
 
 
-def _clock_rate(at_start: Array, spheroconic: Twofold, periods: Periods) -> ClockRate:
+def _clock_rate(at_start: Array, spheroconic: DoubleDouble, periods: Periods) -> TimeRate:
     """Return dt/dτ₁ on each torus, from its value at the start."""
     product = at_start[:, None]
     for s in range(periods.genus):
         product = product * rate_factor(periods.curve, s, spheroconic.high[:, s, None], "t", DOUBLE)
-    return ClockRate(AbelJacobi(periods), 1 / product[:, 0], "t")
+    return TimeRate(AbelJacobi(periods), 1 / product[:, 0], "t")
 
 
-def _angles(spheroconic: Twofold, points: Twofold, increasing: NDArray[np.bool_], periods: Periods) -> Array:
+def _angles(spheroconic: DoubleDouble, points: DoubleDouble, increasing: NDArray[np.bool_], periods: Periods) -> Array:
     """Return the angles ψ_s of the starts, shape (N, g)."""
     angles = []
     for s, cut in enumerate(periods.cuts):
@@ -188,6 +188,6 @@ def _angles(spheroconic: Twofold, points: Twofold, increasing: NDArray[np.bool_]
 def _phases(angles: Array, periods: Periods) -> Array:
     """Return z of one point on each torus, by the series of ``AbelJacobi.map``."""
     orders = np.arange(1, periods.longest)
-    waves = np.sin(angles[:, :, None] * orders) / orders
-    terms = periods.angle_series[..., 1:] * waves[:, None]
+    exponentials = np.sin(angles[:, :, None] * orders) / orders
+    terms = periods.angle_series[..., 1:] * exponentials[:, None]
     return np.asarray(angles / (2 * np.pi) + np.sum(terms.reshape(*angles.shape, -1), axis=-1))

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.motion.evaluation_plan import Horizon
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.rest_balls import resting_series
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.motion.torus_solution_balls import EnclosedSolution
+from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later, Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.times import TimeGrid
@@ -29,7 +29,7 @@ from veselova.mechanics.results.trajectory import Provenance, Trajectory
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.version import __version__
 
-__all__ = ["EnclosedMotion"]
+__all__ = ["MotionInBalls"]
 
 #: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
 _SPARE = 8
@@ -49,7 +49,7 @@ _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 
 
 @dataclass(frozen=True)
-class EnclosedMotion:
+class MotionInBalls:
     """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
 
     problem: TorusProblem
@@ -69,16 +69,16 @@ class EnclosedMotion:
         if not (any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)):
             return self._resting(asked, began)
         solution = Solution(self.problem)
-        horizon = Horizon(solution, grid)
-        clock = horizon.clock()
-        reach = float(np.max(np.abs(clock.tau1(grid[[0, -1]])[0])))
+        plan = EvaluationPlan(solution, grid)
+        time_map = plan.time_map()
+        reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
         method = self.method or self._cheaper(solution)
-        working = self.digits + _SPARE + math.ceil(math.log10(1 + horizon.cycles))
+        working = self.digits + _SPARE + math.ceil(math.log10(1 + plan.cycles))
         if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
             working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
-                found, details = self._attempt(solution, method, working, exact, clock, reach)
+                found, details = self._attempt(solution, method, working, exact, time_map, reach)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
                 continue
@@ -107,17 +107,17 @@ class EnclosedMotion:
         if asked.places is not None:
             found = found.at(asked.places)
         decimals = found.decimals(self.digits, self.certified)
-        arrays = {name: found.rounded(name) for name in self.problem.stored}
+        arrays = {name: found.round_to_doubles(name) for name in self.problem.stored}
         error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
         provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
         return Trajectory(self.problem, asked.asked, error, arrays, provenance, self, decimals, asked.asked_remainders)
 
     def _attempt(
-        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], clock: Clock, reach: float
+        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], time_map: TimeMap, reach: float
     ) -> tuple[_Found, Any]:
-        solution = EnclosedSolution(coarse, working, self.certified, method, reach)
+        solution = SolutionInBalls(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
-            series, details = solution.series(xp.array(exact), clock)
+            series, details = solution.series(xp.array(exact), time_map)
             return _Found.of(self.problem, series, xp), details
 
 
@@ -151,7 +151,7 @@ class _Found:
             (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
         return digits + int(largest.adjusted()) + 1
 
-    def rounded(self, name: str) -> NDArray[np.float64]:
+    def round_to_doubles(self, name: str) -> NDArray[np.float64]:
         """Return the doubles nearest to the midpoints of a series."""
         return self.series[name].astype(np.float64)
 

@@ -10,7 +10,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.body_frame_balls import BodyFrame
 from veselova.analytic.attitude.frame_balls import frame_around
-from veselova.analytic.motion.series_balls import States, along_all, series_of
+from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
 from veselova.analytic.spectrum.branch_points_balls import resting_spheroconic
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.errors import Unsolved
@@ -36,6 +36,6 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
     else:
         raise Unsolved("at-rest", "q_dot = 0: a resting body's natural frame is known in double precision only; give a frame")
     points = resting_spheroconic(moving, xp) / xp.number(moving.unit) if moving.size > 1 else xp.array(np.zeros(0))
-    frames, coordinates = (np.stack([x] * count) for x in (frame, along_all(points[None], moving.frozen, xp)[0]))
+    frames, coordinates = (np.stack([x] * count) for x in (frame, to_all_directions(points[None], moving.frozen, xp)[0]))
     zeros = xp.array(np.zeros((count, problem.n)))
     return series_of(problem, States(zeros[:, 0], zeros, frames, coordinates), xp)

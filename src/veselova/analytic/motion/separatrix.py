@@ -60,8 +60,8 @@ class DepartureBound:
             differences = np.max([np.max(np.abs(other - first), axis=(1, 2)) for other in others], axis=0)
             differences = differences if side > 0 else differences[::-1]
             largest = np.maximum.accumulate(np.maximum(bounds[-1], _BETWEEN * np.nan_to_num(differences, nan=np.inf)))
-            kept = int(np.searchsorted(largest, self.lost, side="right")) + 1
-            instants, bounds = np.append(instants, further[:kept]), np.append(bounds, largest[:kept])
+            selected = int(np.searchsorted(largest, self.lost, side="right")) + 1
+            instants, bounds = np.append(instants, further[:selected]), np.append(bounds, largest[:selected])
         self._known[side] = instants, bounds
         return instants, bounds
 

@@ -12,7 +12,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["States", "along_all", "series_of"]
+__all__ = ["States", "series_of", "to_all_directions"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class States:
     spheroconic: Values
 
 
-def along_all(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
+def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
     """Return the λ's of all directions, (N, n−1), increasing, from those of the directions that move, (N, m−1)."""
     resting = np.tile(arithmetic.array([1 / a for a in frozen]), (len(points), 1))
     coordinates = np.concatenate([points, resting], axis=1)
@@ -39,7 +39,7 @@ def along_all(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> 
 def series_of(problem: TorusProblem, states: States, arithmetic: Any) -> Mapping[str, Values]:
     """Return the series of a problem by name, in the order of its outputs."""
     engine = {name: getattr(states, name) for name in ("tau1", "frame", "spheroconic")}
-    stored = dict(problem.completed({"q_dot": states.velocity, **engine}))
+    stored = dict(problem.complete({"q_dot": states.velocity, **engine}))
     derived = {name: problem.derive(name, stored) for name in problem.derived if name != "X"}
     if "X" in problem.derived:
         derived["X"] = _position(problem.exact.A, states.frame[:, :, 0], arithmetic)

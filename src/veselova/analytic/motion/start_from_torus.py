@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, extended
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, extended_arithmetic
 from veselova.analytic.attitude.frame import Frame
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, to_float
 
 __all__ = ["start_on_torus"]
@@ -37,17 +37,17 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
     n = len(diagonal)
     for i, a in enumerate(diagonal):
         if a <= 0:
-            raise InvalidInput(("A", i), "a number greater than 0", shown(A[i]))
+            raise InvalidInput(("A", i), "a number greater than 0", show(A[i]))
     order = sorted(range(n), key=lambda i: -diagonal[i])
     for before, after in itertools.pairwise(order):
         if diagonal[before] == diagonal[after]:
-            raise InvalidInput(("A", after), "distinct entries (phases do not determine a start otherwise)", shown(A[after]))
+            raise InvalidInput(("A", after), "distinct entries (phases do not determine a start otherwise)", show(A[after]))
     h = exact_number(energy, ("energy",))
     if h <= 0:
-        raise InvalidInput(("energy",), "a number greater than 0", shown(energy))
+        raise InvalidInput(("energy",), "a number greater than 0", show(energy))
     unit = diagonal[order[-1]]
     inverse = [unit / diagonal[i] for i in order]
-    curve = _curve(inverse, _scaled_constants(constants, inverse, unit))
+    curve = _curve(inverse, _scale_constants(constants, inverse, unit))
     z = np.mod(to_float(exact_vector(phases, ("phases",), n - 1)), 1.0)
     wanted = _signs(signs, n)[order]
     psi = AbelJacobi(Periods(curve)).invert(z[None, :])
@@ -68,7 +68,7 @@ def _log(x: Fraction) -> float:
     return math.log(x.numerator) - math.log(x.denominator)
 
 
-def _scaled_constants(constants: Any, inverse: Sequence[Fraction], unit: Fraction) -> list[Fraction]:
+def _scale_constants(constants: Any, inverse: Sequence[Fraction], unit: Fraction) -> list[Fraction]:
     """Return c_2 … c_{n−1} in units of the largest I; raises InvalidInput unless max(c_s, I_s) < min(c_{s+1}, I_{s+1})."""
     n = len(inverse)
     scaled = [c * unit for c in exact_vector(constants, ("constants",), n - 2)]
@@ -90,12 +90,12 @@ def _signs(signs: Any, n: int) -> Array:
     given = exact_vector(signs, ("signs",), n)
     for i, sign in enumerate(given):
         if sign not in (1, -1):
-            raise InvalidInput(("signs", i), "1 or -1", shown(signs[i]))
+            raise InvalidInput(("signs", i), "1 or -1", show(signs[i]))
     return to_float(given)
 
 
 def _curve(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Curve:
-    xp = extended(_DIGITS)
+    xp = extended_arithmetic(_DIGITS)
     none = xp.array([])
     points = Spectrum(xp, xp.array(list(inverse)), none, none, xp.array([0, *constants]), none, None)
     return Curve.of(points, DOUBLE)

@@ -14,8 +14,8 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.time_map.analyticity_strip import Orbit
-from veselova.analytic.time_map.fourier_balls import MOST_MODES, EnclosedFourier
-from veselova.analytic.time_map.panels_balls import EnclosedClock, expected_nodes
+from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapInBalls
+from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["TimeMap", "UniformTimeMap", "choose_time_map"]
@@ -37,7 +37,7 @@ class UniformTimeMap:
     name = "uniform"
 
     def __init__(self, orbit: Orbit) -> None:
-        self._rate = orbit.rate.inversion.arithmetic.number(orbit.spectrum.clock_rate)
+        self._rate = orbit.rate.inversion.arithmetic.number(orbit.spectrum.time_rate)
 
     @property
     def size(self) -> int:
@@ -49,7 +49,7 @@ class UniformTimeMap:
         return np.asarray(times * self._rate)
 
 
-TimeMap: TypeAlias = EnclosedClock | EnclosedFourier | UniformTimeMap
+TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
 def choose_time_map(orbit: Orbit, approximate: NDArray[np.float64], coarse: Solution, moving: Moving) -> TimeMap:
@@ -67,13 +67,15 @@ def choose_time_map(orbit: Orbit, approximate: NDArray[np.float64], coarse: Solu
     # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.
     forming = modes * _MODE[kind] * max(1.0, max(coarse.rate.needed_nodes) / _NODES) ** 2
     by_modes = forming + times * (modes * _MODE_AT_TIME[kind] + _TIME)
-    by_panels = expected_nodes(orbit, approximate) * _NODE[kind]
-    maps: list[Callable[[], EnclosedClock | EnclosedFourier]] = [partial(EnclosedClock, orbit, approximate, xp.certified)]
+    by_panels = estimate_nodes(orbit, approximate) * _NODE[kind]
+    maps: list[Callable[[], ChebyshevTimeMapInBalls | FourierTimeMapInBalls]] = [
+        partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified)
+    ]
     # Of a direction that doubles do not see they say nothing.
     known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
     growth = (xp.digits / _DIGITS) ** _GROWTH[kind]
     if known and modes <= MOST_MODES and forming * growth <= _LONGEST and not xp.certified:
-        maps.insert(int(by_panels < by_modes), partial(EnclosedFourier, orbit))
+        maps.insert(int(by_panels < by_modes), partial(FourierTimeMapInBalls, orbit))
     for time_map in maps[:-1]:
         with suppress(Unsolved):
             return time_map()

@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences, Frame
-from veselova.analytic.attitude.sensitivity import Steepness
-from veselova.analytic.attitude.sensitivity_sampling import BETWEEN, FEW, Survey, drawn_phases
+from veselova.analytic.attitude.sensitivity import Sensitivity
+from veselova.analytic.attitude.sensitivity_sampling import BETWEEN, FEW, SensitivitySampling, sample_phases
 from veselova.analytic.curve.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
-from veselova.analytic.curve.periods import resolved_periods
+from veselova.analytic.curve.periods import resolve_periods
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.theta.nufft import Transforms
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
-from veselova.analytic.time_map.cost_model import expected_modes
-from veselova.analytic.time_map.fourier import FourierClock
+from veselova.analytic.time_map.cost_model import estimate_modes
+from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import STRETCH_POWERS, ClockRate, clock_rate
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate, time_rate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -68,7 +68,7 @@ class Solution:
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
         if not problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found, self.periods = resolved_periods(moving_part(problem), distance)
+        found, self.periods = resolve_periods(moving_part(problem), distance)
         self.curve: Curve = self.periods.curve
         self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
         self.inversion = AbelJacobi(self.periods)
@@ -83,18 +83,18 @@ class Solution:
         """Return ``separatrix``, ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
         if self.separatrices:
             return "separatrix"
-        return "closed-cut" if self.moving.turned or self.moving.frozen else "generic"
+        return "closed-cut" if self.moving.rotated or self.moving.frozen else "generic"
 
     @cached_property
-    def rate(self) -> ClockRate:
+    def rate(self) -> TimeRate:
         """Return dt/dτ₁ on the torus, in double precision."""
-        return ClockRate.of(self.spectrum, self.inversion, self.problem.time)
+        return TimeRate.of(self.spectrum, self.inversion, self.problem.time)
 
     def rate_at(self, z: Array, in_angles: bool) -> Array:
         """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions."""
         if in_angles:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return np.asarray(self.rate_constant * self.quotients.stretch(z) ** STRETCH_POWERS[self.problem.time])
+        return np.asarray(self.rate_constant * self.quotients.time_rate(z) ** TIME_RATE_POWERS[self.problem.time])
 
     def takes_rate_from_angles(self, method: str | None = None, cycles: float = np.inf) -> bool:
         """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix, always on uneven tori and where
@@ -111,11 +111,11 @@ class Solution:
     @cached_property
     def rate_constant(self) -> float:
         """Return dt/dτ₁ over that power of the stretch; its largest value, at a half period, is the scale of the rate."""
-        return float(self.rate.scale) * self.quotients.peak_inverted(STRETCH_POWERS[self.problem.time])
+        return float(self.rate.scale) * self.quotients.peak_inverted(TIME_RATE_POWERS[self.problem.time])
 
     @cached_property
     def _rate_of_position(self) -> Callable[[Array], Array]:
-        return clock_rate(self.spectrum, self.problem.time, DOUBLE)
+        return time_rate(self.spectrum, self.problem.time, DOUBLE)
 
     @cached_property
     def near_separatrix(self) -> bool:
@@ -145,32 +145,32 @@ class Solution:
         return LinearFlow.of(self._origin, self.periods.frequencies / self.rate.mean)
 
     @cached_property
-    def guarded(self) -> tuple[LinearFlow, LinearFlow, float]:
+    def precise_flows(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
-        from veselova.analytic.time_map.guard_digits import guarded_flows  # loads python-flint
+        from veselova.analytic.time_map.guard_digits import extended_precision_flows  # loads python-flint
 
-        return guarded_flows(self.spectrum, self._origin, self.problem.time)
+        return extended_precision_flows(self.spectrum, self._origin, self.problem.time)
 
-    def fourier_clock(self, guarded: bool) -> FourierClock:
+    def fourier_time_map(self, precise_flows: bool) -> FourierTimeMap:
         """Return the Fourier clock, with guard digits or without; raises Unsolved (``beyond-floats``)."""
         if (variation := self.moving.rate_variation) > WIDEST_RATE:
             raise Unsolved(
                 "beyond-floats", f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 of its mean"
             )
-        if guarded not in self._fourier_clocks:
-            flows = self.guarded if guarded else (self.in_tau1, self.in_time, self.mean_rate)
-            self._fourier_clocks[guarded] = FourierClock(self.rate, *flows)
-        return self._fourier_clocks[guarded]
+        if precise_flows not in self._fourier_clocks:
+            flows = self.precise_flows if precise_flows else (self.in_tau1, self.in_time, self.mean_rate)
+            self._fourier_clocks[precise_flows] = FourierTimeMap(self.rate, *flows)
+        return self._fourier_clocks[precise_flows]
 
     @cached_property
-    def _fourier_clocks(self) -> dict[bool, FourierClock]:
+    def _fourier_clocks(self) -> dict[bool, FourierTimeMap]:
         return {}
 
     @cached_property
     def modes(self) -> float:
         """Return about how many modes a Fourier clock has."""
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
-        return expected_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
+        return estimate_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 
     @cached_property
     def fastest(self) -> float:
@@ -178,10 +178,10 @@ class Solution:
         return float(np.max(np.abs(self.in_time.rates)))
 
     @cached_property
-    def _survey(self) -> Survey:
+    def _sampling(self) -> SensitivitySampling:
         half_periods, steep = self.default_method() == "theta", not self.near_separatrix
         point = self.point if self.problem.time == "s" else None
-        return Survey(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep, point)
+        return SensitivitySampling(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep, point)
 
     def point(self, q: Array) -> Array:
         """Return the points Aq/√(q,Aq) of the ellipsoid with unit normals q (N, m), along the moving directions."""
@@ -189,28 +189,28 @@ class Solution:
         return np.asarray(A * q / np.sqrt((q * q) @ A)[:, None])
 
     @cached_property
-    def steepness(self) -> Steepness:
+    def sensitivity(self) -> Sensitivity:
         """Return how fast the frame turns with the phases, and more for what lies between the sampled points."""
-        if self._survey.steepness is not None:
-            return self._survey.steepness
+        if self._sampling.sensitivity is not None:
+            return self._sampling.sensitivity
         return self.steepness_at(self._drawn)
 
     @cached_property
-    def steepness_of_point(self) -> Steepness:
+    def steepness_of_point(self) -> Sensitivity:
         """Return how fast the point of a geodesic moves with the phases, in the same way."""
-        if self._survey.steepness_of_point is not None:
-            return self._survey.steepness_of_point
+        if self._sampling.steepness_of_point is not None:
+            return self._sampling.steepness_of_point
         return self._steepness_between(self._drawn)[1]
 
     @property
     def _drawn(self) -> Array:
-        return np.concatenate([drawn_phases(self.curve.genus), self._origin[None, :]])
+        return np.concatenate([sample_phases(self.curve.genus), self._origin[None, :]])
 
-    def steepness_at(self, z: Array) -> Steepness:
+    def steepness_at(self, z: Array) -> Sensitivity:
         """Return how fast the frame turns at phases z (N, g), and more; doubled near a separatrix, where it varies most."""
         return self._steepness_between(z)[0]
 
-    def _steepness_between(self, z: Array) -> tuple[Steepness, Steepness]:
+    def _steepness_between(self, z: Array) -> tuple[Sensitivity, Sensitivity]:
         """Return how fast the frame turns, and the point of a geodesic moves, at phases z (N, g)."""
         near, rates = self.near_separatrix, self.in_tau1.rates
         points = z if near else self.inversion.invert(z)
@@ -219,13 +219,13 @@ class Solution:
         attitude: Callable[[Array], Attitude] = self.quotients.at if near else self.frame.at
         at, between = attitude(ends.ends), 2.0 if near else BETWEEN
         of_frame, of_point = ends.slopes(at), ends.quotients(self.point(at.q))
-        return Steepness.of(between * of_frame, rates), Steepness.of(between * of_point, rates)
+        return Sensitivity.of(between * of_frame, rates), Sensitivity.of(between * of_point, rates)
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
         T = np.asarray(self.periods.riemann_matrix, dtype=np.float64)
-        return replace(ThetaQuotients.of(T, self.frame), at_half_periods=self._survey.at_half_periods)
+        return replace(ThetaQuotients.of(T, self.frame), at_half_periods=self._sampling.at_half_periods)
 
     @cached_property
     def transforms(self) -> Transforms:
@@ -260,7 +260,7 @@ class Solution:
 
         For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of that.
         """
-        normals = self._survey.start.normals[0]
+        normals = self._sampling.start.normals[0]
         along = normals.T @ self.moving.directions.T
         if self.problem.exact.natural and along.shape[0] == self.problem.n - 1:
             # The last bits of the frame are asked for only where those of a double leave a doubt.
@@ -281,9 +281,9 @@ class Solution:
         """Return dτ₁/dt, q̇ and the frame along the problem's principal axes."""
         rate, moving, n = self._rate_of_position(attitude.q), self.moving, self.problem.n
         (count, along, genus), frame = attitude.normals.shape, np.empty((attitude.q.shape[0], n, n))
-        turned = attitude.normals.reshape(-1, genus) @ self.rotation  # one product, not one for every time
+        rotated = attitude.normals.reshape(-1, genus) @ self.rotation  # one product, not one for every time
         frame[:, :, 0] = attitude.q @ moving.directions.T
-        frame[:, :, 1:] = moving.directions @ turned.reshape(count, along, -1)
+        frame[:, :, 1:] = moving.directions @ rotated.reshape(count, along, -1)
         if moving.frozen:
             frame[:, :, 1:] += self.frozen_part
         return rate, (attitude.q_prime @ moving.directions.T) * rate[:, None], frame

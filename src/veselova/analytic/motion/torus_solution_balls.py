@@ -21,21 +21,21 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.dense_output.interpolation_balls import EnclosedWindows
-from veselova.analytic.motion.drift_bound import Drift, expected_growth
-from veselova.analytic.motion.series_balls import States, along_all, series_of
+from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
+from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
+from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
 from veselova.analytic.motion.time_map_balls import choose_time_map
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.spectrum.branch_points import Spectrum, resolved
-from veselova.analytic.spectrum.branch_points_balls import enclosed, spheroconic
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.theta.riemann_theta_balls import EnclosedTheta
+from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.analyticity_strip import Orbit
-from veselova.analytic.time_map.rate import Clock, ClockRate, clock_rate
+from veselova.analytic.time_map.rate import TimeMap, TimeRate, time_rate
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["EnclosedSolution"]
+__all__ = ["SolutionInBalls"]
 
 #: Relative gap below which no inversion in doubles begins one in balls.
 _NARROWEST = 1e-20
@@ -54,7 +54,7 @@ _MOST_GROWTH = 1000
 _MOVED = f"the start had to be moved, and the bound of its drift grows beyond 1e{_MOST_GROWTH} times the distance until then"
 
 
-class EnclosedSolution:
+class SolutionInBalls:
     """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
 
     ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only angles can be); else estimated.
@@ -71,19 +71,19 @@ class EnclosedSolution:
             reason = "on and near a separatrix phases say little of the body, and theta functions are not bounded"
             raise Unsolved("not-enclosed", reason)
         beyond = _digits_of_least(given, digits)
-        found = resolved(given, digits, Fraction(1, 10 ** (2 * digits + 10)), beyond)
+        found = resolve_spectrum(given, digits, Fraction(1, 10 ** (2 * digits + 10)), beyond)
         if certified and (found.separatrices or found.moving.size < given.size):
             raise Unsolved("not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others")
         self._is_bounded = found.moving != given and (certified or bool(found.separatrices))
         if self._is_bounded:
-            growth = expected_growth(found.spectrum, reach)
+            growth = estimate_growth(found.spectrum, reach)
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed" if certified else "too-far", _MOVED)
             beyond = max(growth, beyond)
-            found = resolved(given, digits, Fraction(1, 10 ** (2 * digits + 10 + beyond)), beyond)
+            found = resolve_spectrum(given, digits, Fraction(1, 10 ** (2 * digits + 10 + beyond)), beyond)
         self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
         self.arithmetic: Any = balls(digits, certified)
-        self.spectrum = enclosed(found)
+        self.spectrum = enclose_spectrum(found)
         fine: Any = self.spectrum.arithmetic
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
@@ -91,46 +91,48 @@ class EnclosedSolution:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
             begin = start(found.spectrum, curve, self.spectrum)
             self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
-            rate = ClockRate.of(self.spectrum, inversion, problem.time)
+            rate = TimeRate.of(self.spectrum, inversion, problem.time)
             origin, frequencies = inversion.map(self._angles)[0], inversion.periods.frequencies
             self._quotients: ThetaQuotients | None = None
             if method == "theta":
-                theta = EnclosedTheta(inversion.periods.riemann_matrix, self.arithmetic)
+                theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
                 self._quotients = ThetaQuotients(theta, self.frame)
-            stretch = None if self._quotients is None else self._quotients.stretch
+            time_rate = None if self._quotients is None else self._quotients.time_rate
             # Doubles do not see every direction that moves.
             in_angles = coarse.takes_rate_from_angles(coarse.default_method())
             coarse_rate = partial(coarse.rate_at, in_angles=in_angles) if coarse.moving.size == self.moving.size else None
-            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, stretch, coarse_rate)
+            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rate)
 
-    def series(self, times: Values, coarse: Clock) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
+    def series(self, times: Values, coarse: TimeMap) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took.
 
         times (N,) exact, increasing · coarse: the clock in double precision, in units where the largest I is 1.
         """
         xp, problem = self.arithmetic, self.problem
         tau1, attitude, details = self._motion(times, coarse)
-        velocity = attitude.q_prime * clock_rate(self.spectrum, problem.time, xp)(attitude.q)[:, None]
+        velocity = attitude.q_prime * time_rate(self.spectrum, problem.time, xp)(attitude.q)[:, None]
         points = attitude.spheroconic
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
         unit = xp.number(self.moving.unit)
-        points = along_all(points / unit, self.moving.frozen, xp)
-        states = States(tau1 * xp.sqrt(unit), self._body.along_axes(velocity), self._body.frames(attitude), points)
-        return series_of(problem, states if self._drift is None else self._drifted(states, self._drift, tau1), xp), details
+        points = to_all_directions(points / unit, self.moving.frozen, xp)
+        states = States(tau1 * xp.sqrt(unit), self._body.to_axes(velocity), self._body.frames(attitude), points)
+        return series_of(
+            problem, states if self._drift is None else self._add_perturbation(states, self._drift, tau1), xp
+        ), details
 
-    def _drifted(self, states: States, drift: Drift, tau1: Values) -> States:
+    def _add_perturbation(self, states: States, drift: PerturbationBound, tau1: Values) -> States:
         """Return the states of the moved start, widened to hold those of the given one."""
         xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
-        late, velocity, turned, points = drift.bounds(tau1, xp)
+        late, velocity, rotated, points = drift.bounds(tau1, xp)
         return States(
-            xp.widened(states.tau1, late * xp.sqrt(unit)),
-            xp.widened(states.velocity, velocity[:, None]),
-            xp.widened(states.frame, turned[:, None, None]),
-            xp.widened(states.spheroconic, points[:, None] / unit),
+            xp.add_error(states.tau1, late * xp.sqrt(unit)),
+            xp.add_error(states.velocity, velocity[:, None]),
+            xp.add_error(states.frame, rotated[:, None, None]),
+            xp.add_error(states.spheroconic, points[:, None] / unit),
         )
 
-    def _motion(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
+    def _motion(self, times: Values, coarse: TimeMap) -> tuple[Values, Attitude, Mapping[str, Any]]:
         """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs less."""
 
         def sampled(t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -140,9 +142,9 @@ class EnclosedSolution:
         windows, size = None, self.moving.size
         if not (self.arithmetic.certified or self._coarse.near_separatrix):
             cycles = self._coarse.fastest * abs(float(times[-1] - times[0]))
-            windows = EnclosedWindows.worth_while(times, cycles, sampled, self.arithmetic)
+            windows = WindowsInBalls.worth_while(times, cycles, sampled, self.arithmetic)
         while windows is not None:
-            tau1, attitude, details = self._evaluated(windows.times, coarse)
+            tau1, attitude, details = self._evaluate(windows.times, coarse)
             normals = attitude.normals if size != 3 else attitude.normals[:, :, :1]  # γ = ±q×n_2
             table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
             found = windows.at(times, np.column_stack(table))
@@ -154,18 +156,18 @@ class EnclosedSolution:
                     rest = np.stack([rest, across(q, rest) * side], axis=2)
                 return found[:, 0], Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]), details
             windows = windows.finer()
-        return self._evaluated(times, coarse)
+        return self._evaluate(times, coarse)
 
-    def _evaluated(self, times: Values, coarse: Clock) -> tuple[Values, Attitude, Mapping[str, Any]]:
+    def _evaluate(self, times: Values, coarse: TimeMap) -> tuple[Values, Attitude, Mapping[str, Any]]:
         approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(self._coarse.moving.unit / self.moving.unit)
         # Zero is exactly that, and a time below the range of doubles, or below the rounding of a clock in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
-        clock = choose_time_map(self.orbit, approximate, self._coarse, self.moving)
-        tau1 = clock.tau1(times, approximate)
+        time_map = choose_time_map(self.orbit, approximate, self._coarse, self.moving)
+        tau1 = time_map.tau1(times, approximate)
         z = self.orbit.phases(tau1)
         attitude = self._quotients.at(z) if self._quotients is not None else self.frame.at(self.orbit.rate.inversion.invert(z))
-        return tau1, attitude, {"clock": clock.name, "clock_size": clock.size, "evaluations": len(times)}
+        return tau1, attitude, {"time_map": time_map.name, "time_map_size": time_map.size, "evaluations": len(times)}
 
     @cached_property
     def _body(self) -> BodyFrame:
@@ -173,15 +175,15 @@ class EnclosedSolution:
         return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
 
     @cached_property
-    def _drift(self) -> Drift | None:
+    def _drift(self) -> PerturbationBound | None:
         """Return how far the start that was moved may get from the given one, where that has to be bounded."""
         xp, given = self.arithmetic, self._given
         if not self._is_bounded:
             return None
-        drift = Drift.of(given, self.moving, xp)
+        drift = PerturbationBound.of(given, self.moving, xp)
         q = xp.array(self.problem.exact.q)
         turn = self._body.turn(drift.matrix, self.spectrum.constants, q / xp.sqrt(np.sum(q * q)))
-        return replace(drift, frames=xp.at_most(turn).item())
+        return replace(drift, frames=xp.upper_bound(turn).item())
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:

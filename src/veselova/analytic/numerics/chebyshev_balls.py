@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, Fixed
+from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, FixedPoint
 
-__all__ = ["EnclosedSeries"]
+__all__ = ["ChebyshevSeriesInBalls"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _OF_SQUARE = 6
 _ROUNDING = 1e-15
 
 
-class EnclosedSeries:
+class ChebyshevSeriesInBalls:
     """C series Σ_m c_cm T_m(x), |x| ≤ 1, on each of W intervals, for coefficients (W, C, M), balls."""
 
     def __init__(self, coefficients: Values, arithmetic: Any) -> None:
@@ -84,23 +84,23 @@ class _InFixedPoint:
         #: Powers of two above the sums.
         self._scales = np.exp2(np.ceil(np.log2(np.where(sizes > 0, sizes, 1.0))) + 1)
         middle = arithmetic.midpoints(coefficients)
-        self._weights = Fixed.of_numbers(middle / np.tile(self._scales, 2), self._bits)
+        self._weights = FixedPoint.of_numbers(middle / np.tile(self._scales, 2), self._bits)
         # What an error of x and of every operation does, and what the coefficients leave open.
-        growth = Fixed.growth(len(coefficients), _OF_SQUARE)[:, None, None] + 2
-        steepness = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
+        growth = FixedPoint.growth(len(coefficients), _OF_SQUARE)[:, None, None] + 2
+        sensitivity = np.sum(growth * np.abs(coefficients.astype(float)), axis=0)
         both = (*sizes.shape[:1], 2, *sizes.shape[1:])
-        self._steepness = (steepness.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * UPWARDS
-        self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0).reshape(both).sum(axis=1)
+        self._sensitivity = (sensitivity.reshape(both).sum(axis=1) + (2 * len(growth) + 4) * self._scales) * UPWARDS
+        self._open = np.sum(arithmetic.upper_bound(coefficients - middle), axis=0).reshape(both).sum(axis=1)
 
     def __call__(self, interval: int, x: Values, spread: float) -> Values:
         """Return the sums of an interval at points that are open by ``spread`` at most."""
         xp, scales, weights = self._xp, self._scales[interval], self._weights[:, interval]
-        series, slack = len(scales), (spread + 2.0**-self._bits) * xp.array(self._steepness[interval])
-        point = Fixed.of_numbers(x, self._bits)
+        series, slack = len(scales), (spread + 2.0**-self._bits) * xp.array(self._sensitivity[interval])
+        point = FixedPoint.of_numbers(x, self._bits)
         square = point.polynomials(3)[2, :]  # 2x² − 1
-        sums = square.polynomials(weights.limbs.shape[1]).weighted(weights)
+        sums = square.polynomials(weights.limbs.shape[1]).weighted_sums(weights)
         total = sums[:, :series] + point[:, None] * sums[:, series:]
-        result = np.broadcast_to(xp.around_zero(self._open[interval] + slack), (len(x), series))
+        result = np.broadcast_to(xp.zero_ball(self._open[interval] + slack), (len(x), series))
         for part in total.parts():
             result = result + part * scales
         return np.asarray(result)

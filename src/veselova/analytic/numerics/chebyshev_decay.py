@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, LAST_COEFFICIENTS, Values
 
-__all__ = ["MORE", "SAMPLE", "are_resolved", "expected_terms"]
+__all__ = ["MORE", "SAMPLE", "are_resolved", "estimate_terms"]
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ SAMPLE, _SAMPLE_DIGITS = 64, 11
 _NEARLY, MORE = 1e3, 1.25
 
 
-def expected_terms(values: Array, digits: int) -> int:
+def estimate_terms(values: Array, digits: int) -> int:
     """Return the terms of Chebyshev series of so many digits, from values (…, S) at S nodes in double precision.
 
     A falling bound, the largest coefficient from each on, is read off where it is still above rounding.
@@ -37,5 +37,5 @@ def expected_terms(values: Array, digits: int) -> int:
 
 def are_resolved(series: Values, noise: Values, size: Values, arithmetic: Any) -> bool:
     """Return whether the last coefficients of series (K, N) are rounding: of values that are open by noise, of a size, (K,)."""
-    last = np.sum(arithmetic.at_most(series[:, -LAST_COEFFICIENTS:]), axis=1)
+    last = np.sum(arithmetic.upper_bound(series[:, -LAST_COEFFICIENTS:]), axis=1)
     return bool(np.all(last <= _NEARLY * (noise + arithmetic.epsilon * size)))

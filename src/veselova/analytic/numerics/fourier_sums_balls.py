@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, Fixed
+from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, FixedPoint
 
 __all__ = ["SumsOverPoints", "sums_over_modes"]
 
@@ -58,8 +58,8 @@ def sums_over_modes(
     for first in range(0, len(turns), points):
         some = slice(first, first + points)
         if fixed is None or (found := fixed(turns[some])) is None:
-            waves = arithmetic.waves(modes, turns[some])[part]
-            found = arithmetic.product(waves.T, coefficients[:, None])[:, 0]
+            exponentials = arithmetic.exponentials(modes, turns[some])[part]
+            found = arithmetic.product(exponentials.T, coefficients[:, None])[:, 0]
         result[some] = found
     return result
 
@@ -74,7 +74,7 @@ class SumsOverPoints:
             self._in_fixed_point = fixed if fixed.are_narrow else None
         if self._in_fixed_point is None:
             self._xp, self._weights, entries = arithmetic, weights.T, np.arange(highest + 1)[:, None]
-            self._powers = [arithmetic.waves(entries, turn[:, None]) for turn in turns.T]
+            self._powers = [arithmetic.exponentials(entries, turn[:, None]) for turn in turns.T]
 
     def cosines(self, modes: Integers) -> Values:
         """Return Σ_j w_kj cos 2πm·z_j for modes (M, g), shape (M, K)."""
@@ -105,18 +105,18 @@ class _Scaled:
         self.sizes = np.abs(coefficients.astype(float))
         self._scales = np.exp2(np.ceil(np.log2(np.sum(self.sizes, axis=0))) + 1)
         middle = arithmetic.midpoints(coefficients)
-        self.numbers = Fixed.of_numbers(middle / self._scales, self.bits)
-        self._open = np.sum(arithmetic.at_most(coefficients - middle), axis=0)
+        self.numbers = FixedPoint.of_numbers(middle / self._scales, self.bits)
+        self._open = np.sum(arithmetic.upper_bound(coefficients - middle), axis=0)
         self.sizes /= self._scales
 
-    def balls(self, sums: Fixed, slack: Array) -> Values:
+    def balls(self, sums: FixedPoint, slack: Array) -> Values:
         """Return sums (N, K) that their turns leave open by ``slack`` of a unit, of which every term was rounded."""
         xp, rounding = self._xp, _OF_TERM * self._terms * 2.0**-self.bits
-        result = xp.around_zero(xp.array(slack * (1 + _OPEN) * UPWARDS + rounding))
+        result = xp.zero_ball(xp.array(slack * (1 + _OPEN) * UPWARDS + rounding))
         for values in sums.parts():
             result = result + values
         # In doubles the last digits of small sums would be lost.
-        return np.asarray(xp.widened(result * xp.array(self._scales), self._open))
+        return np.asarray(xp.add_error(result * xp.array(self._scales), self._open))
 
 
 class _Turns:
@@ -124,12 +124,12 @@ class _Turns:
 
     def __init__(self, turns: Values, highest: Integers, bits: int) -> None:
         both = np.stack([_real(turns), _imaginary(turns)])
-        self._fixed, self._highest = Fixed.of_numbers(both, bits), highest
+        self._fixed, self._highest = FixedPoint.of_numbers(both, bits), highest
         # An error of a power is that of the first one, times the exponent, as long as it is small.
         self.errors = 2 * np.max(_radius(both).astype(float), axis=0) + _OF_POWER * 2.0**-bits
         self.are_narrow = bool(np.max(self.errors @ highest, initial=0.0) < _OPEN)
 
-    def powers(self, axis: int) -> Fixed:
+    def powers(self, axis: int) -> FixedPoint:
         """Return the powers of the turns along an axis from the zeroth on, shape (2, B+1, N)."""
         cosines, sines = (self._fixed[part, :, axis] for part in (0, 1))
         return cosines.turns(sines, int(self._highest[axis]) + 1)
@@ -145,7 +145,7 @@ class _OverModes:
         self._part, self._limbs = part, self._scaled.numbers.limbs[:, :, 0] * signs**part  # a sine changes sign with m
         self._places = (modes * signs[:, None]).T
         self._places[1:] += highest[1:, None]
-        self._steepness = np.abs(modes).T @ self._scaled.sizes
+        self._sensitivity = np.abs(modes).T @ self._scaled.sizes
         self._behind = math.prod(self._shape[2:], start=1)
         #: Points that are looked at together.
         self.points = min(_POINTS, _TABLE // (2 * len(self._limbs) * self._behind))
@@ -155,28 +155,28 @@ class _OverModes:
         turns = _Turns(points, self._highest, self._scaled.bits)
         if not turns.are_narrow:
             return None
-        return self._scaled.balls(self._summed(turns)[:, None], turns.errors @ self._steepness)[:, 0]
+        return self._scaled.balls(self._sum(turns)[:, None], turns.errors @ self._sensitivity)[:, 0]
 
-    def _summed(self, turns: _Turns) -> Fixed:
+    def _sum(self, turns: _Turns) -> FixedPoint:
         """Return the sums, shape (N,), places along the second axis of the box some at a time."""
         first, size, part = turns.powers(0).limbs, len(turns.errors), self._part
         count, genus = len(self._limbs), len(self._shape)
-        table = Fixed(np.moveaxis(first, 2, 1).reshape(count, -1, 2 * size))
+        table = FixedPoint(np.moveaxis(first, 2, 1).reshape(count, -1, 2 * size))
         if genus == 1:
             weights = np.zeros((count, self._shape[0], 1))
             weights[:, self._places[0], 0] = self._limbs
-            return table.weighted(Fixed(weights))[part * size : (part + 1) * size, 0]
+            return table.weighted_sums(FixedPoint(weights))[part * size : (part + 1) * size, 0]
         others = [_from_lowest(turns.powers(k)) for k in range(1, genus)]
         step = max(1, _PLACES // self._behind)
         total = np.zeros((count, size))
         for start in range(0, self._shape[1], step):
             box = self._box(start, min(step, self._shape[1] - start))
-            sums = table.weighted(Fixed(box.reshape(*box.shape[:2], -1)))
+            sums = table.weighted_sums(FixedPoint(box.reshape(*box.shape[:2], -1)))
             inner = sums.limbs.reshape(count, 2, size, *box.shape[2:])
             for power in reversed(others[1:]):
-                inner = np.stack([_contracted(inner, power, k) for k in (0, 1)], axis=1)
-            total += _contracted(inner, others[0][..., start : start + step], part)
-        return Fixed(total).carried()
+                inner = np.stack([_contract(inner, power, k) for k in (0, 1)], axis=1)
+            total += _contract(inner, others[0][..., start : start + step], part)
+        return FixedPoint(total).carry()
 
     def _box(self, start: int, step: int) -> Array:
         """Return limbs (L, B+1, step, …) of the coefficients with some places along the second axis, from the modes."""
@@ -187,19 +187,19 @@ class _OverModes:
         return box
 
 
-def _from_lowest(powers: Fixed) -> Array:
+def _from_lowest(powers: FixedPoint) -> Array:
     """Return limbs of w^−B … w^B, shape (L, 2, N, 2B+1), from powers (2, B+1, N)."""
     limbs = np.moveaxis(powers.limbs, 2, 3)
     inverse = limbs[..., :0:-1] * np.array([1.0, -1.0])[:, None, None]
     return np.concatenate([inverse, limbs], axis=3)
 
 
-def _contracted(z: Array, w: Array, part: int) -> Array:
+def _contract(z: Array, w: Array, part: int) -> Array:
     """Return limbs of a part of Σ_k z_…k w_k, for those of z (2, N, …, K) and w (2, N, K)."""
     w = w.reshape(*w.shape[:3], *(1,) * (z.ndim - 4), w.shape[3])
     # Re zw = Re z Re w − Im z Im w, Im zw = Re z Im w + Im z Re w.
     pair = (w[:, 0], -w[:, 1]) if part == 0 else (w[:, 1], w[:, 0])
-    return Fixed(np.concatenate([z[:, 0], z[:, 1]], axis=-1)).dot(Fixed(np.concatenate(pair, axis=-1))).limbs
+    return FixedPoint(np.concatenate([z[:, 0], z[:, 1]], axis=-1)).dot(FixedPoint(np.concatenate(pair, axis=-1))).limbs
 
 
 class _OverPoints:
@@ -209,7 +209,7 @@ class _OverPoints:
         count, genus = points.shape
         self._scaled = _Scaled(weights.T, count * genus, arithmetic)
         turns = _Turns(points, np.full(genus, highest), self._scaled.bits)
-        self._steepness, self.are_narrow = turns.errors.T @ self._scaled.sizes, turns.are_narrow
+        self._sensitivity, self.are_narrow = turns.errors.T @ self._scaled.sizes, turns.are_narrow
         self._powers = [turns.powers(axis) for axis in range(genus)]
         #: Limbs of Σ_j w_kj cos(m'·z_j) cos(m_g z_jg), and of the same with sines, (L, 2, B+1, K), by all entries but the last.
         self._rows: dict[tuple[int, ...], Array] = {}
@@ -220,40 +220,40 @@ class _OverPoints:
         missing = [row for row in dict.fromkeys(map(tuple, leading)) if row not in self._rows]
         for first in range(0, len(missing), _ROWS):
             self._add(missing[first : first + _ROWS])
-        limbs = np.empty((len(self._scaled.numbers.limbs), *modes.shape[:1], self._steepness.shape[1]))
+        limbs = np.empty((len(self._scaled.numbers.limbs), *modes.shape[:1], self._sensitivity.shape[1]))
         for place, (row, entry) in enumerate(zip(leading, last.tolist(), strict=True)):
             sums = self._rows[tuple(row)][:, :, abs(entry)]
             limbs[:, place] = sums[:, 0] + sums[:, 1] if entry < 0 else sums[:, 0] - sums[:, 1]
-        return self._scaled.balls(Fixed(limbs), np.abs(modes) @ self._steepness)
+        return self._scaled.balls(FixedPoint(limbs), np.abs(modes) @ self._sensitivity)
 
     def _add(self, rows: list[tuple[int, ...]]) -> None:
         """Form the sums of some rows."""
         numbers = self._scaled.numbers
         count, points, columns = numbers.limbs.shape
-        waves, last = self._leading(np.array(rows)), self._powers[-1].limbs
+        exponentials, last = self._leading(np.array(rows)), self._powers[-1].limbs
         found = np.empty((count, 2, last.shape[2], len(rows), columns))
         for part in (0, 1):
             # Of shape (L, J, rows, K).
-            weights = Fixed(np.swapaxes(waves.limbs[:, part], 1, 2)[..., None]) * numbers[:, None]
-            table = Fixed(np.swapaxes(last[:, part], 1, 2))
-            sums = table.weighted(Fixed(weights.limbs.reshape(count, points, -1)))
+            weights = FixedPoint(np.swapaxes(exponentials.limbs[:, part], 1, 2)[..., None]) * numbers[:, None]
+            table = FixedPoint(np.swapaxes(last[:, part], 1, 2))
+            sums = table.weighted_sums(FixedPoint(weights.limbs.reshape(count, points, -1)))
             found[:, part] = sums.limbs.reshape(count, -1, len(rows), columns)
         self._rows.update((row, np.ascontiguousarray(found[:, :, :, place])) for place, row in enumerate(rows))
 
-    def _leading(self, modes: Integers) -> Fixed:
+    def _leading(self, modes: Integers) -> FixedPoint:
         """Return e^{2πi m'·z} of all axes but the last, shape (2, M, J)."""
-        waves = self._power(modes, 0)
+        exponentials = self._power(modes, 0)
         for axis in range(1, modes.shape[1]):
             factor = self._power(modes, axis)
-            waves = Fixed(np.stack([waves.part_of_product(factor, part).limbs for part in (0, 1)], axis=1))
-        return waves
+            exponentials = FixedPoint(np.stack([exponentials.part_of_product(factor, part).limbs for part in (0, 1)], axis=1))
+        return exponentials
 
-    def _power(self, modes: Integers, axis: int) -> Fixed:
+    def _power(self, modes: Integers, axis: int) -> FixedPoint:
         """Return the factors of one axis, shape (2, M, J)."""
         entries = modes[:, axis]
         limbs = self._powers[axis].limbs[:, :, np.abs(entries)]
         limbs[:, 1] *= np.where(entries < 0, -1.0, 1.0)[:, None]
-        return Fixed(limbs)
+        return FixedPoint(limbs)
 
 
 _real = np.frompyfunc(lambda x: x.real, 1, 1)

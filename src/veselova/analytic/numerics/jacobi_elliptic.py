@@ -79,12 +79,12 @@ class Jacobi:
         wave = 2 - square if self._is_direct is True else 2 + square
         if self._stacked:
             wave = np.minimum(np.where(self._is_direct, 2 - square, wave), _LARGEST_WAVE)
-        waves = [0 * wave + 1, wave]  # 1, then 2 cos 2mz or 2 cosh 2my
+        exponentials = [0 * wave + 1, wave]  # 1, then 2 cos 2mz or 2 cosh 2my
         for m in range(2, self._terms + 1):
-            waves.append(wave * waves[-1] - (waves[-2] if m > 2 else 2))
-        sums = self._series @ np.stack(waves, axis=-2)
-        z1, z2, z3, z4 = self._truncated(*(sums[..., i, :] for i in range(4)))
-        (t2, t3, t4), (z2, z4) = self._constants, self._exchanged(z2 * cosine, z4)
+            exponentials.append(wave * exponentials[-1] - (exponentials[-2] if m > 2 else 2))
+        sums = self._series @ np.stack(exponentials, axis=-2)
+        z1, z2, z3, z4 = self._truncate_sums(*(sums[..., i, :] for i in range(4)))
+        (t2, t3, t4), (z2, z4) = self._constants, self._exchange(z2 * cosine, z4)
         return (t3 / t2) * z1 * sine / z4, (t4 / t2) * z2 / z4, (t4 / t3) * z3 / z4
 
     @cached_property
@@ -92,7 +92,7 @@ class Jacobi:
         """Return whether the nome of k is the smaller one, not that of k'."""
         return self.aspect >= 1 if self._stacked else bool(self.aspect >= 1)
 
-    def _exchanged(self, second: Any, fourth: Any) -> tuple[Any, Any]:
+    def _exchange(self, second: Any, fourth: Any) -> tuple[Any, Any]:
         """Return θ2, θ4, or θ4, θ2 where the nome is that of k'."""
         if self._stacked:
             return np.where(self._is_direct, second, fourth), np.where(self._is_direct, fourth, second)
@@ -145,11 +145,11 @@ class Jacobi:
         """Return θ_2/q^{1/4}, θ_3, θ_4 at zero, or θ_4, θ_3, θ_2 where the nome is that of k'."""
         odd, even, signs = self._powers
         sums = (2 * values.sum(axis=-1, keepdims=self._stacked) for values in (odd, even, signs * even))
-        t2, t3, t4 = self._truncated(*(value - rest for value, rest in zip(sums, (0, 1, 1), strict=True)))
-        t2, t4 = self._exchanged(t2, t4)
+        t2, t3, t4 = self._truncate_sums(*(value - rest for value, rest in zip(sums, (0, 1, 1), strict=True)))
+        t2, t4 = self._exchange(t2, t4)
         return t2, t3, t4
 
-    def _truncated(self, *sums: Any) -> tuple[Any, ...]:
+    def _truncate_sums(self, *sums: Any) -> tuple[Any, ...]:
         """Return sums over m ≤ M = _terms with what they leave out, at most nome^(M²+M).
 
         With y ≤ ¼|log nome| the first omitted term, m = M+1, is at most (4m+2) nome^(m²+m/2) in z1 and z2, 2 nome^(m²−m/2) in
@@ -159,4 +159,4 @@ class Jacobi:
         if not xp.has_radii:
             return sums
         bound = xp.exp(self._log_nome * (self._terms**2 + self._terms))
-        return tuple(xp.widened(value, bound) for value in sums)
+        return tuple(xp.add_error(value, bound) for value in sums)

@@ -34,7 +34,7 @@ def increasing_root(
     guess: Array,
     low: Array,
     high: Array,
-    settled: float,
+    converged: float,
     narrow: float | None = None,
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
@@ -44,7 +44,7 @@ def increasing_root(
     again: the error left is of the order of the method, so choose it near that root of the wanted accuracy. It ends with brackets
     of at most ``narrow`` too (``settled`` without one), where values are too rough, or slopes too small, for such a step.
     """
-    narrow = settled if narrow is None else narrow
+    narrow = converged if narrow is None else narrow
     rows: Rows = slice(None)
     result, x, before = guess, guess, high - low
     with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken
@@ -52,13 +52,13 @@ def increasing_root(
             value, slope = function(x, rows)
             step = value / slope
             moved, size = x - step, np.abs(step)
-            small, found = size <= settled, np.minimum(np.maximum(moved, low), high)
+            small, found = size <= converged, np.minimum(np.maximum(moved, low), high)
             if small.all():
                 return _with(result, rows, found)
             low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
             taken = (2 * size <= before) & (moved >= low) & (moved <= high)  # steps that do not shrink may go in circles
             trial = np.where(taken, moved, (low + high) / 2)
-            before, x = np.maximum(np.abs(trial - x), 2 * settled), np.where(small, found, trial)
+            before, x = np.maximum(np.abs(trial - x), 2 * converged), np.where(small, found, trial)
             open_ = np.asarray(~(small | (high - low <= narrow)).reshape(len(x), -1).all(axis=1))
             if not open_.any():
                 return _with(result, rows, x)
@@ -91,14 +91,14 @@ def interval_step(value: Values, slope: Values, bend: Any, arithmetic: Any) -> t
     ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as far as a root may be, which is
     shown where the distance times the bend is below the other half.
     """
-    reach = arithmetic.around_zero(value / (_SLOPE * slope))
-    return np.asarray(value / arithmetic.widened(slope, reach * bend)), np.asarray(reach)
+    reach = arithmetic.zero_ball(value / (_SLOPE * slope))
+    return np.asarray(value / arithmetic.add_error(slope, reach * bend)), np.asarray(reach)
 
 
 def is_shown(reach: Values, slope: Values, bend: Any, arithmetic: Any) -> bool:
     """Return whether half of the slopes is certain as far as that."""
-    rest = arithmetic.around_zero((1 - _SLOPE) * arithmetic.at_least(slope))
-    return bool(arithmetic.inside(reach * bend, rest).all())
+    rest = arithmetic.zero_ball((1 - _SLOPE) * arithmetic.at_least(slope))
+    return bool(arithmetic.contained_in(reach * bend, rest).all())
 
 
 def _with(result: Array, rows: Rows, found: Array) -> Array:

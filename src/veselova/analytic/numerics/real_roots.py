@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["NEAR", "Polynomial", "monic", "product", "quotient", "remainder", "roots", "total", "trimmed", "value"]
+__all__ = ["NEAR", "Polynomial", "monic", "product", "quotient", "remainder", "roots", "total", "trim", "value"]
 
 Polynomial = list[Fraction]
 
@@ -56,7 +56,7 @@ def remainder(polynomial: Polynomial, monic: Polynomial) -> Polynomial:
     return rest
 
 
-def trimmed(polynomial: Polynomial) -> Polynomial:
+def trim(polynomial: Polynomial) -> Polynomial:
     """Return the polynomial without leading zeros."""
     while len(polynomial) > 1 and polynomial[-1] == 0:
         polynomial = polynomial[:-1]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.motion.base import Motion
-from veselova.analytic.separable.curve import SeparableStart, drawn_apart
+from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.orbit import SeparableOrbit
-from veselova.analytic.time_map.panel_quadrature import integrated
+from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
 from veselova.mechanics.core.problem import Series
@@ -53,33 +53,33 @@ class BodyMotion(Motion[VeselovaSO3]):
         given = problem.potential.given or {}
         alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
         alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
-        moments = list(drawn_apart([problem.moments[i] for i in order]))
-        gamma, Omega = problem.along_axes()
+        moments = list(separate([problem.moments[i] for i in order]))
+        gamma, Omega = problem.to_axes()
         velocity = exact_cross(gamma, Omega)  # scaled as γ is
         x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
         v, walls = family_polynomial(moments, *alphas[:2]), tuple(alphas[2 + i] for i in order)
         return SeparableOrbit(SeparableStart(tuple(moments), x, w, v, walls))
 
-    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
-        clock = orbit.clock(grid.doubles)
-        tau, z = clock.tau1(grid.doubles, grid.remainders)
+        time_map = orbit.time_map(grid.doubles)
+        tau, z = time_map.tau1(grid.doubles, grid.remainders)
         slopes, largest = self._turning
         low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
-        panels = integrated(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise)
+        panels = integrate_on_panels(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise)
         at, velocity = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
-        error, lag = orbit.error(tau, clock, self._steepness)
+        error, lag = orbit.error(tau, time_map, self._sensitivity)
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the mean.
         error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
         error = error + orbit.integral_error(tau, slopes)
         error = orbit.require_digit(error, grid.doubles)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
-        return series, error, "angles", orbit.details(clock)
+        return series, error, "angles", orbit.details(time_map)
 
     def _to_body(self, values: Array) -> Array:
         """Return vectors (N, 3), or columns (N, 3, k), along sorted axes in those of the body."""
@@ -88,17 +88,17 @@ class BodyMotion(Motion[VeselovaSO3]):
         axes = self.problem.axes
         return result if axes is None else np.asarray(np.einsum("ij,nj...->ni...", axes, result))
 
-    def _frame(self, gamma: Array, lines: Array, turned: Array) -> Array:
+    def _frame(self, gamma: Array, lines: Array, rotated: Array) -> Array:
         """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
         start = self._to_body(self._orbit.motion.attitude(self._orbit.motion.angles[None, :]).normals)[0]
-        cosine, sine = np.cos(turned), np.sin(turned)
+        cosine, sine = np.cos(rotated), np.sin(rotated)
         turn = np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
         rest = lines @ turn @ (start.T @ self.problem.frame[:, 1:])
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
-    def _steepness(self) -> Steepness:
-        return self._orbit.steepness(lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2))
+    def _sensitivity(self) -> Sensitivity:
+        return self._orbit.sensitivity(lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2))
 
     @cached_property
     def _turning(self) -> tuple[Array, float]:

@@ -28,13 +28,13 @@ from veselova.analytic.numerics.real_roots import (
     remainder,
     roots,
     total,
-    trimmed,
+    trim,
     value,
 )
 from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SeparableStart", "SeparatedCut", "drawn_apart", "moving_axes", "separated_cuts"]
+__all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ class SeparableStart:
             if beta:
                 slope = math.prod(self.inverse[i] - x for x in _without(self.inverse, i))
                 parts.append([-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])])
-        return trimmed(total(parts))
+        return trim(total(parts))
 
     @property
     def degree(self) -> int:
@@ -196,7 +196,7 @@ class SeparatedCut:
         return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
 
 
-def drawn_apart(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     """Return increasing numbers, of which those that are equal, or nearly so, are drawn apart by 1e-30 of themselves."""
     result = list(values)
     for i in range(1, len(result)):
@@ -225,12 +225,12 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
             start = start.without(i)
             del axes[i]
         try:
-            return start, separated_cuts(start), axes
+            return start, find_cuts(start), axes
         except _Resting as resting:
             still = [resting.axis]
 
 
-def separated_cuts(start: SeparableStart) -> list[SeparatedCut]:
+def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as ``moving_axes`` has it."""
     factor = start.factor
     found = roots(factor, start.apart)

@@ -13,7 +13,7 @@ from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.analytic.separable.periods import SeparatedPeriods
-from veselova.analytic.time_map.rate import Rate
+from veselova.analytic.time_map.rate import TorusRate
 
 __all__ = ["SeparableMotion", "SeparatedRate"]
 
@@ -55,21 +55,21 @@ class SeparableMotion:
             return (1 if velocity > 0 else -1) * (1 if lower else -1)
         return (1 if position > 0 else -1) * (1 if self.angles[s] >= 0 or not lower else -1)
 
-    def between(self, phi: Array) -> Array:
+    def differences(self, phi: Array) -> Array:
         """Return |λ_s−λ_j|, one for s = j, shape (N, g, g), from the ends of the cuts."""
         g = len(self.cuts)
         result = np.ones((phi.shape[0], g, g))
         for s in range(g):
             for j in range(s + 1, g):
-                stretch = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
-                distance = self.cuts[s].point(phi[:, s])[1] + stretch + self.cuts[j].point(phi[:, j])[0]
+                time_rate = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
+                distance = self.cuts[s].point(phi[:, s])[1] + time_rate + self.cuts[j].point(phi[:, j])[0]
                 result[:, s, j] = result[:, j, s] = distance
         return result
 
     def speeds(self, phi: Array) -> Array:
         """Return dφ_s/dτ, from λ_s' = 2√R(λ_s)/Π_{j≠s}|λ_s−λ_j|, shape (N, g)."""
         rates = np.stack([cut.speed(phi[:, s]) for s, cut in enumerate(self.cuts)], axis=1)
-        return np.asarray(2 * rates / np.prod(self.between(phi), axis=2))
+        return np.asarray(2 * rates / np.prod(self.differences(phi), axis=2))
 
     def _offsets(self, phi: Array) -> Array:
         """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
@@ -108,7 +108,7 @@ class SeparableMotion:
         for i, (s, lower) in self._own.items():
             own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
         far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
-        return offsets, ends, own, far, np.prod(far, axis=2) / np.sqrt(np.prod(self.between(phi), axis=2))
+        return offsets, ends, own, far, np.prod(far, axis=2) / np.sqrt(np.prod(self.differences(phi), axis=2))
 
     def _among_all_axes(self, q: Array, lines: Array, components: Array, points: Array) -> Attitude:
         n, g, count = self._dimension, len(self.cuts), q.shape[0]
@@ -120,7 +120,7 @@ class SeparableMotion:
 
     def _components(self, phi: Array, y_rest: Array) -> Array:
         """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of the ends that are I's."""
-        result, products = np.empty_like(phi), np.prod(self.between(phi), axis=2)
+        result, products = np.empty_like(phi), np.prod(self.differences(phi), axis=2)
         for s, cut in enumerate(self.cuts):
             lower, upper = cut.points.roots(phi[:, s])
             ends = (1.0 if cut.axes[0] is not None else lower) * (1.0 if cut.axes[1] is not None else upper)
@@ -137,7 +137,7 @@ class SeparableMotion:
             return np.zeros(phi.shape[0])
         _, _, own, _, y_rest = self._roots(phi)
         y, along = y_rest * np.prod(own, axis=2), self._components(phi, y_rest)
-        return np.asarray(-np.sum(y * along[:, ::-1], axis=1) / self.between(phi)[:, 0, 1])
+        return np.asarray(-np.sum(y * along[:, ::-1], axis=1) / self.differences(phi)[:, 0, 1])
 
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
@@ -150,7 +150,7 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
 
 
 @dataclass(frozen=True)
-class SeparatedRate(Rate[SeparatedPeriods]):
+class SeparatedRate(TorusRate[SeparatedPeriods]):
     """dt/dτ = √(λ_1…λ_g) on the torus of a separable motion."""
 
     scale: float = 1.0
@@ -163,9 +163,9 @@ class SeparatedRate(Rate[SeparatedPeriods]):
     def needed_nodes(self) -> tuple[int, ...]:
         """Return, per cut, the number of coefficients of the forms or the weighted ones: √λ may make two of them many."""
         periods = self.inversion.periods
-        weighted = (periods.resolved(partial(self._weighted_forms, s)) for s in range(periods.genus))
+        weighted = (periods.cosine_coefficients(partial(self._weight_forms, s)) for s in range(periods.genus))
         return tuple(max(a.shape[1], b.shape[1]) for a, b in zip(weighted, periods.cut_series, strict=True))
 
-    def _weighted_forms(self, s: int, psi: Array) -> Array:
+    def _weight_forms(self, s: int, psi: Array) -> Array:
         periods = self.inversion.periods
         return periods.forms(s, psi) * np.sqrt(periods.cuts[s].lower + periods.cuts[s].point(psi)[0])

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences
-from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.time_map.fourier import FourierClock
+from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import PanelClock
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableOrbit"]
@@ -55,12 +55,12 @@ class SeparableOrbit:
         """Return the uniform part of the phases in physical time."""
         return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
-    def clock(self, grid: Array) -> Clock:
+    def time_map(self, grid: Array) -> TimeMap:
         """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes too many panels."""
         if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
-            return FourierClock(self.rate, self.in_tau, self.in_time, self.rate.mean)
+            return FourierTimeMap(self.rate, self.in_tau, self.in_time, self.rate.mean)
         self.require_panels(grid)
-        return PanelClock(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+        return ChebyshevTimeMap(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
 
     def require_panels(self, grid: Array) -> None:
         """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are made."""
@@ -87,9 +87,9 @@ class SeparableOrbit:
         at = self.motion.attitude(phi)
         return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[:, None]
 
-    def details(self, clock: Clock) -> dict[str, Any]:
+    def details(self, time_map: TimeMap) -> dict[str, Any]:
         """Return what a trajectory's provenance says of the orbit."""
-        return {"clock": clock.name, "clock_size": clock.size, "degree": self._degree}
+        return {"time_map": time_map.name, "time_map_size": time_map.size, "degree": self._degree}
 
     @cached_property
     def sample(self) -> Array:
@@ -97,25 +97,25 @@ class SeparableOrbit:
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
-    def steepness(self, values: Callable[[Attitude], Array]) -> Steepness:
+    def sensitivity(self, values: Callable[[Attitude], Array]) -> Sensitivity:
         """Return how fast numbers (N, …) of the attitudes change with the phases, and more between the sampled points."""
         genus = self.motion.periods.genus
         differences = Differences(self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus)))
         at = self.motion.attitude(self.inversion.invert(differences.ends))
-        return Steepness.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
+        return Sensitivity.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
 
     @cached_property
     def start_rounding(self) -> Array:
         """Return the rounding of the phases at the start, (g,)."""
         return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
 
-    def error(self, tau: Array, clock: Clock, steepness: Steepness) -> tuple[Array, Array]:
+    def error(self, tau: Array, time_map: TimeMap, sensitivity: Sensitivity) -> tuple[Array, Array]:
         """Return a bound on the error of numbers of that steepness, (N,), and that of τ."""
         rates, elapsed, rounding = np.abs(self.in_tau.rates), np.abs(tau), _RATE * DOUBLE.epsilon
-        of_clock, drift = clock.error(tau, self.start_rounding, rounding * rates)
+        of_clock, drift = time_map.error(tau, self.start_rounding, rounding * rates)
         lag = (rounding + drift) * elapsed + of_clock
-        at_once = _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * steepness.together
-        return np.asarray(at_once + rounding * steepness.by_rates * elapsed + lag * steepness.along_flow), np.asarray(lag)
+        at_once = _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * sensitivity.together
+        return np.asarray(at_once + rounding * sensitivity.by_rates * elapsed + lag * sensitivity.along_flow), np.asarray(lag)
 
     def integral_error(self, tau: Array, slopes: Array) -> Array:
         """Return how far errors of the phases move an integral along the orbit, (N,), from its integrand's slopes in them, (g,).

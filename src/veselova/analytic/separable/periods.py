@@ -74,9 +74,9 @@ class SeparatedPeriods(AngleSeries):
     @cached_property
     def cut_series(self) -> tuple[Array, ...]:
         """Return, per cut, the cosine coefficients of du_k/dφ (signs included), shape (g, N_s)."""
-        return tuple(self.resolved(partial(self.forms, s)) for s in range(self.genus))
+        return tuple(self.cosine_coefficients(partial(self.forms, s)) for s in range(self.genus))
 
-    def resolved(self, function: Callable[[Array], Array]) -> Array:
+    def cosine_coefficients(self, function: Callable[[Array], Array]) -> Array:
         """Return the cosine coefficients of even functions of an angle, (K, M), from their values (K, N) at angles (N,).
 
         Raises Unsolved where they do not fall to rounding.

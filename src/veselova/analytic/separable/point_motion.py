@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import Steepness
+from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.motion.base import Motion
-from veselova.analytic.separable.curve import SeparableStart, drawn_apart
+from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.orbit import SeparableOrbit
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -38,18 +38,18 @@ class PointMotion(Motion[SeparableVeselova]):
         )
         size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableOrbit(SeparableStart(drawn_apart(inverse), q, v, self.problem.polynomial, walls, size))
+        return SeparableOrbit(SeparableStart(separate(inverse), q, v, self.problem.polynomial, walls, size))
 
     @cached_property
-    def _steepness(self) -> Steepness:
-        return self._orbit.steepness(lambda at: at.q)
+    def _sensitivity(self) -> Sensitivity:
+        return self._orbit.sensitivity(lambda at: at.q)
 
-    def _evaluated(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
-        clock = orbit.clock(grid.doubles)
-        tau, z = clock.tau1(grid.doubles, grid.remainders)
+        time_map = orbit.time_map(grid.doubles)
+        tau, z = time_map.tau1(grid.doubles, grid.remainders)
         at, velocity = orbit.states(z)
         series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
-        error = orbit.require_digit(orbit.error(tau, clock, self._steepness)[0], grid.doubles)
-        return series, error, "angles", orbit.details(clock)
+        error = orbit.require_digit(orbit.error(tau, time_map, self._sensitivity)[0], grid.doubles)
+        return series, error, "angles", orbit.details(time_map)

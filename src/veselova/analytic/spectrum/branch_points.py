@@ -25,7 +25,7 @@ from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
-__all__ = ["COINCIDE", "Resolved", "Spectrum", "resolved", "spectrum", "tangent"]
+__all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "tangent"]
 
 #: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
 _InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
@@ -55,13 +55,13 @@ class Spectrum:
     q_prime: Values
     constants: Values
     spheroconic: Values
-    clock_rate: Any
+    time_rate: Any
 
     def in_arithmetic(self, arithmetic: Arithmetic) -> Spectrum:
         """Return the spectrum in another arithmetic."""
         values = map(arithmetic.array, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic))
         inverse, q, q_prime, constants, spheroconic = values
-        return Spectrum(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(self.clock_rate))
+        return Spectrum(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(self.time_rate))
 
     def working(self) -> AbstractContextManager[object]:
         """Return the context in which operators keep the digits of decimals; other numbers keep theirs by themselves, or in that
@@ -92,7 +92,7 @@ class Resolved:
     separatrices: tuple[int, ...]
 
 
-def resolved(
+def resolve_spectrum(
     moving: Moving, digits: int, distance: Fraction | None = None, beyond: int = 0, coincide: int = COINCIDE
 ) -> Resolved:
     """Return the spectrum in which every interval is open and known to twice ``digits``.
@@ -108,8 +108,8 @@ def resolved(
     exponent = 2 * digits + 10 + beyond
     opening, coinciding = Fraction(1, 10**exponent), max(coincide, 2 * exponent + 20)
     # Between A's nearer than that, a cut that closes would not say that a direction hardly moves.
-    moving = moving.opened(opening, Fraction(1, 10 ** (coinciding // 2)))
-    separatrices, hidden = set[int](), set[int]()
+    moving = moving.separate(opening, Fraction(1, 10 ** (coinciding // 2)))
+    separatrices, coincident = set[int](), set[int]()
     while True:
         if moving.size < 2:
             raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
@@ -119,25 +119,25 @@ def resolved(
             raise Unsolved("beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I")
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
-            return Resolved(moving, found, tuple(sorted(separatrices | hidden)))
+            return Resolved(moving, found, tuple(sorted(separatrices | coincident)))
         j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
         if j == 0 and moving.time != "tau1":  # between c_1 = 0 and the least I, which is no separatrix
             raise Unsolved("beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}")
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
-            moving = moving.moved(0, opening)
+            moving = moving.perturb(0, opening)
         elif j % 2 == 1:
             moving = moving.without(axis)
         elif moving.hardly_moves(axis, Fraction(1, 10**coinciding)):  # across it the motion is not stable
-            hidden.add(moving.axes[axis])
+            coincident.add(moving.axes[axis])
             leaves_one = distance is None and moving.size == 2  # an unstable equilibrium is no rest
             apart = opening if leaves_one else distance
-            moving = moving.without(axis) if apart is None else moving.displaced(axis, apart)
+            moving = moving.without(axis) if apart is None else moving.lift_axis(axis, apart)
         elif axis in separatrices:
             raise InternalContradiction("a closed gap did not open")
         else:
             separatrices.add(axis)
-            moving = moving.moved(axis, opening if distance is None else distance)
+            moving = moving.perturb(axis, opening if distance is None else distance)
 
 
 def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectrum:

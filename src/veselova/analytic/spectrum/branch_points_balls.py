@@ -16,7 +16,7 @@ from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_betw
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
-__all__ = ["enclosed", "resting_spheroconic", "spheroconic"]
+__all__ = ["enclose_spectrum", "resting_spheroconic", "spheroconic"]
 
 #: Digits of the balls against those in which the zeros were found: differences of nearby zeros and poles enter what follows.
 _FINER = 2
@@ -34,7 +34,7 @@ _STEPS = 2
 _FIRST_REACH, _WIDER, _WIDENINGS = 4, 1000, 5
 
 
-def enclosed(found: Resolved) -> Spectrum:
+def enclose_spectrum(found: Resolved) -> Spectrum:
     """Return the spectrum in balls; raises Unsolved where a zero cannot be enclosed.
 
     Disjoint balls, as many as there are zeros, each with a change of sign of the secular function: each holds one.
@@ -60,12 +60,12 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     """
     room = _ROOM * (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
     found, around = (_quadratic_zeros if q.shape[1] == 3 else _polynomial_zeros)(q, inverse, room, xp)
-    for row in np.flatnonzero(~xp.inside(found, around).all(axis=1)).tolist():
+    for row in np.flatnonzero(~xp.contained_in(found, around).all(axis=1)).tolist():
         if not all(x.is_finite() for x in q[row]):
             raise ZeroDivisionError("a position that is not known at all")
         poles = [xp.rational(x) for x in inverse]
         middle = _zeros_of_position(poles, [xp.rational(x) ** 2 for x in q[row]], _FINER * xp.digits)
-        found[row] = xp.widened(xp.array(middle), room[row] / _ROOM)
+        found[row] = xp.add_error(xp.array(middle), room[row] / _ROOM)
     return found
 
 
@@ -80,7 +80,7 @@ def _quadratic_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple
     far = np.where(up, half + root, half - root)
     of_far, of_near = second + far / leading, second + constant / far
     zeros = np.stack([np.where(up, of_near, of_far), np.where(up, of_far, of_near)], axis=1)
-    return zeros, xp.midpoints(zeros) + xp.around_zero(room)[:, None]
+    return zeros, xp.midpoints(zeros) + xp.zero_ball(room)[:, None]
 
 
 def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tuple[Values, Values]:
@@ -101,7 +101,7 @@ def _polynomial_zeros(q: Values, inverse: Values, room: Values, xp: Any) -> tupl
     while digits < xp.digits:
         value, slope = polynomial(zeros)
         zeros, digits = xp.midpoints(zeros - xp.midpoints(value) / xp.midpoints(slope)), 2 * digits
-    around = zeros + xp.around_zero(room)[:, None]
+    around = zeros + xp.zero_ball(room)[:, None]
     return np.asarray(zeros - polynomial(zeros)[0] / polynomial(around)[1]), around
 
 
@@ -139,11 +139,11 @@ def _zeros(found: Iterable[Any], coarse_poles: Iterable[Any], poles: Values, wei
         terms = weights[live] / (x - poles[live])
         return constant + np.sum(terms), -np.sum(terms / (x - poles[live]))
 
-    zeros = [at_pole[zero] if zero in at_pole else _enclosed_zero(secular, xp.number(zero), xp) for zero in found]
+    zeros = [at_pole[zero] if zero in at_pole else _enclose_zero(secular, xp.number(zero), xp) for zero in found]
     return xp.array(zeros)
 
 
-def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: Balls) -> Any:
+def _enclose_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: Balls) -> Any:
     for _ in range(_STEPS):
         value, slope = falling(middle)
         middle = (middle - value / slope).mid()
@@ -151,6 +151,6 @@ def _enclosed_zero(falling: Callable[[Any], tuple[Any, Any]], middle: Any, xp: B
     reach = _FIRST_REACH * (value / slope.mid()).abs_upper() + xp.epsilon
     for _ in range(_WIDENINGS):
         if falling(middle - reach)[0] > 0 and falling(middle + reach)[0] < 0:
-            return xp.widened(middle, reach)
+            return xp.add_error(middle, reach)
         reach = _WIDER * reach
     raise Unsolved("not-enclosed", "a constant of motion or a spheroconic coordinate: no change of sign could be shown")

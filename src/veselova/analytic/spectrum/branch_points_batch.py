@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.double_double import Twofold, stacked
+from veselova.analytic.arithmetic.double_double import DoubleDouble, stack_double_doubles
 from veselova.analytic.spectrum.secular_equation import zeros_of_many
 
 __all__ = ["Spectra"]
@@ -34,11 +34,11 @@ class Spectra:
     axes: NDArray[np.intp]
     unit: Array
     energy: Array
-    inverse: Twofold
-    constants: Twofold
-    spheroconic: Twofold
+    inverse: DoubleDouble
+    constants: DoubleDouble
+    spheroconic: DoubleDouble
     increasing: NDArray[np.bool_]
-    clock_rate: Array
+    time_rate: Array
     known: NDArray[np.bool_]
 
     @classmethod
@@ -47,42 +47,42 @@ class Spectra:
         axes = np.argsort(-A, axis=1, kind="stable")
         A, q, q_dot = (np.take_along_axis(x, axes, axis=1) for x in (A, q, q_dot))
         with np.errstate(all="ignore"):  # what is no number is not known
-            return cls._of_sorted(axes, A, Twofold.of(q), Twofold.of(q_dot))
+            return cls._of_sorted(axes, A, DoubleDouble.of(q), DoubleDouble.of(q_dot))
 
     @classmethod
-    def _of_sorted(cls, axes: NDArray[np.intp], A: Array, position: Twofold, velocity: Twofold) -> Spectra:
+    def _of_sorted(cls, axes: NDArray[np.intp], A: Array, position: DoubleDouble, velocity: DoubleDouble) -> Spectra:
         unit = A[:, -1:]
         size = (position * position).total()
         velocity = velocity - position * ((position * velocity).total() / size)[:, None]
-        scaled = Twofold.of(A) / unit
+        scaled = DoubleDouble.of(A) / unit
         weight = (scaled * position * position).total()
         # The part of q̇ that is A-orthogonal to q: (dτ₁/dt)² = (w,Aw) is a sum of positive terms.
         sliding = velocity - position * ((scaled * position * velocity).total() / weight)[:, None]
         speed = (scaled * sliding * sliding).total()
         rate = speed.sqrt()
         position, velocity = position / size.sqrt()[:, None], velocity / rate[:, None]
-        inverse = Twofold.of(unit) / A
+        inverse = DoubleDouble.of(unit) / A
         spheroconic, found = zeros_of_many(inverse, position * position, 0)
         rows = [position / (spheroconic[:, s, None] - inverse) for s in range(A.shape[1] - 1)]
-        along = stacked([(row * velocity).total() / (row * row).total().sqrt() for row in rows])
+        along = stack_double_doubles([(row * velocity).total() / (row * row).total().sqrt() for row in rows])
         squares = along * along
-        others, settled = zeros_of_many(spheroconic, squares, 1)
+        others, converged = zeros_of_many(spheroconic, squares, 1)
         excess = np.abs(((squares / spheroconic).total() - 1).high)
-        zero = Twofold.of(np.zeros(A.shape[0]))
+        zero = DoubleDouble.of(np.zeros(A.shape[0]))
         return cls(
             axes=axes,
             unit=unit[:, 0],
             energy=_energy(speed * unit[:, 0], weight * unit[:, 0] / size, A),
             inverse=inverse,
-            constants=stacked([zero, *(others[:, k] for k in range(A.shape[1] - 2))]),
+            constants=stack_double_doubles([zero, *(others[:, k] for k in range(A.shape[1] - 2))]),
             spheroconic=spheroconic,
             increasing=np.stack([(row * velocity).total().high >= 0 for row in rows], axis=1),
-            clock_rate=rate.high,
-            known=found & settled & (excess < _CONTRADICTION),
+            time_rate=rate.high,
+            known=found & converged & (excess < _CONTRADICTION),
         )
 
 
-def _energy(speed: Twofold, weight: Twofold, A: Array) -> Array:
+def _energy(speed: DoubleDouble, weight: DoubleDouble, A: Array) -> Array:
     """Return h = (dτ₁/dt)² (q,Aq)/(2 det A), equation (4.6), from the speed and (q,Aq) for |q| = 1."""
     energy = speed * weight / 2.0
     for i in range(A.shape[1]):

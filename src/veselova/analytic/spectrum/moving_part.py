@@ -47,7 +47,7 @@ class Moving:
     axes: tuple[int, ...]
     unit: Fraction
     frozen: tuple[Fraction, ...]
-    turned: bool
+    rotated: bool
     time: str
 
     @cached_property
@@ -69,7 +69,7 @@ class Moving:
         power = {"t": 0.5, "s": 1.0, "tau1": 0.0}[self.time]
         return math.exp(power * (math.log(self.A[0].numerator) - math.log(self.A[0].denominator)))
 
-    def opened(self, distance: Fraction, closeness: Fraction) -> Moving:
+    def separate(self, distance: Fraction, closeness: Fraction) -> Moving:
         """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by ``distance``."""
         A = list(self.A)
         for i in range(1, len(A)):
@@ -93,7 +93,7 @@ class Moving:
         q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
         return min(max(q / q_total, v / v_total) for q, v in zip(self.q_squared, self.v_squared, strict=True))
 
-    def displaced(self, axis: int, distance: Fraction) -> Moving:
+    def lift_axis(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much for a negative distance."""
         q_squared, qv = list(self.q_squared), list(self.qv)
         q_squared[axis], qv[axis] = max(distance, -2 * distance) ** 2 * sum(q_squared, Fraction()), Fraction()
@@ -116,7 +116,7 @@ class Moving:
             frozen=(*self.frozen, self.A[axis] * self.unit),
         )
 
-    def moved(self, axis: int, distance: Fraction) -> Moving:
+    def perturb(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that.
 
         Where q̇ is Neumann's q' it is scaled in place of q_i: alone on its axis, q is a unit vector whatever its scale.
@@ -142,31 +142,31 @@ def moving_part(problem: TorusProblem) -> Moving:
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
         groups.setdefault(a, []).append(i)
-    kept: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]] = []
+    selected: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]] = []
     frozen: list[Fraction] = []
     for a in sorted(groups, reverse=True):
         axes = groups[a]
-        turned = _turned([exact.q[i] for i in axes], [exact.tangent[i] for i in axes])
-        frozen += [a] * (len(axes) - len(turned))
-        for squares, vector in turned:
-            kept.append((a, axes[0], squares, dict(zip(axes, vector, strict=True))))
-    unit = kept[-1][0]
+        rotated = _rotate_group([exact.q[i] for i in axes], [exact.tangent[i] for i in axes])
+        frozen += [a] * (len(axes) - len(rotated))
+        for squares, vector in rotated:
+            selected.append((a, axes[0], squares, dict(zip(axes, vector, strict=True))))
+    unit = selected[-1][0]
     return Moving(
-        A=tuple(a / unit for a, _, _, _ in kept),
-        q_squared=tuple(squares[0] for _, _, squares, _ in kept),
-        v_squared=tuple(squares[1] for _, _, squares, _ in kept),
-        qv=tuple(squares[2] for _, _, squares, _ in kept),
-        vectors=tuple(vector for _, _, _, vector in kept),
+        A=tuple(a / unit for a, _, _, _ in selected),
+        q_squared=tuple(squares[0] for _, _, squares, _ in selected),
+        v_squared=tuple(squares[1] for _, _, squares, _ in selected),
+        qv=tuple(squares[2] for _, _, squares, _ in selected),
+        vectors=tuple(vector for _, _, _, vector in selected),
         n=problem.n,
-        axes=tuple(axis for _, axis, _, _ in kept),
+        axes=tuple(axis for _, axis, _, _ in selected),
         unit=unit,
         frozen=tuple(frozen),
-        turned=any(a == b for (a, *_), (b, *_) in itertools.pairwise(kept)),
+        rotated=any(a == b for (a, *_), (b, *_) in itertools.pairwise(selected)),
         time=problem.time,
     )
 
 
-def _turned(
+def _rotate_group(
     q: Sequence[Fraction], velocity: Sequence[Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]]:
     """Return (q², q̇², qq̇) and a vector along each moving direction of one group: q first, then q̇ across it."""
@@ -176,10 +176,10 @@ def _turned(
     zero = Fraction()
     if qq == 0:
         return [((zero, vv, zero), velocity)] if vv else []
-    turned: list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]] = [((qq, qv * qv / qq, qv), q)]
+    rotated: list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]] = [((qq, qv * qv / qq, qv), q)]
     if vv * qq != qv * qv:
-        turned.append(((zero, vv - qv * qv / qq, zero), [qq * d - qv * x for x, d in zip(q, velocity, strict=True)]))
-    return turned
+        rotated.append(((zero, vv - qv * qv / qq, zero), [qq * d - qv * x for x, d in zip(q, velocity, strict=True)]))
+    return rotated
 
 
 def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals, Values
-from veselova.analytic.arithmetic.double_double import Twofold, where
+from veselova.analytic.arithmetic.double_double import DoubleDouble, where
 
 __all__ = ["TooFewDigits", "zeros_between_poles", "zeros_of_many"]
 
@@ -66,12 +66,14 @@ def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Decima
         return low
     lower = [(low - pole, weight) for pole, weight in reversed(live[: a + 1])]
     upper = [(pole - high, weight) for pole, weight in live[a + 1 :]]
-    if _scaled(lower, upper, constant, width, width / 2)[0] <= 0:
+    if _scaled_secular(lower, upper, constant, width, width / 2)[0] <= 0:
         return low + _distance(lower, upper, constant, width, arithmetic)
     return high - _distance(upper, lower, -constant, width, arithmetic)
 
 
-def _scaled(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: Any, width: Any, own: Any) -> tuple[Any, Any]:
+def _scaled_secular(
+    near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: Any, width: Any, own: Any
+) -> tuple[Any, Any]:
     """Return δ(width−δ) h(δ) and its derivative, h = κ + Σ_near w/(d+δ) − Σ_far w/(d+width−δ); both lists start at d = 0.
 
     All distances are sums of positive terms, and the product has no pole on [0, width].
@@ -94,7 +96,7 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
     own = width * near[0][1] / (near[0][1] + far[0][1])
     own = min(own, most)
     for step in range(_MOST_STEPS):
-        value, derivative = _scaled(near, far, constant, width, own)
+        value, derivative = _scaled_secular(near, far, constant, width, own)
         if value == 0:
             return own
         least, most = (own, most) if value > 0 else (least, own)
@@ -106,13 +108,13 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
         change, own = abs(new - own), new
         if change <= _ROUNDINGS * max(arithmetic.epsilon, _SETTLED) * own:
             for _ in range(math.ceil(math.log2(max(1.0, arithmetic.digits / _SETTLED_DIGITS)))):
-                value, derivative = _scaled(near, far, constant, width, own)
+                value, derivative = _scaled_secular(near, far, constant, width, own)
                 own = own - value / derivative
             return own
     raise TooFewDigits
 
 
-def zeros_of_many(poles: Twofold, weights: Twofold, constant: int) -> tuple[Twofold, NDArray[np.bool_]]:
+def zeros_of_many(poles: DoubleDouble, weights: DoubleDouble, constant: int) -> tuple[DoubleDouble, NDArray[np.bool_]]:
     """Return the zeros of N functions between their increasing poles, shape (N, m−1) for (N, m), and which N have settled.
 
     All weights must be positive. The distance of every zero from the nearer pole has some 25 digits of its own. No number
@@ -123,36 +125,38 @@ def zeros_of_many(poles: Twofold, weights: Twofold, constant: int) -> tuple[Twof
         return low, np.ones(low.high.shape[0], dtype=bool)
     width = high - low
     below, above = _sides(poles, weights)
-    middle = _scaled(_rounded(below), _rounded(above), constant, width.high, width.high / 2)[0]
+    middle = _scaled_secular(_round(below), _round(above), constant, width.high, width.high / 2)[0]
     from_low = middle <= 0
     near = [(where(from_low, x, y), where(from_low, v, w)) for (x, v), (y, w) in zip(below, above, strict=True)]
     far = [(where(from_low, y, x), where(from_low, w, v)) for (x, v), (y, w) in zip(below, above, strict=True)]
     kappa = np.where(from_low, float(constant), -float(constant))
-    own = Twofold.of(_distances(_rounded(near), _rounded(far), kappa, width.high))
+    own = DoubleDouble.of(_distances(_round(near), _round(far), kappa, width.high))
     for _ in range(_FINE_STEPS):
-        value, derivative = _scaled(near, far, kappa, width, own)
+        value, derivative = _scaled_secular(near, far, kappa, width, own)
         change = value.high / derivative.high
         own = own - change
-    settled = (np.abs(change) <= _FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
-    return where(from_low, low + own, high - own), np.all(settled, axis=1)
+    converged = (np.abs(change) <= _FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
+    return where(from_low, low + own, high - own), np.all(converged, axis=1)
 
 
-def _sides(poles: Twofold, weights: Twofold) -> tuple[list[tuple[Twofold, Twofold]], list[tuple[Twofold, Twofold]]]:
+def _sides(
+    poles: DoubleDouble, weights: DoubleDouble
+) -> tuple[list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]]:
     """Return (distance, weight) of the poles below, and above, each zero, from the nearest on; where there is none, weight 0."""
     count = poles.high.shape[1]
     zero = np.arange(count - 1)
-    sides: tuple[list[tuple[Twofold, Twofold]], list[tuple[Twofold, Twofold]]] = ([], [])
+    sides: tuple[list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]] = ([], [])
     for k in range(count - 1):
         for side, nearest, step in ((sides[0], zero, -1), (sides[1], zero + 1, 1)):
             index = nearest + step * k
             exists = (index >= 0) & (index < count)
             index = np.where(exists, index, nearest)
             distance = (poles[:, index] - poles[:, nearest]) * float(step)
-            side.append((distance, where(exists, weights[:, index], Twofold.of(np.zeros(count - 1)))))
+            side.append((distance, where(exists, weights[:, index], DoubleDouble.of(np.zeros(count - 1)))))
     return sides
 
 
-def _rounded(side: list[tuple[Twofold, Twofold]]) -> list[tuple[Array, Array]]:
+def _round(side: list[tuple[DoubleDouble, DoubleDouble]]) -> list[tuple[Array, Array]]:
     return [(distance.high, weight.high) for distance, weight in side]
 
 
@@ -162,7 +166,7 @@ def _distances(near: list[tuple[Array, Array]], far: list[tuple[Array, Array]], 
     own = np.minimum(width * near[0][1] / (near[0][1] + far[0][1]), most)
     moving = np.ones(width.shape, dtype=bool)
     for step in range(_FEW_STEPS):
-        value, derivative = _scaled(near, far, constant, width, own)
+        value, derivative = _scaled_secular(near, far, constant, width, own)
         least, most = np.where(moving & (value > 0), own, least), np.where(moving & (value <= 0), own, most)
         new = own - value / np.where(derivative < 0, derivative, -np.inf)
         slow = (step % 4 == 3) & (most > _WIDE_BRACKET * least)

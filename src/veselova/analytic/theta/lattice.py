@@ -27,10 +27,10 @@ __all__ = [
     "Coordinates",
     "Halves",
     "Member",
-    "centred_points",
     "half_of",
     "largest_corner",
     "lattice_points",
+    "points_near_cell",
     "points_within",
     "schur",
     "small_norm",
@@ -64,7 +64,7 @@ class Coordinates:
     """The rows of ``U`` are the basis, shape (g, g); ``waves`` is the set F of analytic.theta, the others have Gaussians."""
 
     U: Integers
-    waves: tuple[int, ...]
+    harmonics: tuple[int, ...]
 
     @classmethod
     def cheapest(cls, T: Array) -> tuple[Coordinates, float]:
@@ -73,7 +73,7 @@ class Coordinates:
         Gaussians are the shortest vectors of a basis reduced in T, or what the shortest of one reduced in T⁻¹ leave.
         """
         genus = len(T)
-        primal, dual = _reduced(T), np.rint(np.linalg.inv(_reduced(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)[::-1]
+        primal, dual = _reduce(T), np.rint(np.linalg.inv(_reduce(np.asarray(np.linalg.inv(T)))).T).astype(np.int64)[::-1]
         choices = []
         for U, counts in ((primal, range(genus + 1)), (dual, range(1, genus))):
             if U is dual and (primal == U).all():
@@ -83,15 +83,15 @@ class Coordinates:
         return min(choices, key=lambda choice: choice[1])
 
     @classmethod
-    def given(cls, T: Array, waves: tuple[int, ...]) -> tuple[Coordinates, float]:
+    def unreduced(cls, T: Array, harmonics: tuple[int, ...]) -> tuple[Coordinates, float]:
         """Return those of Z^g itself, and the cost of their sum; infinite where the waves cancel."""
-        order = [*(i for i in range(len(T)) if i not in waves), *waves]
-        return cls(np.eye(len(T), dtype=np.int64), waves), _Factors.of(T[np.ix_(order, order)]).cost(len(T) - len(waves))
+        order = [*(i for i in range(len(T)) if i not in harmonics), *harmonics]
+        return cls(np.eye(len(T), dtype=np.int64), harmonics), _Factors.of(T[np.ix_(order, order)]).cost(len(T) - len(harmonics))
 
     @cached_property
     def gaussians(self) -> list[int]:
         """Return G, the coordinates that are not waves."""
-        return [i for i in range(len(self.U)) if i not in self.waves]
+        return [i for i in range(len(self.U)) if i not in self.harmonics]
 
     def form(self, T: Any) -> Any:
         """Return UTUᵀ."""
@@ -114,7 +114,7 @@ class Coordinates:
         """Return the members by δ_G and then by ε_F: those together that have the same Gaussians, and the same waves."""
         families: dict[Halves, dict[Halves, list[Member]]] = defaultdict(lambda: defaultdict(list))
         for place, (local, sign) in enumerate(self.characteristics(characteristics)):
-            delta_G, epsilon_F = tuple(local.delta[i] for i in self.gaussians), tuple(local.epsilon[i] for i in self.waves)
+            delta_G, epsilon_F = tuple(local.delta[i] for i in self.gaussians), tuple(local.epsilon[i] for i in self.harmonics)
             families[delta_G][epsilon_F].append((place, local, sign))
         return families
 
@@ -123,7 +123,7 @@ class Coordinates:
         return np.rint(np.linalg.inv(self.U).T).astype(np.int64)
 
 
-def _reduced(form: Array) -> Integers:
+def _reduce(form: Array) -> Integers:
     """Return a basis, as rows, in which no vector is shortened by a multiple of another; short vectors first."""
     U = np.eye(len(form), dtype=np.int64)
     gram, size = form.tolist(), len(form)
@@ -169,9 +169,9 @@ class _Factors:
         least = of_waves[0] ** 2 if len(of_waves) == 1 else float(np.linalg.eigvalsh(rest @ rest.T)[0]) if of_waves else math.inf
         if least < _WAVE_FLOOR:
             return math.inf
-        bells = _points(spread * x for spread, x in zip(self._spreads[:m], self._lengths[:m], strict=True))
-        waves = _points(RADIUS / x for x in of_waves)
-        return bells * waves + _BELL * bells + (_WAVE * waves if of_waves else 0.0)
+        gaussian_factors = _points(spread * x for spread, x in zip(self._spreads[:m], self._lengths[:m], strict=True))
+        harmonics = _points(RADIUS / x for x in of_waves)
+        return gaussian_factors * harmonics + _BELL * gaussian_factors + (_WAVE * harmonics if of_waves else 0.0)
 
 
 def points_within(form: Array, radius: float) -> float:
@@ -212,7 +212,7 @@ def _corners(size: int) -> Array:
     return corners
 
 
-def centred_points(form: Array, radius: float) -> Array:
+def points_near_cell(form: Array, radius: float) -> Array:
     """Return the k ∈ Z^d that matter to some r of the cell |r_i| ≤ ½: |k−r|² ≤ radius² + min_k |k−r|² in the norm of the form.
 
     Zero is no nearer than the nearest, so |k|² − 2k·r ≤ radius², whose least value over the cell is |k|² − Σ|(form k)_i|.

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.trigonometric_sums import turns, waves
+from veselova.analytic.arithmetic.trigonometric_sums import exponentials, turns
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.lattice import RADIUS, lattice_points, points_within, small_norm
@@ -82,9 +82,9 @@ class _Family:
         weights[: len(weights) // 2 * 2 : 2] += 1j * weights[1::2]
         return cls([place for place, _ in members], orders, weights[::2], float(np.sum(sizes)))
 
-    def along(self, z: Array) -> Complex:
+    def exponentials(self, z: Array) -> Complex:
         """Return e^{2πi x·z}, shape (X, N), at phases z (N, g)."""
-        return waves(turns(np.pi * z, int(np.max(np.abs(self.orders)))), self.orders)
+        return exponentials(turns(np.pi * z, int(np.max(np.abs(self.orders)))), self.orders)
 
     def values(self, sums: Complex) -> Array:
         """Return the functions, shape (N, len(places)), from their sums (M, N)."""
@@ -98,7 +98,7 @@ class Transforms:
     """
 
     def __init__(self, quotients: ThetaQuotients, rates: Array) -> None:
-        self._transform = _transform()
+        self._nufft = _load_nufft()
         self._quotients, self._rates, self._fastest = quotients, rates, int(np.argmax(np.abs(rates)))
         T = np.asarray(quotients.frame.periods.riemann_matrix, dtype=np.float64)
         expected = points_within(T, RADIUS) * len(quotients.functions)
@@ -139,36 +139,36 @@ class Transforms:
         counts = np.diff(borders)
         dense = (counts >= _FEWEST) & (np.abs(keys[borders[:-1]]) < _FARTHEST)
         single = np.repeat(~dense, counts)
-        values[single] = self._summed(z[single])
+        values[single] = self._sum(z[single])
         for rows in (slice(first, last) for first, last in zip(borders[:-1][dense], borders[1:][dense], strict=True)):
-            values[rows] = self._transformed(tau1[rows], z[rows])
+            values[rows] = self._transform(tau1[rows], z[rows])
         return self._quotients.attitude(values), self._rounding / np.abs(values[:, 0])
 
-    def _summed(self, z: Array) -> Array:
+    def _sum(self, z: Array) -> Array:
         """Return the functions by the sums as they are."""
         values = np.empty((len(z), len(self._quotients.functions)))
         for family in self._families:
             block = max(1, _BLOCK // len(family.orders))
             for first in range(0, len(z), block):
                 rows = slice(first, first + block)
-                values[rows, family.places] = family.values(family.weights @ family.along(z[rows]))
+                values[rows, family.places] = family.values(family.weights @ family.exponentials(z[rows]))
         return values
 
-    def _transformed(self, tau1: Array, z: Array) -> Array:
+    def _transform(self, tau1: Array, z: Array) -> Array:
         """Return the functions in one window by transforms around the time in its middle."""
         middle, rate = tau1.size // 2, self._rates[self._fastest]
         cycles = z[:, self._fastest] - z[middle, self._fastest]
         cycles += 2 * np.rint(((tau1 - tau1[middle]) * rate - cycles) / 2)
         values = np.empty((tau1.size, len(self._quotients.functions)))
         for family in self._families:
-            coefficients = family.weights * family.along(z[middle : middle + 1])[:, 0]
+            coefficients = family.weights * family.exponentials(z[middle : middle + 1])[:, 0]
             frequencies = np.pi * (family.orders @ self._rates)
-            sums = self._transform(frequencies, coefficients, cycles / rate, eps=_TOLERANCE, isign=1, nthreads=1)
+            sums = self._nufft(frequencies, coefficients, cycles / rate, eps=_TOLERANCE, isign=1, nthreads=1)
             values[:, family.places] = family.values(np.atleast_2d(sums))
         return values
 
 
-def _transform() -> Callable[..., Any]:
+def _load_nufft() -> Callable[..., Any]:
     """Return finufft's transform of type 3 in one dimension."""
     try:
         from finufft import nufft1d3

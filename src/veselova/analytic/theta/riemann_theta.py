@@ -27,10 +27,10 @@ from veselova.analytic.theta.lattice import (
     RADIUS,
     Coordinates,
     Member,
-    centred_points,
     half_of,
     largest_corner,
     lattice_points,
+    points_near_cell,
     schur,
 )
 from veselova.analytic.theta.theta_tables import SIGNS, Blocks, Family, Group, in_blocks
@@ -62,7 +62,7 @@ class Theta:
     """The theta functions of T, shape (g, g); ``waves`` is the set F of the sum over Z^g, None for the cheapest accurate one."""
 
     T: Array
-    waves: tuple[int, ...] | None = None
+    harmonics: tuple[int, ...] | None = None
 
     @property
     def genus(self) -> int:
@@ -71,7 +71,7 @@ class Theta:
 
     @cached_property
     def _chosen(self) -> tuple[Coordinates, float]:
-        return Coordinates.cheapest(self.T) if self.waves is None else Coordinates.given(self.T, self.waves)
+        return Coordinates.cheapest(self.T) if self.harmonics is None else Coordinates.unreduced(self.T, self.harmonics)
 
     @property
     def coordinates(self) -> Coordinates:
@@ -80,7 +80,7 @@ class Theta:
 
     @cached_property
     def _split(self) -> tuple[list[int], list[int]]:
-        return list(self.coordinates.waves), self.coordinates.gaussians
+        return list(self.coordinates.harmonics), self.coordinates.gaussians
 
     @cached_property
     def _to_coordinates(self) -> Array:
@@ -97,7 +97,7 @@ class Theta:
     @cached_property
     def _gaussian_lattice(self) -> Array:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
-        return centred_points(self._parts[2], RADIUS)
+        return points_near_cell(self._parts[2], RADIUS)
 
     @cached_property
     def _of_cell(self) -> tuple[Array, Array]:
@@ -116,7 +116,7 @@ class Theta:
     @cached_property
     def size(self) -> int:
         """Return the number of lattice terms for characteristic zero."""
-        of_zero = self._crossings(frozenset({0}))[1][0]
+        of_zero = self._cross_terms(frozenset({0}))[1][0]
         return len(self._gaussian_lattice) * (of_zero.stop - of_zero.start)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
@@ -127,7 +127,7 @@ class Theta:
         wanted, y = tuple(characteristics), (z - 2 * np.rint(z / 2)) @ self._to_coordinates
         if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
             blocks = self._blocks(wanted)
-            return blocks.values(*self._bells(y, blocks.shifts))
+            return blocks.values(*self._gaussian_factors(y, blocks.shifts))
         result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)
         block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
         at_once = max(1, block // max(len(z), 1))  # groups, of few points
@@ -139,13 +139,13 @@ class Theta:
 
     def _fill(self, groups: list[Group], y: Array, result: Array) -> None:
         """Write the values of some groups at points y (N, g) to their places, the rows of the result."""
-        bells, angles, nearest = self._bells(y, np.array([group.delta_G for group in groups]))
+        gaussian_factors, angles, nearest = self._gaussian_factors(y, np.array([group.delta_G for group in groups]))
         for k, group in enumerate(groups):
             half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
             signs = group.signs[:, None] * SIGNS[half_turns & 1]
-            result[group.places] = group.sums(bells[k], angles[k]) * signs
+            result[group.places] = group.sums(gaussian_factors[k], angles[k]) * signs
 
-    def _bells(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
+    def _gaussian_factors(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
         """Return (e^{−π|k−r|²}, π(y_F − Cr), n), k on the Gaussian lattice, with y_G + δ_G = n + r, r in the cell around zero.
 
         ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |F|) and (P, N, |G|).
@@ -171,7 +171,7 @@ class Theta:
 
     def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         """Return the tables of all characteristics at once."""
-        return _kept(self._blocked, characteristics, self._side_by_side, Blocks.of)
+        return _keep_tables(self._blocked, characteristics, self._side_by_side, Blocks.of)
 
     @cached_property
     def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks]:
@@ -180,12 +180,12 @@ class Theta:
     def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         local, signs = zip(*self.coordinates.characteristics(characteristics), strict=True)
         deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
-        shifts, (of, doubled, turned) = list(dict.fromkeys(deltas)), self._turned(local)
+        shifts, (of, doubled, rotated) = list(dict.fromkeys(deltas)), self._characteristic_phases(local)
         blocks = np.array([shifts.index(delta) for delta in deltas])
         return Blocks(
             np.array(shifts, dtype=float) / 2,
             in_blocks(doubled, blocks[of], len(shifts)),
-            in_blocks(np.concatenate([turned.real, -turned.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
+            in_blocks(np.concatenate([rotated.real, -rotated.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
             np.flatnonzero(np.diff(of, prepend=-1)),
             in_blocks(self._parities(local).T, blocks, len(shifts)),
             self._parts[3] * np.array(signs)[:, None],
@@ -193,7 +193,7 @@ class Theta:
 
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         """Return the families by δ_G."""
-        return _kept(self._grouped, characteristics, self._by_shift, _part)
+        return _keep_tables(self._grouped, characteristics, self._by_shift, _part)
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[Group]]:
@@ -202,7 +202,7 @@ class Theta:
     def _by_shift(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         families = self.coordinates.families(characteristics).items()
         members = [c for _, of in families for given in of.values() for _, c, _ in given]
-        self._crossings(frozenset(self._codes(members)))  # at once
+        self._cross_terms(frozenset(self._codes(members)))  # at once
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
     def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
@@ -216,33 +216,35 @@ class Theta:
         return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
 
     def _family(self, members: list[Characteristic]) -> Family:
-        of, doubled, turned = self._turned(members)
-        each = turned.reshape(len(turned), len(members), -1)
+        of, doubled, rotated = self._characteristic_phases(members)
+        each = rotated.reshape(len(rotated), len(members), -1)
         parts = [each.real, -each.imag] if self._split[0] else [each.real]
-        tables = np.stack(parts, axis=2).reshape(len(turned), -1)
+        tables = np.stack(parts, axis=2).reshape(len(rotated), -1)
         return Family(doubled[of == 0], np.ascontiguousarray(tables.T))
 
-    def _turned(self, members: Sequence[Characteristic]) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
+    def _characteristic_phases(
+        self, members: Sequence[Characteristic]
+    ) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
         """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
         (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
         F = self._split[0]
         codes = self._codes(members)
-        doubled, places, crossings = self._crossings(frozenset(codes))
+        doubled, places, cross_terms = self._cross_terms(frozenset(codes))
         ranges = [places[code] for code in codes]
-        of, waves = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
+        of, harmonics = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
         delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
         signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
-        doubled = doubled[waves]
-        turned = crossings[:, waves]
-        turned *= signs[:, of]
-        turned *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
-        return of, doubled, turned
+        doubled = doubled[harmonics]
+        rotated = cross_terms[:, harmonics]
+        rotated *= signs[:, of]
+        rotated *= _QUARTER_TURNS[(doubled * delta[of]).sum(axis=1) % 4]
+        return of, doubled, rotated
 
     def _codes(self, members: Sequence[Characteristic]) -> list[int]:
         """Return the bits of 2ε_F of each."""
         return [sum(c.epsilon[i] << place for place, i in enumerate(self._split[0])) for c in members]
 
-    def _crossings(self, wanted: frozenset[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+    def _cross_terms(self, wanted: frozenset[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
         """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
 
         ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
@@ -251,29 +253,29 @@ class Theta:
         if (classes := 2 ** len(self._split[0])) <= _FEW_CLASSES:
             wanted = frozenset(range(classes))
         known = list(self._crossed)  # a copy: another thread may add to them
-        if (found := next((kept for kept in known if wanted <= kept), None)) is not None:
+        if (found := next((selected for selected in known if wanted <= selected), None)) is not None:
             return self._crossed[found]
-        self._crossed[wanted] = self._formed(sorted(wanted))
+        self._crossed[wanted] = self._form_cross_terms(sorted(wanted))
         return self._crossed[wanted]
 
-    def _formed(self, codes: list[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+    def _form_cross_terms(self, codes: list[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
         """Return the ``_crossings`` of these codes and no others."""
         S, C, _, _ = self._parts
-        doubled = half_of(self._doubled_points(codes))
+        doubled = half_of(self._double_points(codes))
         of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
         norms = ((x @ S) * x).sum(axis=1)
         least = np.full(2 ** len(S), -np.inf)
         least[codes] = np.inf
         np.minimum.at(least, of, norms)
-        kept = norms <= RADIUS**2 + least[of]
-        order = np.flatnonzero(kept)[np.argsort(of[kept], kind="stable")]
+        selected = norms <= RADIUS**2 + least[of]
+        order = np.flatnonzero(selected)[np.argsort(of[selected], kind="stable")]
         doubled, x = doubled[order], x[order]
         weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
         firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
         places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
         return doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
 
-    def _doubled_points(self, codes: list[int]) -> NDArray[np.int64]:
+    def _double_points(self, codes: list[int]) -> NDArray[np.int64]:
         """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent finds all of them at once."""
         S, bits = self._parts[0], np.arange(len(self._parts[0]))
         # No point of space is farther from a lattice than a corner of its cell is from the middle.
@@ -287,7 +289,7 @@ class Theta:
         return {}
 
 
-def _kept(
+def _keep_tables(
     tables: dict[tuple[Characteristic, ...], K],
     wanted: tuple[Characteristic, ...],
     made: Callable[[tuple[Characteristic, ...]], K],
@@ -296,7 +298,7 @@ def _kept(
     """Return the tables of characteristics: those that are kept, a part of those of more of them, or those that are made."""
     if (found := tables.get(wanted)) is None:
         each, known = set(wanted), list(tables)  # a copy: another thread may add to them
-        more = next((kept for kept in known if each <= set(kept)), None) if len(each) == len(wanted) else None
+        more = next((selected for selected in known if each <= set(selected)), None) if len(each) == len(wanted) else None
         found = made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
         tables[wanted] = found
     return found

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.theta.characteristic import Characteristic
-from veselova.analytic.theta.lattice import Coordinates, Halves, Member, centred_points, half_of, lattice_points, small_norm
+from veselova.analytic.theta.lattice import Coordinates, Halves, Member, half_of, lattice_points, points_near_cell, small_norm
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["EnclosedTheta"]
+__all__ = ["ThetaInBalls"]
 
 Array = NDArray[np.float64]
 
@@ -29,14 +29,14 @@ _BEYOND_PRECISION = 4.0
 _MOST_TERMS = 300_000
 
 
-class EnclosedTheta:
+class ThetaInBalls:
     """The theta functions of T, shape (g, g), balls of ``arithmetic``. What is left out of the sums is estimated, not bounded."""
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
         self._xp, self._coordinates = arithmetic, Coordinates.cheapest(_symmetric(T))[0]
         self._T = self._coordinates.form(T)
-        self._F, self._G = list(self._coordinates.waves), self._coordinates.gaussians
-        self._crossings: dict[tuple[int, ...], tuple[NDArray[np.int64], Values]] = {}
+        self._F, self._G = list(self._coordinates.harmonics), self._coordinates.gaussians
+        self._cross_terms: dict[tuple[int, ...], tuple[NDArray[np.int64], Values]] = {}
         if self.size > _MOST_TERMS:
             raise Unsolved("narrow-gap", f"theta sums of {arithmetic.digits} digits would have {self.size} terms at this gap")
 
@@ -66,7 +66,7 @@ class EnclosedTheta:
     @cached_property
     def _gaussian_lattice(self) -> NDArray[np.int64]:
         """Return the k that matter for some y_G in the unit cell around zero, shape (K, |G|)."""
-        return centred_points(_symmetric(self._parts[2]), self._radius).astype(np.int64)
+        return points_near_cell(_symmetric(self._parts[2]), self._radius).astype(np.int64)
 
     def _wave_lattice(self, epsilon_F: tuple[int, ...]) -> NDArray[np.int64]:
         """Return 2x for one of each pair ±x that matters, shape (X, |F|)."""
@@ -82,24 +82,24 @@ class EnclosedTheta:
         result, z = np.empty((len(z), len(characteristics)), dtype=object), self._coordinates.points(z)
         for delta_G, families in self._coordinates.families(characteristics).items():
             self._fill(result, z, delta_G, families)
-        return np.asarray(self._xp.widened(result, np.abs(result[:, :1]) * self._xp.epsilon))
+        return np.asarray(self._xp.add_error(result, np.abs(result[:, :1]) * self._xp.epsilon))
 
     def _fill(self, result: Values, z: Values, delta_G: Halves, families: Mapping[Halves, Sequence[Member]]) -> None:
         """Write the values of the characteristics with one δ_G, which share their Gaussians, to their places."""
         xp, F, G = self._xp, self._F, self._G
-        heights, common, r, nearest = self._bells(z, delta_G)
+        heights, common, r, nearest = self._gaussian_factors(z, delta_G)
         x, tables = (list(parts) for parts in zip(*map(self._crossing, families), strict=True))
         table = np.concatenate(tables, axis=1)
         # Classes of k; for each family the real parts of its x, then the imaginary ones; points.
         products = np.stack([xp.product(heights[:, rows], table[rows]).T for _, rows in self._classes])
         # 2x is whole for every characteristic, so turns of half of y_F have whole powers.
         y_F = z[:, F] - (r @ self._parts[1].T if F and G else 0)
-        waves = xp.waves(np.concatenate(x), xp.turns(y_F / 2)) if F else None
+        harmonics = xp.exponentials(np.concatenate(x), xp.turns(y_F / 2)) if F else None
         first = 0
         for orders, members in zip(x, families.values(), strict=True):
             rows, first = slice(first, first + len(orders)), first + len(orders)
             real, imaginary = np.split(products[:, 2 * rows.start : 2 * rows.stop], 2, axis=1)
-            sums = _Sums(orders, real, imaginary, waves and (waves[0][rows], waves[1][rows]))
+            sums = _Sums(orders, real, imaginary, harmonics and (harmonics[0][rows], harmonics[1][rows]))
             for place, characteristic, sign in members:
                 epsilon, delta = _at(characteristic.epsilon, G), _at(characteristic.delta, F)
                 values = common * sums.of([-1 if parity @ epsilon % 2 else 1 for parity, _ in self._classes], delta)
@@ -113,7 +113,7 @@ class EnclosedTheta:
         parities, which = np.unique(self._gaussian_lattice % 2, axis=0, return_inverse=True)
         return [(parity, np.flatnonzero(which.ravel() == place)) for place, parity in enumerate(parities)]
 
-    def _bells(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values, NDArray[np.float64]]:
+    def _gaussian_factors(self, z: Values, delta: tuple[int, ...]) -> tuple[Values, Values, Values, NDArray[np.float64]]:
         """Return (e^{2π kᵀT_GG⁻¹r}, k on the Gaussian lattice, e^{−π rᵀT_GG⁻¹r}, r, n) with y_G = n + r."""
         xp = self._xp
         if not self._G:
@@ -130,17 +130,17 @@ class EnclosedTheta:
 
         w_x e^{−πxᵀSx − πkᵀT_GG⁻¹k} e^{2πi x·Ck}, w = 1 at zero and 2 elsewhere, side by side, shape (K, 2X).
         """
-        if epsilon_F not in self._crossings:
+        if epsilon_F not in self._cross_terms:
             xp, (S, C, inverse) = self._xp, self._parts
             k, x = self._gaussian_lattice, self._wave_lattice(epsilon_F)
-            bells = xp.exp(-xp.pi * np.sum((k @ inverse) * k, axis=1))[:, None] if self._G else xp.array([[1]])
-            weights = bells * (xp.exp(-xp.pi * np.sum((x @ S) * x, axis=1) / 4) if self._F else 1)
+            gaussian_factors = xp.exp(-xp.pi * np.sum((k @ inverse) * k, axis=1))[:, None] if self._G else xp.array([[1]])
+            weights = gaussian_factors * (xp.exp(-xp.pi * np.sum((x @ S) * x, axis=1) / 4) if self._F else 1)
             weights = weights * np.where(np.any(x != 0, axis=1), 2, 1)
             cosines, sines = weights, 0 * weights
             if self._F and self._G:
-                cosines, sines = (weights * wave.T for wave in xp.waves(x, xp.turns((k @ C.T) / 2)))
-            self._crossings[epsilon_F] = x, np.concatenate([cosines, sines], axis=1)
-        return self._crossings[epsilon_F]
+                cosines, sines = (weights * wave.T for wave in xp.exponentials(x, xp.turns((k @ C.T) / 2)))
+            self._cross_terms[epsilon_F] = x, np.concatenate([cosines, sines], axis=1)
+        return self._cross_terms[epsilon_F]
 
 
 class _Sums:
@@ -149,8 +149,10 @@ class _Sums:
     orders (X, |F|): 2x · real, imaginary (classes, X, N): R and I · waves (X, N) each: cos and sin 2πx·y_F, None without F
     """
 
-    def __init__(self, orders: NDArray[np.int64], real: Values, imaginary: Values, waves: tuple[Values, Values] | None) -> None:
-        self._real, self._imaginary, self._waves = real, imaginary, waves
+    def __init__(
+        self, orders: NDArray[np.int64], real: Values, imaginary: Values, harmonics: tuple[Values, Values] | None
+    ) -> None:
+        self._real, self._imaginary, self._harmonics = real, imaginary, harmonics
         quarters, which = np.unique(orders % 4, axis=0, return_inverse=True)
         self._quarters, self._rows = quarters, [np.flatnonzero(which.ravel() == place) for place in range(len(quarters))]
         self._parts: dict[bool, list[list[Values]]] = {}
@@ -158,7 +160,7 @@ class _Sums:
     def of(self, signs: list[int], delta: NDArray[np.int64]) -> Values:
         """Return the sums over all classes of k, with signs, and over x, with 2δ_F; shape (N,)."""
         turns = self._quarters @ delta % 4
-        parts = self._turned(bool(turns[0] % 2))  # 2x is odd or even as ε_F is, so all turns are
+        parts = self._characteristic_sums(bool(turns[0] % 2))  # 2x is odd or even as ε_F is, so all turns are
         total: Any = 0
         for sign, of_class in zip(signs, parts, strict=True):
             for turn, part in zip(turns, of_class, strict=True):
@@ -166,12 +168,12 @@ class _Sums:
                 total = total - part if (sign < 0) != (turn > 1) else total + part
         return np.asarray(total)
 
-    def _turned(self, odd: bool) -> list[list[Values]]:
+    def _characteristic_sums(self, odd: bool) -> list[list[Values]]:
         """Return the sums over the x alike modulo two, of each class of k; of i times the terms where ``odd``."""
         if odd not in self._parts:
             terms = self._real
-            if self._waves is not None:
-                cosines, sines = self._waves
+            if self._harmonics is not None:
+                cosines, sines = self._harmonics
                 real, imaginary = self._real, self._imaginary
                 terms = -(sines * real + cosines * imaginary) if odd else cosines * real - sines * imaginary
             self._parts[odd] = [[np.sum(of_class[rows], axis=0) for rows in self._rows] for of_class in terms]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from veselova.analytic.theta.lattice import RADIUS, centred_points, largest_corner, points_within
+from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
 from veselova.analytic.theta.siegel_reduction import SiegelReduction
 
 __all__ = ["SiegelTheta"]
@@ -141,7 +141,7 @@ class SiegelTheta:
     @cached_property
     def _table(self) -> _Table:
         tau = self.reduction.tau.astype(complex)
-        return _Table.of(tau, centred_points(tau.imag, RADIUS))
+        return _Table.of(tau, points_near_cell(tau.imag, RADIUS))
 
     def values(self, z: Complex, characteristics: Array, order: int) -> tuple[Complex, Array, Array]:
         """Return the derivatives of one order (0, 1 or 2) at points z (N, g) for characteristics (C, 2, g).

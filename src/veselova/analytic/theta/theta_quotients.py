@@ -20,7 +20,7 @@ from veselova.analytic.attitude.frame import Attitude, Frame, slopes
 from veselova.analytic.curve.hyperelliptic import BranchPoint, places_of
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
-from veselova.analytic.theta.riemann_theta_balls import EnclosedTheta
+from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["ThetaQuotients"]
@@ -42,7 +42,7 @@ class ThetaQuotients:
     ``at_half_periods``: the attitudes at the frame's half periods, where they are known already · ``cost``: ``Theta.cost``.
     """
 
-    theta: Theta | EnclosedTheta
+    theta: Theta | ThetaInBalls
     frame: Frame
     at_half_periods: Attitude | None = None
     cost: float = math.inf
@@ -130,7 +130,7 @@ class ThetaQuotients:
         off = DOUBLE.epsilon * max(1.0, float(np.max(periods.cancellation))) * float(np.max(np.abs(T)))
         return off / (math.e * float(np.linalg.eigvalsh(T)[0]))
 
-    def stretch(self, z: Array) -> Array:
+    def time_rate(self, z: Array) -> Array:
         """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a constant, and never zero.
 
         For (q,Aq) = Π λ_s/Π I_i, and Π_s (λ_s − b) is a constant times (θ[η(b)]/θ)² at every branch point b.

@@ -41,9 +41,9 @@ class Family:
         lattice = self.tables.shape[1]
         return Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
 
-    def sums(self, bells: Array, along: Array) -> Array:
+    def sums(self, gaussian_factors: Array, along: Array) -> Array:
         """Return the sums without their signs, shape (M, N); ``along`` (W, N): cosines of each x, then sines."""
-        weighted = (self.tables @ bells.T).reshape(-1, *along.shape)
+        weighted = (self.tables @ gaussian_factors.T).reshape(-1, *along.shape)
         return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
 
 
@@ -62,17 +62,17 @@ class Group:
 
     def of(self, places: Mapping[int, int]) -> Group | None:
         """Return the group of the members at some places, the keys, with their new places; None where it has none of them."""
-        kept = [i for i, place in enumerate(self.places) if place in places]
-        if not kept:
+        selected = [i for i, place in enumerate(self.places) if place in places]
+        if not selected:
             return None
         families, first = [], 0
         for family in self.families:
             last = first + family.size
-            members = [i - first for i in kept if first <= i < last]
+            members = [i - first for i in selected if first <= i < last]
             families += [family.of(members)] if members else []
             first = last
-        new = [places[self.places[i]] for i in kept]
-        return Group(self.delta_G, families, new, self.parities[:, kept], self.signs[kept])
+        new = [places[self.places[i]] for i in selected]
+        return Group(self.delta_G, families, new, self.parities[:, selected], self.signs[selected])
 
     @cached_property
     def _orders(self) -> NDArray[np.int64]:
@@ -82,14 +82,14 @@ class Group:
     def _highest(self) -> int:
         return int(np.max(np.abs(self._orders), initial=0))
 
-    def sums(self, bells: Array, angles: Array) -> Array:
+    def sums(self, gaussian_factors: Array, angles: Array) -> Array:
         """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
         if not angles.shape[1]:
-            return np.concatenate([family.tables @ bells.T for family in self.families])
+            return np.concatenate([family.tables @ gaussian_factors.T for family in self.families])
         along, result, first = waves_at(angles, self._orders, self._highest), [], 0
         for family in self.families:
             last = first + len(family.orders)
-            result.append(family.sums(bells, along[:, first:last].reshape(-1, len(angles))))
+            result.append(family.sums(gaussian_factors, along[:, first:last].reshape(-1, len(angles))))
             first = last
         return np.concatenate(result)
 
@@ -116,18 +116,18 @@ class Blocks:
         """Return the tables of some members."""
         ends = np.append(self.firsts, len(self.orders))
         counts = np.diff(ends)[members]
-        waves = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in members])
-        tables = np.concatenate([part[waves] for part in np.split(self.tables, 2)])
+        harmonics = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in members])
+        tables = np.concatenate([part[harmonics] for part in np.split(self.tables, 2)])
         return Blocks(
-            self.shifts, self.orders[waves], tables, np.cumsum(counts) - counts, self.parities[members], self.signs[members]
+            self.shifts, self.orders[harmonics], tables, np.cumsum(counts) - counts, self.parities[members], self.signs[members]
         )
 
-    def values(self, bells: Array, angles: Array, nearest: Array) -> Array:
+    def values(self, gaussian_factors: Array, angles: Array, nearest: Array) -> Array:
         """Return the theta functions, (N, M), from (P, N, K), (P, N, |F|) and (P, N, |G|): see ``Theta``."""
-        phases, terms = self.orders @ _stacked(angles), self.tables @ _stacked(bells)
+        phases, terms = self.orders @ _stack_blocks(angles), self.tables @ _stack_blocks(gaussian_factors)
         sums = terms[: len(phases)] * np.cos(phases)
         sums += terms[len(phases) :] * np.sin(phases)
-        half_turns = (self.parities @ _stacked(nearest)).astype(np.int64)
+        half_turns = (self.parities @ _stack_blocks(nearest)).astype(np.int64)
         result: Array = np.add.reduceat(sums, self.firsts, axis=0)
         result *= self.signs * SIGNS[half_turns & 1]
         return result.T
@@ -140,6 +140,6 @@ def in_blocks(rows: NDArray[Any], blocks: NDArray[np.intp], count: int) -> Array
     return result.reshape(len(rows), -1)
 
 
-def _stacked(given: Array) -> Array:
+def _stack_blocks(given: Array) -> Array:
     """Return the blocks (P, N, d) of N points below each other, one column each, shape (P·d, N)."""
     return given.swapaxes(1, 2).reshape(-1, given.shape[1])

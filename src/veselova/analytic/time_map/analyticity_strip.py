@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.spectrum.branch_points import Spectrum
-from veselova.analytic.time_map.rate import STRETCH_POWERS, ClockRate
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 
 __all__ = ["Orbit"]
 
@@ -42,10 +42,10 @@ class Orbit:
     """
 
     spectrum: Spectrum
-    rate: ClockRate
+    rate: TimeRate
     start: Values
     frequencies: Values
-    stretch: Callable[[Values], Values] | None
+    time_rate: Callable[[Values], Values] | None
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
     def phases(self, tau1: Values) -> Values:
@@ -56,20 +56,20 @@ class Orbit:
     def rates(self, tau1: Values) -> Values:
         """Return d(time)/dτ₁ at Neumann times (N,)."""
         z = self.phases(tau1)
-        if self.stretch is None:
+        if self.time_rate is None:
             return self.rate.at(self.rate.inversion.invert(z))
-        return np.asarray(self._unit * self.stretch(z) ** self._power)
+        return np.asarray(self._unit * self.time_rate(z) ** self._power)
 
     @property
     def _power(self) -> int:
-        return STRETCH_POWERS[self.rate.time]
+        return TIME_RATE_POWERS[self.rate.time]
 
     @cached_property
     def _unit(self) -> Any:
         """Return d(time)/dτ₁ over its power of the stretch, from the start."""
-        assert self.stretch is not None
-        at_start = self.stretch(self.start[None, :])[0] ** self._power
-        return 1 / (self.rate.inversion.arithmetic.number(self.spectrum.clock_rate) * at_start)
+        assert self.time_rate is not None
+        at_start = self.time_rate(self.start[None, :])[0] ** self._power
+        return 1 / (self.rate.inversion.arithmetic.number(self.spectrum.time_rate) * at_start)
 
     @cached_property
     def strip(self) -> tuple[float, Any]:

@@ -49,12 +49,12 @@ class Panels:
         zero = int(np.searchsorted(borders, 0.0))
         slopes = coefficients[order] * (lengths / 2)[:, None]
         integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
-        integrals[:, 0], integrals[:, 1, :-1] = _integrated(slopes), slopes
+        integrals[:, 0], integrals[:, 1, :-1] = _integrate_series(slopes), slopes
         over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
         # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the mean.
         count = slopes.shape[1]
         left_out = (np.maximum(tails[order], TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
-        values, tails_from_zero = (_summed(summands, zero) for summands in (over_panels, left_out))
+        values, tails_from_zero = (_sum_panels(summands, zero) for summands in (over_panels, left_out))
         return cls(borders, lengths, integrals, values, tails_from_zero, float(sizes @ lengths / np.sum(lengths)))
 
     @property
@@ -97,17 +97,17 @@ class Panels:
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
         """Return the integral from the panel's left border to x, and its derivative in x."""
         angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
-        waves = np.cos(np.arange(self.integrals.shape[2]) * angle[:, None])
-        value, slope = (self.integrals[panel] @ waves[:, :, None])[:, :, 0].T
+        exponentials = np.cos(np.arange(self.integrals.shape[2]) * angle[:, None])
+        value, slope = (self.integrals[panel] @ exponentials[:, :, None])[:, :, 0].T
         return value, slope
 
 
-def _summed(over_panels: Array, zero: int) -> Array:
+def _sum_panels(over_panels: Array, zero: int) -> Array:
     """Return the sums at the borders, 0 at number ``zero``: outwards from it, so that far ones do not round near ones."""
     return np.concatenate([-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])])
 
 
-def _integrated(coefficients: Array) -> Array:
+def _integrate_series(coefficients: Array) -> Array:
     """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} − c_{k+1})/2k, c_0 doubled."""
     count = coefficients.shape[1]
     padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)

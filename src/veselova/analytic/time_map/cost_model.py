@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs", "expected_modes"]
+__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs", "estimate_modes"]
 
 #: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one rounding of them is below 1e-13.
 GUARDED_FROM = 200.0
@@ -52,7 +52,7 @@ _LONG_STRETCH, _PROBES, _LONGER_PANELS = 80.0, 48.0, 0.4
 _PANEL_INVERSION, _PANEL_MARGIN = 3e-6, 1.0
 
 
-def expected_modes(genus: int, log_determinant: float) -> float:
+def estimate_modes(genus: int, log_determinant: float) -> float:
     """Return about how many modes the Fourier clock has, for the Riemann matrix iT with log det T."""
     exponent = genus * math.log(_EXPONENT / math.pi) - log_determinant
     return _BODY.get(genus, _HIGH_BODY) * math.exp(exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT)
@@ -70,15 +70,15 @@ class Costs:
     cycles: float
     in_angles: bool = False
 
-    def fewest_in_window(self, nodes: int, clock: str) -> int:
+    def fewest_in_window(self, nodes: int, time_map: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""
-        inversion = _INVERSION + self.modes * _MODE_INVERTED if clock == "fourier" else _PANEL_INVERSION
+        inversion = _INVERSION + self.modes * _MODE_INVERTED if time_map == "fourier" else _PANEL_INVERSION
         evaluation = _EVALUATION.get(self.genus, _HIGH_EVALUATION)
         return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
 
-    def seconds(self, clock: str, inversions: int) -> float:
+    def seconds(self, time_map: str, inversions: int) -> float:
         """Return the seconds of a clock that is inverted so often; infinite where it is not taken of its own accord."""
-        if clock == "fourier":
+        if time_map == "fourier":
             of_modes = self.modes * (_MODE + inversions * _MODE_INVERTED)
             return _MODES + of_modes + inversions * _INVERSION if self.modes <= _MOST_MODES else math.inf
         if self.cycles > PANEL_CYCLES:
@@ -98,7 +98,7 @@ class Costs:
 
         Not ``keeping``: the cheaper there too, as next to a separatrix, where modes are many and take more nodes each.
         """
-        fourier, panels = (self.seconds(clock, inversions) for clock in ("fourier", "panels"))
+        fourier, panels = (self.seconds(time_map, inversions) for time_map in ("fourier", "panels"))
         keeps = keeping and self.cycles > GUARDED_FROM and self.genus <= _GUARDED_GENUS and fourier < math.inf
         beyond = panels == math.inf and self.genus <= _LAST_RESORT_GENUS
         return "fourier" if keeps or beyond or fourier < panels else "panels"

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.trigonometric_sums import waves_at
 from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor, increasing_root
-from veselova.analytic.time_map.fourier_modes import Integers, grown
+from veselova.analytic.time_map.fourier_modes import Integers, find_significant_modes
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import Clock, Rate
+from veselova.analytic.time_map.rate import TimeMap, TorusRate
 
-__all__ = ["ColumnsForModes", "FourierClock", "significant_modes"]
+__all__ = ["ColumnsForModes", "FourierTimeMap", "find_modes"]
 
 Array = NDArray[np.float64]
 
@@ -57,13 +57,13 @@ _BLOCK = 32_000
 _OPEN, _SETTLED = 1e-17, 1e-9
 
 
-class FourierClock(Clock):
+class FourierTimeMap(TimeMap):
     """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ − t/F_0 stays bounded."""
 
     name: ClassVar[str] = "fourier"
 
-    def __init__(self, rate: Rate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
-        modes, coefficients, edge, self._off = significant_modes(rate)
+    def __init__(self, rate: TorusRate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
+        modes, coefficients, edge, self._off = find_modes(rate)
         order = np.argsort(-np.abs(coefficients))
         modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
@@ -92,7 +92,7 @@ class FourierClock(Clock):
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
         self._longest = 1 / np.maximum(np.abs(np.concatenate([pace / 2, np.pi * at_edge])), np.finfo(float).tiny)
         self._longest_of_all = float(np.max(self._longest, initial=0.0))
-        self._settled = self._last_step(coefficients, pace)
+        self._converged = self._last_step(coefficients, pace)
 
     @property
     def size(self) -> int:
@@ -116,14 +116,14 @@ class FourierClock(Clock):
         for as long. Errors of different modes add in squares. To these comes one rounding of δ.
         """
         elapsed = max(abs(tau1.item(0)), abs(tau1.item(-1)))
-        of_all, sway = self._swayed if elapsed > self._longest_of_all else self._swayed_for(elapsed)
+        of_all, sway = self._swayed if elapsed > self._longest_of_all else self._bound_modes(elapsed)
         return of_all + float(sway @ of_start), float(sway @ of_rates)
 
     @cached_property
     def _swayed(self) -> tuple[float, Array]:
-        return self._swayed_for(np.inf)
+        return self._bound_modes(np.inf)
 
-    def _swayed_for(self, elapsed: float) -> tuple[float, Array]:
+    def _bound_modes(self, elapsed: float) -> tuple[float, Array]:
         """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
         lengths = np.minimum(self._longest, elapsed)
         of_modes = self._off * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
@@ -157,7 +157,7 @@ class FourierClock(Clock):
             delta = np.maximum(
                 np.minimum(-value / np.maximum(fourth_order_divisor(value, *rise), _LEAST_SLOPE * mean), reach), -reach
             )
-        delta = increasing_root(excess, delta, -reach, reach, self._settled, _SETTLED / self._fastest)
+        delta = increasing_root(excess, delta, -reach, reach, self._converged, _SETTLED / self._fastest)
         z = self._in_time.start + uniform + delta[:, None] * rates
         return times / mean + delta, z[:, : self._genus]
 
@@ -217,7 +217,7 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
-def significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float]:
+def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
     """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0 and above its rounding, F_m, the modes
     next to them, and by what part of F_0 each is off.
 
@@ -239,7 +239,7 @@ def significant_modes(rate: Rate[Any]) -> tuple[Integers, Array, Integers, float
         values = float(rate.scale) / mean * np.stack([np.linalg.det(matrices), off])
         return values.T, np.abs(values[0]) > np.maximum(_SMALLEST_MODE, values[1])
 
-    modes, values, edge = grown(rate.inversion.periods.genus, determinants)
+    modes, values, edge = find_significant_modes(rate.inversion.periods.genus, determinants)
     return modes, mean * values[:, 0], edge, max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2)
 
 
@@ -249,7 +249,7 @@ class ColumnsForModes(Generic[T]):
     ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may turn by one of ψ
     """
 
-    def __init__(self, rate: Rate[Any], made: Callable[[Values, Values, int], T]) -> None:
+    def __init__(self, rate: TorusRate[Any], made: Callable[[Values, Values, int], T]) -> None:
         self._rate, self._made = rate, made
         self._form(0.0)
 

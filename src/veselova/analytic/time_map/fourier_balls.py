@@ -15,9 +15,9 @@ from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_o
 from veselova.analytic.numerics.monotone_root import Rows, doublings, increasing_root, interval_step
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.fourier import ColumnsForModes
-from veselova.analytic.time_map.fourier_modes import grown
+from veselova.analytic.time_map.fourier_modes import find_significant_modes
 
-__all__ = ["MOST_MODES", "EnclosedFourier"]
+__all__ = ["MOST_MODES", "FourierTimeMapInBalls"]
 
 #: Modes looked at before giving up: minutes.
 MOST_MODES = 200_000
@@ -33,7 +33,7 @@ _MODE_DIGITS, _SLOPE_DIGITS = 2, 2
 _TAIL = 4
 
 
-class EnclosedFourier:
+class FourierTimeMapInBalls:
     """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is left out is estimated."""
 
     name = "fourier"
@@ -42,13 +42,13 @@ class EnclosedFourier:
         self._orbit = orbit
         xp: Any = orbit.rate.inversion.arithmetic
         self._xp, self._mean = xp, orbit.rate.mean
-        self._modes, coefficients, edge = self._significant()
+        self._modes, coefficients, edge = self._select_modes()
         rates = self._modes @ orbit.frequencies
         self._amplitudes, self._slopes = coefficients / (xp.pi * rates), 2 * coefficients
-        self._bend = np.sum(xp.at_most(2 * xp.pi * rates * self._slopes))
+        self._bend = np.sum(xp.upper_bound(2 * xp.pi * rates * self._slopes))
         fastest = 2 * xp.pi * np.max(np.abs(orbit.frequencies.astype(float)))
         #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
-        self._weights = np.maximum(xp.at_most(self._slopes), xp.at_most(fastest * self._amplitudes)) / self._mean
+        self._weights = np.maximum(xp.upper_bound(self._slopes), xp.upper_bound(fastest * self._amplitudes)) / self._mean
         #: 1/|m·f| of those kept and of those next to them.
         self._slowness = np.abs(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)).astype(float)
 
@@ -61,7 +61,7 @@ class EnclosedFourier:
     def _smallest(self) -> Any:
         return self._mean * self._xp.epsilon
 
-    def _significant(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
+    def _select_modes(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
         rate, xp = self._orbit.rate, self._xp
         columns = ColumnsForModes(rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp))
@@ -72,7 +72,9 @@ class EnclosedFourier:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        return grown(rate.inversion.periods.genus, determinants, 2 * MOST_MODES)  # those at the edge are looked at too
+        return find_significant_modes(
+            rate.inversion.periods.genus, determinants, 2 * MOST_MODES
+        )  # those at the edge are looked at too
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""
@@ -87,7 +89,7 @@ class EnclosedFourier:
         value, slope = self._excess(xp.digits, z, delta)
         tau1 = uniform + delta
         tail = self._tail(float(np.max(np.abs(tau1.astype(float)))))
-        return np.asarray(tau1 - interval_step(xp.widened(value, tail), slope, self._bend, xp)[0])
+        return np.asarray(tau1 - interval_step(xp.add_error(value, tail), slope, self._bend, xp)[0])
 
     def _tail(self, elapsed: float) -> Any:
         """Return what the modes left out add up to: what a mode does to t grows until a half of its period, 1/(2 m·f)."""
@@ -97,25 +99,29 @@ class EnclosedFourier:
         """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step asks for no more."""
         xp, half, start = self._xp, math.ceil(digits / 2) + _SLOPE_DIGITS, self._orbit.start[None, :]
         turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
-        kept = self._kept(digits)
-        waves = sums_over_modes("sines", self._modes[kept], self._amplitudes[kept], turns, xp.at(digits))
-        value = self._mean * delta + waves[1:] - waves[0]
-        kept = self._kept(half)
+        selected = self._select_by_digits(digits)
+        exponentials = sums_over_modes("sines", self._modes[selected], self._amplitudes[selected], turns, xp.at(digits))
+        value = self._mean * delta + exponentials[1:] - exponentials[0]
+        selected = self._select_by_digits(half)
         with xp.at(half) as fewer:
-            waves = sums_over_modes("cosines", self._modes[kept], self._slopes[kept], turns[1:], fewer)
-            return value, xp.widened(self._mean + waves, np.sum(xp.at_most(self._slopes[~kept])))
+            exponentials = sums_over_modes("cosines", self._modes[selected], self._slopes[selected], turns[1:], fewer)
+            return value, xp.add_error(self._mean + exponentials, np.sum(xp.upper_bound(self._slopes[~selected])))
 
-    def _kept(self, digits: int) -> NDArray[np.bool_]:
+    def _select_by_digits(self, digits: int) -> NDArray[np.bool_]:
         """Return the modes that matter to so many digits."""
         return np.asarray(self._weights > self._xp.number(10) ** -(digits + _MODE_DIGITS), dtype=bool)
 
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return δ in double precision, from the uniform phases (N, g)."""
-        kept = self._kept(DOUBLE.digits)
-        modes, amplitudes, slopes = self._modes[kept], self._amplitudes[kept].astype(float), self._slopes[kept].astype(float)
+        selected = self._select_by_digits(DOUBLE.digits)
+        modes, amplitudes, slopes = (
+            self._modes[selected],
+            self._amplitudes[selected].astype(float),
+            self._slopes[selected].astype(float),
+        )
         frequencies, mean = self._orbit.frequencies.astype(float), float(self._mean)
         begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
-        reach, settled = 2 * float(np.sum(np.abs(amplitudes))) / mean, _SETTLED / float(np.max(np.abs(frequencies)))
+        reach, converged = 2 * float(np.sum(np.abs(amplitudes))) / mean, _SETTLED / float(np.max(np.abs(frequencies)))
         highest, block = int(np.max(np.abs(modes), initial=0)), max(1, _BLOCK // max(1, len(modes)))
 
         def root(z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -124,6 +130,6 @@ class EnclosedFourier:
                 return mean * delta + amplitudes @ sines - begin, mean + slopes @ cosines
 
             bounds = np.full(len(z), reach)
-            return increasing_root(excess, np.zeros(len(z)), -bounds, bounds, settled)
+            return increasing_root(excess, np.zeros(len(z)), -bounds, bounds, converged)
 
         return np.concatenate([root(z[first : first + block]) for first in range(0, len(z), block)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Integers", "grown"]
+__all__ = ["Integers", "find_significant_modes"]
 
 Integers = NDArray[np.int64]
 
@@ -18,7 +18,7 @@ Integers = NDArray[np.int64]
 _MOST_MODES = 1_000_000
 
 
-def grown(
+def find_significant_modes(
     genus: int, coefficients: Callable[[Integers], tuple[Any, NDArray[np.bool_]]], most: int = _MOST_MODES
 ) -> tuple[Integers, NDArray[Any], Integers]:
     """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, these, and the modes next to them.

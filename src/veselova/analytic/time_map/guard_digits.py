@@ -12,21 +12,21 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.cost_model import GUARD_DIGITS
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import ClockRate
+from veselova.analytic.time_map.rate import TimeRate
 
-__all__ = ["guarded_flows"]
+__all__ = ["extended_precision_flows"]
 
 #: Digits that balls may lose on the way to the frequencies.
 _SPARE = 6
 
 
-def guarded_flows(spectrum: Spectrum, origin: NDArray[np.float64], time: str) -> tuple[LinearFlow, LinearFlow, float]:
+def extended_precision_flows(spectrum: Spectrum, origin: NDArray[np.float64], time: str) -> tuple[LinearFlow, LinearFlow, float]:
     """Return z(τ₁) = z⁰ + fτ₁, the uniform part z⁰ + (f/F_0)t, and F_0, from z⁰ in double precision."""
     with balls(spectrum.arithmetic.digits, certified=False) as fine:
         exact = spectrum.in_arithmetic(fine)
         curve = Curve.of(exact, balls(GUARD_DIGITS + _SPARE, certified=False))
     with balls(GUARD_DIGITS + _SPARE, certified=False):
         periods = Periods(curve)
-        mean = ClockRate.of(exact, AbelJacobi(periods), time).mean
+        mean = TimeRate.of(exact, AbelJacobi(periods), time).mean
         of_tau1, of_time = (LinearFlow.of(origin, rates) for rates in (periods.frequencies, periods.frequencies / mean))
     return of_tau1, of_time, float(mean)

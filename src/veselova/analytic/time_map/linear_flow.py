@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.double_double import Twofold, exact_product, halves
+from veselova.analytic.arithmetic.double_double import DoubleDouble, exact_product, halves
 
 __all__ = ["LinearFlow"]
 
@@ -47,7 +47,7 @@ class LinearFlow:
 
         None of them stands still: it moves by a 1e-60th of the fastest rate instead.
         """
-        rates = (Twofold(self.rates, self.rests) * orders).total()
+        rates = (DoubleDouble(self.rates, self.rests) * orders).total()
         high = np.where(rates.high == 0, _STANDING * np.max(np.abs(self.rates)), rates.high)
         start, rests = np.concatenate([self.start, orders @ self.start]), np.concatenate([self.rests, rates.low])
         return LinearFlow(start, np.concatenate([self.rates, high]), rests)

@@ -15,7 +15,7 @@ from veselova.analytic.time_map.chebyshev_panels import TAIL, Panels, are_settle
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["integrated"]
+__all__ = ["integrate_on_panels"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _MOST_HALVINGS = 30
 _BLOCK = 4096
 
 
-def integrated(
+def integrate_on_panels(
     integrand: Callable[[Array], Array],
     in_tau1: LinearFlow,
     low: float,
@@ -62,14 +62,14 @@ def integrated(
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = panels.series(lefts, length)
         # A spike may be shorter than its phases are exact, and its series never end; a short one needs no more than a long panel.
-        settled = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (tails * sizes * length <= TAIL * floor * panels.length)
+        converged = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (tails * sizes * length <= TAIL * floor * panels.length)
         lengths = np.full(lefts.size, length)
-        done.append((lefts[settled], lengths[settled], coefficients[settled], tails[settled], sizes[settled]))
-        if np.all(settled):
+        done.append((lefts[converged], lengths[converged], coefficients[converged], tails[converged], sizes[converged]))
+        if np.all(converged):
             return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
         length /= 2
-        lefts = (lefts[~settled][:, None] + np.array([0.0, length])).ravel()
-        before = np.repeat(tails[~settled], 2)
+        lefts = (lefts[~converged][:, None] + np.array([0.0, length])).ravel()
+        before = np.repeat(tails[~converged], 2)
     raise Unsolved("narrow-gap", "a spike along the orbit is shorter than phases in doubles are exact; integrate numerically")
 
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from veselova.analytic.numerics.monotone_root import Rows, increasing_root
 from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panel_quadrature import integrated
-from veselova.analytic.time_map.rate import Clock
+from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
+from veselova.analytic.time_map.rate import TimeMap
 
-__all__ = ["PanelClock"]
+__all__ = ["ChebyshevTimeMap"]
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ _AVERAGED, _HIGHEST = 16.0, 8
 _SETTLED = 1e-9
 
 
-class PanelClock(Clock):
+class ChebyshevTimeMap(TimeMap):
     """t(τ₁) by Chebyshev panels over a stretch of the orbit that holds the wanted times.
 
     ``rate`` gives dt/dτ₁ at phases z of shape (N, g); ``mean`` is F_0.
@@ -48,11 +48,11 @@ class PanelClock(Clock):
     def panels(self) -> Panels:
         """Return the panels; whoever has them already may set them."""
         low, high = self._earliest / self._mean, self._latest / self._mean
-        panels = integrated(self._rate, self.in_tau1, low, high)
+        panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         # The mean clock's estimate; extended where that was short.
         while panels.values[0] > self._earliest or panels.values[-1] < self._latest:
             low, high = (border and 1.5 * border for border in panels.borders[[0, -1]].tolist())
-            panels = integrated(self._rate, self.in_tau1, low, high)
+            panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         return panels
 
     @property
@@ -71,7 +71,7 @@ class PanelClock(Clock):
         low, high = self.panels.borders[[0, -1]].tolist()
         if tau1[0] < low or tau1[-1] > high:
             low, high = (1.5 * float(tau1[0]) if tau1[0] < low else low), (1.5 * float(tau1[-1]) if tau1[-1] > high else high)
-            self.panels = integrated(self._rate, self.in_tau1, low, high)
+            self.panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:

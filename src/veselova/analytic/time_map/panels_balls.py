@@ -13,13 +13,13 @@ from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, LAST_COEFFICIENTS, Values
-from veselova.analytic.numerics.chebyshev_balls import EnclosedSeries
-from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, expected_terms
+from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
+from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, estimate_terms
 from veselova.analytic.numerics.monotone_root import Rows, doublings, increasing_root, interval_step, is_shown
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["EnclosedClock", "expected_nodes"]
+__all__ = ["ChebyshevTimeMapInBalls", "estimate_nodes"]
 
 #: Half length of a panel in half widths of the strip: longer ones take hardly fewer nodes for a length.
 _PANEL_IN_STRIPS = 3.0
@@ -52,7 +52,7 @@ _LONGER = 1.25
 _NEAR = 1e-6
 
 
-class EnclosedClock:
+class ChebyshevTimeMapInBalls:
     """τ₁ at given times on one orbit, in balls.
 
     ``certified``: what series leave out follows from the strip of analyticity; otherwise from their last coefficients, which
@@ -98,23 +98,23 @@ class EnclosedClock:
             ratio = 2 * count * width / reach
             decay = self._xp.number(1 / (ratio + math.sqrt(1 + ratio * ratio))) * (1 + 1e-12)
             nodes = math.ceil(self._xp.nats / -math.log(float(decay)))
-            truncation = self._xp.bounded_tail(largest, decay, nodes)
-            panels = self._evaluated(reach, direction, count, nodes)
+            truncation = self._xp.bound_tail(largest, decay, nodes)
+            panels = self._evaluate(reach, direction, count, nodes)
             return replace(panels, truncation=self._xp.array([truncation] * count), steepest=largest / width)
         # Near a separatrix dt/dτ₁ varies much faster than any phase.
         count = math.ceil(reach / (2 * min(_PANEL_IN_CYCLES / fastest, _LONGEST_IN_STRIPS * self._orbit.strip[0])))
         self._require_few(count)
-        nodes = self._expected_nodes(reach, direction, count)
+        nodes = self._estimate_nodes(reach, direction, count)
         while True:
-            panels = self._evaluated(reach, direction, count, nodes)
+            panels = self._evaluate(reach, direction, count, nodes)
             last = panels.rates[:, -LAST_COEFFICIENTS:]
             middle = self._xp.midpoints(last)
-            noise = np.sum(self._xp.at_most(last - middle), axis=1)
+            noise = np.sum(self._xp.upper_bound(last - middle), axis=1)
             if are_resolved(middle, noise, panels.rates[:, 0], self._xp):
-                return replace(panels, truncation=self._xp.estimated_tail(panels.rates))
+                return replace(panels, truncation=self._xp.estimate_tail(panels.rates))
             nodes = math.ceil(MORE * nodes)
 
-    def _expected_nodes(self, reach: float, direction: int, count: int) -> int:
+    def _estimate_nodes(self, reach: float, direction: int, count: int) -> int:
         """Return the nodes per panel that the decay of the series in double precision asks for."""
         if self._orbit.coarse_rates is None:
             return math.ceil(_NODES_PER_DIGIT * float(self._xp.digits))
@@ -124,24 +124,24 @@ class EnclosedClock:
         tau1 = direction * ((2 * panels[:, None] + 1) * half - half * np.cos(theta)).ravel()
         start, frequencies = (np.array([float(x) for x in v]) for v in (self._orbit.start, self._orbit.frequencies))
         values = self._orbit.coarse_rates(start + tau1[:, None] * frequencies).reshape(len(panels), SAMPLE)
-        return expected_terms(values / values[:, :1], self._xp.digits)
+        return estimate_terms(values / values[:, :1], self._xp.digits)
 
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
             wanted = f"a clock of {self._xp.digits} digits would take {nodes:.3g} evaluations or more at that time"
             raise Unsolved("too-far", f"{wanted}; at most {_MOST_NODES} are made")
 
-    def _evaluated(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
+    def _evaluate(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         self._require_few(count * nodes)
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])
-        waves = xp.cos(xp.nodes(nodes))
-        values = self._orbit.rates(direction * (centres[:, None] - half * waves).ravel())
+        exponentials = xp.cos(xp.nodes(nodes))
+        values = self._orbit.rates(direction * (centres[:, None] - half * exponentials).ravel())
         return _Panels(xp, half, centres, xp.cosine_series(values.reshape(count, nodes)), xp.array([0] * count), None)
 
 
-def expected_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
+def estimate_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
     """Return about how many nodes panels to the farthest time take, truncation judged by coefficients."""
     cycles = float(np.max(np.abs(approximate))) * max(abs(float(f)) for f in orbit.frequencies)
     return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
@@ -177,13 +177,13 @@ class _Panels:
         return self._ends[-1]
 
     @cached_property
-    def _steepness(self) -> Values:
+    def _sensitivity(self) -> Values:
         if self._certified:
             return np.full(len(self.rates), self.steepest)
-        return np.asarray(self.arithmetic.at_most(self.rates) @ np.arange(self.rates.shape[1]) ** 2 / self.half)
+        return np.asarray(self.arithmetic.upper_bound(self.rates) @ np.arange(self.rates.shape[1]) ** 2 / self.half)
 
     @cached_property
-    def _waves(self) -> Values:
+    def _exponentials(self) -> Values:
         """Return the d_k, k = 1…N, of t = Σ_{k≥0} d_k cos kθ: d_k = −half (c_{k−1} − c_{k+1})/2k with c_0 counted twice."""
         count, nodes = self.rates.shape
         padded = np.concatenate([self.rates, self.arithmetic.array(np.zeros((count, 2)))], axis=1)
@@ -193,7 +193,7 @@ class _Panels:
     @cached_property
     def _ends(self) -> Values:
         """Return t at the ends of the panels, (P+1,)."""
-        spans = self.arithmetic.widened(-2 * np.sum(self._waves[:, ::2], axis=1), 2 * self.half * self.truncation)
+        spans = self.arithmetic.add_error(-2 * np.sum(self._exponentials[:, ::2], axis=1), 2 * self.half * self.truncation)
         return np.concatenate([self.arithmetic.array([0]), np.cumsum(spans)])
 
     def roots(self, times: Values, approximate: NDArray[np.float64]) -> Values:
@@ -204,38 +204,38 @@ class _Panels:
         result = np.empty(times.shape, dtype=object)
         for place, panel in enumerate(panels.tolist()):
             rows = np.flatnonzero(places == place)
-            clocks = {digits: partial(series, place) for digits, series in steps.items()}
-            result[rows] = self._roots_on(panel, clocks, times[rows], approximate[rows])
+            time_maps = {digits: partial(series, place) for digits, series in steps.items()}
+            result[rows] = self._roots_on(panel, time_maps, times[rows], approximate[rows])
         return result
 
-    def _series(self, panels: NDArray[np.intp], digits: int) -> EnclosedSeries:
+    def _series(self, panels: NDArray[np.intp], digits: int) -> ChebyshevSeriesInBalls:
         """Return the series of t less a constant, and of dt/dx, on some panels, of as many terms as so many digits take."""
         xp, zero = self.arithmetic, self.arithmetic.array(np.zeros((len(panels), 1)))
-        both = [np.hstack([zero, self._waves[panels]]), np.hstack([self.rates[panels], zero])]
+        both = [np.hstack([zero, self._exponentials[panels]]), np.hstack([self.rates[panels], zero])]
         terms = math.ceil(both[0].shape[1] * digits / xp.digits) + _EXTRA_TERMS
         with xp.at(digits) as fewer:
-            return EnclosedSeries(np.stack(both, axis=1)[:, :, :terms], fewer)
+            return ChebyshevSeriesInBalls(np.stack(both, axis=1)[:, :, :terms], fewer)
 
     def _roots_on(
-        self, p: int, clocks: Mapping[int, Callable[[Values], Values]], times: Values, approximate: NDArray[np.float64]
+        self, p: int, time_maps: Mapping[int, Callable[[Values], Values]], times: Values, approximate: NDArray[np.float64]
     ) -> Values:
         """Newton's method on midpoints, then one step in intervals, with the series of each step by its digits."""
-        xp, centre, constant = self.arithmetic, self.centres[p], self._ends[p] - np.sum(self._waves[p])
+        xp, centre, constant = self.arithmetic, self.centres[p], self._ends[p] - np.sum(self._exponentials[p])
 
-        def clock(x: Values, digits: int) -> tuple[Values, Values]:
+        def time_map(x: Values, digits: int) -> tuple[Values, Values]:
             """Return t and dt/dx."""
             with xp.at(digits):
-                value, rate = clocks[digits]((centre - x) / self.half).T
-                return xp.widened(constant + value, 2 * self.half * self.truncation[p]), xp.widened(rate, self.truncation[p])
+                value, rate = time_maps[digits]((centre - x) / self.half).T
+                return xp.add_error(constant + value, 2 * self.half * self.truncation[p]), xp.add_error(rate, self.truncation[p])
 
         lowest, highest = xp.midpoints(xp.array([centre - self.half, centre + self.half]))
         x = self._near(p, (times - constant).astype(float), np.clip(approximate, float(lowest), float(highest)))
         for digits in doublings(xp.digits):
-            value, rate = clock(x, digits)
+            value, rate = time_map(x, digits)
             x = xp.midpoints(x - (value - times) / rate)
             x = np.where(x < lowest, lowest, np.where(x > highest, highest, x))
-        value, rate = clock(x, xp.digits)
-        step, reach = interval_step(value - times, rate, self._steepness[p], xp)
+        value, rate = time_map(x, xp.digits)
+        step, reach = interval_step(value - times, rate, self._sensitivity[p], xp)
         if self._certified and not is_shown(reach, rate, self.steepest, xp):
             raise Unsolved("not-enclosed", "the inverse clock: no interval could be shown to hold τ₁")
         return np.asarray(x - step)
@@ -243,10 +243,10 @@ class _Panels:
     def _near(self, p: int, local: NDArray[np.float64], approximate: NDArray[np.float64]) -> Values:
         """Return roots on a panel to double precision, from local times and approximate values, which may say nothing."""
         xp, half, centre = self.arithmetic, float(self.half), float(self.centres[p])
-        waves, rates = np.concatenate([[0.0], self._waves[p].astype(float)]), half * self.rates[p].astype(float)
+        exponentials, rates = np.concatenate([[0.0], self._exponentials[p].astype(float)]), half * self.rates[p].astype(float)
 
         def excess(u: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            return chebval(-u, waves) - local[rows], chebval(-u, rates)
+            return chebval(-u, exponentials) - local[rows], chebval(-u, rates)
 
         start = (approximate - centre) / half
         value, slope = excess(start, slice(None))

@@ -24,18 +24,18 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.linear_flow import LinearFlow
 
-__all__ = ["STRETCH_POWERS", "Clock", "ClockRate", "Rate", "clock_rate", "rate_factor"]
+__all__ = ["TIME_RATE_POWERS", "TimeMap", "TimeRate", "TorusRate", "rate_factor", "time_rate"]
 
 Array = NDArray[np.float64]
 
 P = TypeVar("P", bound=AngleSeries)
 
 #: d(time)/dτ₁ is a constant times this power of √(q,Aq).
-STRETCH_POWERS = {"t": 1, "s": -2, "tau1": 0}
+TIME_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 @dataclass(frozen=True)
-class Rate(ABC, Generic[P]):
+class TorusRate(ABC, Generic[P]):
     """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion."""
 
     inversion: AbelJacobi[P]
@@ -46,7 +46,7 @@ class Rate(ABC, Generic[P]):
         """Return dt/dτ₁ at angles of shape (N, g)."""
 
     @abstractmethod
-    def _weighted_forms(self, s: int, psi: Values) -> Values:
+    def _weight_forms(self, s: int, psi: Values) -> Values:
         """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
 
     @property
@@ -54,9 +54,9 @@ class Rate(ABC, Generic[P]):
     def needed_nodes(self) -> tuple[int, ...]:
         """Return, per cut, how many nodes resolve them."""
 
-    def _weighted_at_nodes(self, s: int) -> Values:
+    def _weight_at_nodes(self, s: int) -> Values:
         """Return the weighted forms at so many nodes."""
-        return self._weighted_forms(s, self.inversion.arithmetic.nodes(self.needed_nodes[s]))
+        return self._weight_forms(s, self.inversion.arithmetic.nodes(self.needed_nodes[s]))
 
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
@@ -69,7 +69,7 @@ class Rate(ABC, Generic[P]):
         for s in range(genus):
             angles = np.zeros((count, genus), dtype=psi.dtype)
             angles[:, s] = psi
-            result.append((self._weights(self._weighted_forms(s, psi)), self.inversion.map(angles)))
+            result.append((self._weights(self._weight_forms(s, psi)), self.inversion.map(angles)))
         return result
 
     def _weights(self, forms: Values) -> Values:
@@ -81,12 +81,12 @@ class Rate(ABC, Generic[P]):
     def mean(self) -> Any:
         """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
-        means = [np.sum(self._weights(self._weighted_at_nodes(s)), axis=-1) for s in range(periods.genus)]
+        means = [np.sum(self._weights(self._weight_at_nodes(s)), axis=-1) for s in range(periods.genus)]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
 
 
 @dataclass(frozen=True)
-class ClockRate(Rate[Periods]):
+class TimeRate(TorusRate[Periods]):
     """The rate of t, s or τ₁ itself on a hyperelliptic torus; its factors φ_s are at most one at any genus.
 
     time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
@@ -95,14 +95,14 @@ class ClockRate(Rate[Periods]):
     time: str
 
     @classmethod
-    def of(cls, spectrum: Spectrum, inversion: AbelJacobi[Periods], time: str) -> ClockRate:
+    def of(cls, spectrum: Spectrum, inversion: AbelJacobi[Periods], time: str) -> TimeRate:
         """Return the rate whose scale follows from its value at the start."""
         curve, fine = inversion.periods.curve, spectrum.arithmetic
         product = fine.number(1)
         with spectrum.working():
             for s, point in enumerate(spectrum.spheroconic):
                 product = product * rate_factor(curve, s, point, time, fine)
-            scale = 1 / (spectrum.clock_rate * product)
+            scale = 1 / (spectrum.time_rate * product)
         return cls(inversion, inversion.arithmetic.number(scale), time)
 
     def at(self, psi: Values) -> Values:
@@ -122,15 +122,15 @@ class ClockRate(Rate[Periods]):
         """Return those of the forms' own series: the factors are analytic in their strips."""
         return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
 
-    def _weighted_forms(self, s: int, psi: Values) -> Values:
+    def _weight_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
-        return self._weighted(s, below, cut.forms(below, above))
+        return self._weight(s, below, cut.forms(below, above))
 
-    def _weighted_at_nodes(self, s: int) -> Values:
-        return self._weighted(s, *self.inversion.periods.forms_at_nodes[s])
+    def _weight_at_nodes(self, s: int) -> Values:
+        return self._weight(s, *self.inversion.periods.forms_at_nodes[s])
 
-    def _weighted(self, s: int, below: Values, forms: Values) -> Values:
+    def _weight(self, s: int, below: Values, forms: Values) -> Values:
         sign = (-1) ** (self.inversion.periods.genus - s - 1)
         return np.asarray(sign * forms * self._factor(s, below)[..., None, :])
 
@@ -146,11 +146,11 @@ def _number(value: Any, arithmetic: Arithmetic | Decimals) -> Any:
     return value if isinstance(value, np.ndarray) else arithmetic.number(value)
 
 
-def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:
+def time_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:
     """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving directions."""
     with spectrum.working():
         start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
-    relative, at_start = A / ((start * start) @ A), arithmetic.number(spectrum.clock_rate)
+    relative, at_start = A / ((start * start) @ A), arithmetic.number(spectrum.time_rate)
 
     def rate(q: Values) -> Values:
         ratio = (q * q) @ relative
@@ -160,7 +160,7 @@ def clock_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callabl
     return rate
 
 
-class Clock(ABC):
+class TimeMap(ABC):
     """Neumann time as a function of physical time along one orbit, and back."""
 
     name: ClassVar[str]
@@ -196,7 +196,7 @@ class Clock(ABC):
         """Return the number of modes or of panel nodes."""
 
 
-class UniformClock(Clock):
+class UniformTimeMap(TimeMap):
     """The clock of a motion whose time is Neumann's, in its own unit."""
 
     name: ClassVar[str] = "uniform"

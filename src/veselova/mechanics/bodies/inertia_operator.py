@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_matrix, exact_vector, read_only, to_float
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
-__all__ = ["Inertia", "applied"]
+__all__ = ["Inertia", "apply_operator"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _WIDEST = 1e14
 _FORMS = '{"special": [A_1, …, A_n]} or {"matrix": …}'
 
 
-def applied(operator: Any, rows: Any, ops: Operations = FLOATS) -> Any:
+def apply_operator(operator: Any, rows: Any, ops: Operations = FLOATS) -> Any:
     """Return a symmetric operator applied to coordinate rows (…, D); it is a matrix, or its diagonal as a vector."""
     return rows * operator if operator.ndim == 1 else ops.dot(rows, operator)
 
@@ -50,13 +50,13 @@ class Inertia:
         definite matrix of size n(n−1)/2. Raises InvalidInput.
         """
         if not isinstance(value, Mapping) or len(value) != 1:
-            raise InvalidInput(("inertia",), _FORMS, shown(value))
+            raise InvalidInput(("inertia",), _FORMS, show(value))
         ((form, data),) = value.items()
         if form == "special":
             return cls.special(data, n)
         if form == "matrix":
             return cls.of_matrix(data, n * (n - 1) // 2, ("inertia", "matrix"))
-        raise InvalidInput(("inertia",), _FORMS, f"the form {shown(form)}")
+        raise InvalidInput(("inertia",), _FORMS, f"the form {show(form)}")
 
     @classmethod
     def special(cls, A: Any, n: int) -> Inertia:
@@ -66,7 +66,7 @@ class Inertia:
         determinant = Fraction(1)
         for i, value in enumerate(exact):
             if value <= 0 or float(value) == 0:
-                raise InvalidInput((*path, i), "a finite number greater than 0", shown(A[i]))
+                raise InvalidInput((*path, i), "a finite number greater than 0", show(A[i]))
             determinant = determinant * value
         entries = [exact[i] * exact[j] / determinant for i in range(n) for j in range(i + 1, n)]
         try:
@@ -122,15 +122,15 @@ class Inertia:
         """Return k with the moments near 2^k: their geometric mean, rounded."""
         return int(np.rint(np.mean(np.log2(np.maximum(self.moments, np.finfo(float).tiny)))))
 
-    def scaled(self) -> Inertia:
+    def rescale(self) -> Inertia:
         """Return 𝓘/2^k with moments near one, exactly."""
         k = self.exponent
         return Inertia(np.ldexp(self.operator, -k), np.ldexp(self.inverse, k), self.A)
 
     def __call__(self, rows: Any) -> Any:
         """Return 𝓘 applied to coordinate rows (…, D)."""
-        return applied(self.operator, rows)
+        return apply_operator(self.operator, rows)
 
     def solve(self, rows: Any) -> Any:
         """Return 𝓘⁻¹ applied to coordinate rows (…, D)."""
-        return applied(self.inverse, rows)
+        return apply_operator(self.inverse, rows)

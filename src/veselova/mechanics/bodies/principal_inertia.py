@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from veselova.mechanics.bodies.wide_axes import WideAxes, wide_axes
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_matrix, exact_vector, is_matrix, to_float
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
@@ -27,9 +27,9 @@ def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
         raise InvalidInput((name,), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
     for i, value in enumerate(diagonal):
         if value <= 0 or float(value) == 0:
-            raise InvalidInput((name, i), "a finite number greater than 0", shown(A[i]))
+            raise InvalidInput((name, i), "a finite number greater than 0", show(A[i]))
         if value < _LEAST:
-            raise InvalidInput((name, i), "a number whose inverse is within the range of a float", shown(A[i]))
+            raise InvalidInput((name, i), "a number whose inverse is within the range of a float", show(A[i]))
     return diagonal
 
 

@@ -44,7 +44,7 @@ class WideAxes:
     columns: Any
     rounded: Array
 
-    def along(self, vector: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    def to_axes(self, vector: Sequence[Fraction]) -> tuple[Fraction, ...]:
         """Return the components of a vector along the axes, to 2^−256 of the largest."""
         whole, common = over_common_denominator(vector)
         components = np.array(whole, dtype=object) @ self.columns
@@ -62,7 +62,7 @@ def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     scaled = [[x / largest for x in row] for row in matrix]
     M = np.array([[(x.numerator << _BITS) // x.denominator for x in row] for row in scaled], dtype=object)
     V = _orthonormal(np.linalg.eigh(np.array(scaled, dtype=np.float64))[1])
-    V = _diagonalised(_product(V.T, _product(M, V)), V)
+    V = _diagonalize(_product(V.T, _product(M, V)), V)
     values = [_nearest(int(x), _BITS - _KEPT) for x in np.sum(V * _product(M, V), axis=0) >> _BITS]
     order = sorted(range(len(values)), key=values.__getitem__)
     values, V = [values[i] for i in order], V[:, order]
@@ -84,22 +84,22 @@ def _orthonormal(V: Array) -> Any:
     return wide
 
 
-def _diagonalised(H: Any, V: Any) -> Any:
+def _diagonalize(H: Any, V: Any) -> Any:
     """Return V after the rotations that make H = VᵀMV diagonal."""
     n = H.shape[0]
     for _ in range(_SWEEPS):
-        turned = False
+        rotated = False
         for p in range(n - 1):
             for q in range(p + 1, n):
                 if abs(H[p, q]) <= _NOTHING:
                     continue
-                turned = True
+                rotated = True
                 cosine, sine = _rotation(H[p, p], H[q, q], H[p, q])
                 for X in (H.T, H, V):  # the columns p and q of Hᵀ are the rows of H
                     first, second = X[:, p].copy(), X[:, q].copy()
                     X[:, p] = (cosine * first - sine * second) >> _BITS
                     X[:, q] = (sine * first + cosine * second) >> _BITS
-        if not turned:
+        if not rotated:
             break
     return V
 

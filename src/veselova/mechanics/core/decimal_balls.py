@@ -43,18 +43,18 @@ class DecimalBalls:
 
     def _of_rational(self, value: Fraction) -> _Ball:
         middle = self.middle.divide(Decimal(value.numerator), Decimal(value.denominator))
-        return self.rounded(middle, Decimal(0))
+        return self.round_midpoint(middle, Decimal(0))
 
-    def rounded(self, middle: Decimal, radius: Decimal) -> _Ball:
+    def round_midpoint(self, middle: Decimal, radius: Decimal) -> _Ball:
         """Return the ball of a midpoint that was rounded in ``middle``: its rounding is added to the radius."""
         return _Ball(middle, self.above.fma(abs(middle), self.unit, radius), self)
 
     def pair(self, balls: Any) -> Pair:
         """Return midpoints rounded to three digits beyond those asked for, and radii that include this rounding."""
-        split = np.frompyfunc(self._shown, 1, 2)
+        split = np.frompyfunc(self._show, 1, 2)
         return split(balls)  # type: ignore[no-any-return]
 
-    def _shown(self, ball: _Ball) -> tuple[Decimal, Decimal]:
+    def _show(self, ball: _Ball) -> tuple[Decimal, Decimal]:
         context = Context(prec=self.digits + _SHOWN_DIGITS, Emax=_EXPONENTS, Emin=-_EXPONENTS)
         middle = context.plus(ball.middle)
         return middle, self.above.add(ball.radius, self.above.abs(self.above.subtract(ball.middle, middle)))
@@ -72,7 +72,7 @@ class _Ball:
         if isinstance(other, int):  # the zero that sums begin with
             return self
         own = self.arithmetic
-        return own.rounded(own.middle.add(self.middle, other.middle), own.above.add(self.radius, other.radius))
+        return own.round_midpoint(own.middle.add(self.middle, other.middle), own.above.add(self.radius, other.radius))
 
     __radd__ = __add__
 
@@ -85,14 +85,14 @@ class _Ball:
     def __mul__(self, other: _Ball) -> _Ball:
         own, a, b = self.arithmetic, abs(self.middle), abs(other.middle)
         radius = own.above.fma(a, other.radius, own.above.multiply(self.radius, own.above.add(b, other.radius)))
-        return own.rounded(own.middle.multiply(self.middle, other.middle), radius)
+        return own.round_midpoint(own.middle.multiply(self.middle, other.middle), radius)
 
     def __truediv__(self, other: _Ball) -> _Ball:
         """Return the quotient x/y: |x/y − m| ≤ (r_x + |m| r_y)/(|y| − r_y) for the quotient m of the midpoints."""
         own, least = self.arithmetic, self.arithmetic.below.subtract(abs(other.middle), other.radius)
         quotient = own.middle.divide(self.middle, other.middle) if least > 0 else Decimal(0)
         spread = own.above.fma(own.above.abs(quotient), other.radius, self.radius)
-        return own.rounded(quotient, own.above.divide(spread, least) if least > 0 else Decimal("Infinity"))
+        return own.round_midpoint(quotient, own.above.divide(spread, least) if least > 0 else Decimal("Infinity"))
 
 
 def cross(a: Any, b: Any) -> Any:

@@ -33,7 +33,7 @@ __all__ = [
     "VeselovaError",
     "did_you_mean",
     "install_extra",
-    "shown",
+    "show",
     "summary",
     "unknown_name",
 ]
@@ -54,7 +54,7 @@ T = TypeVar("T")
 _QUOTED = ("", "None", "True", "False")
 
 
-def shown(value: object) -> str:
+def show(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
     if isinstance(value, str):
         value = value[: 2 * _SHOWN_CHARACTERS]
@@ -107,10 +107,10 @@ class VeselovaError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Errors cross process borders (workers), and constructors take keywords: rebuild from the state alone.
-        return (_rebuilt, (type(self), self.args, self.__dict__.copy()))
+        return (_rebuild, (type(self), self.args, self.__dict__.copy()))
 
 
-def _rebuilt(kind: type[VeselovaError], args: tuple[Any, ...], state: dict[str, Any]) -> VeselovaError:
+def _rebuild(kind: type[VeselovaError], args: tuple[Any, ...], state: dict[str, Any]) -> VeselovaError:
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(state)
@@ -190,7 +190,7 @@ def did_you_mean(given: object, names: Iterable[str]) -> str:
 def unknown_name(path: Sequence[str | int], given: object, names: Sequence[str], scope: str = "") -> InvalidInput:
     """Return the fault of a name that is none of those known, which are known in a scope such as "for system lr"."""
     required = " ".join(filter(None, (f"one of {', '.join(names)}", scope)))
-    return InvalidInput(path, required, shown(given) + did_you_mean(given, names))
+    return InvalidInput(path, required, show(given) + did_you_mean(given, names))
 
 
 class Faults:

@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = [
     "Number",
     "exact_matrix",
     "exact_number",
     "exact_vector",
+    "given_arguments",
     "is_matrix",
     "over_common_denominator",
     "plain",
     "read_only",
     "require_truth_value",
-    "stated",
     "to_float",
     "whole_number",
 ]
@@ -62,7 +62,7 @@ def exact_number(value: Any, path: Path) -> Fraction:
         number = _parse(value)
         float(number)
     except (ValueError, OverflowError, ZeroDivisionError, InvalidOperation, TypeError):
-        raise InvalidInput(path, _REQUIRED, shown(value)) from None
+        raise InvalidInput(path, _REQUIRED, show(value)) from None
     return number
 
 
@@ -105,7 +105,7 @@ def _items(values: Any, path: Path, required: str) -> list[Any]:
     if isinstance(values, np.ndarray):
         values = values.tolist()
     if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
-        raise InvalidInput(path, required, shown(values))
+        raise InvalidInput(path, required, show(values))
     return list(values)
 
 
@@ -134,17 +134,17 @@ def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None)
 def whole_number(value: Any, path: Path, least: int, most: int) -> int:
     """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0 included."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral) or not least <= int(value) <= most:
-        raise InvalidInput(path, f"a whole number from {least} to {most}", shown(value))
+        raise InvalidInput(path, f"a whole number from {least} to {most}", show(value))
     return int(value)
 
 
 def require_truth_value(value: Any, name: str) -> None:
     """Raise InvalidInput, located at ``name``, for anything but true or false."""
     if not isinstance(value, bool):
-        raise InvalidInput((name,), "true or false", shown(value))
+        raise InvalidInput((name,), "true or false", show(value))
 
 
-def stated(**arguments: Any) -> dict[str, Any]:
+def given_arguments(**arguments: Any) -> dict[str, Any]:
     """Return the arguments that were given, those other than None, in JSON types."""
     return {name: plain(value) for name, value in arguments.items() if value is not None}
 

@@ -113,7 +113,7 @@ class Problem(ABC):
         """Return one of the ``derived`` series as decimals with radii, from the decimals of the stored ones."""
         raise KeyError(name)
 
-    def completed(self, series: Series) -> Series:
+    def complete(self, series: Series) -> Series:
         """Return the series of a flow, with what it leaves to the problem, along the axes in which the problem was given."""
         return series
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain, read_only, to_float
 from veselova.mechanics.core.remainders import split, split_grid
 
@@ -69,7 +69,7 @@ class TimeGrid:
         if doubles is not None:
             return _of_doubles(doubles, times)
         if isinstance(times, (str, bytes)) or not isinstance(times, (Sequence, np.ndarray)):
-            raise InvalidInput(("times",), _REQUIRED, shown(times))
+            raise InvalidInput(("times",), _REQUIRED, show(times))
         return _of_rationals(exact_vector(times, ("times",)))
 
     @property
@@ -102,7 +102,7 @@ def _is_number(times: Any) -> bool:
         try:
             exact_number(times, ("times",))
         except InvalidInput:
-            raise InvalidInput(("times",), _REQUIRED, shown(times)) from None
+            raise InvalidInput(("times",), _REQUIRED, show(times)) from None
         return True
     return isinstance(times, (Real, Decimal, np.number))
 
@@ -158,17 +158,17 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
     """Return the grid of a mapping with start, stop and count, both ends included."""
     if set(grid) != {"start", "stop", "count"}:
         given = f"the fields {', '.join(map(str, grid)) or 'none'}"
-        raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", shown(given))
+        raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", show(given))
     ends, count = [exact_number(grid[key], ("times", key)) for key in ("start", "stop")], grid["count"]
     if isinstance(count, (bool, np.bool_)) or not isinstance(count, (int, np.integer)):
-        raise InvalidInput(("times", "count"), "a whole number", shown(count))
+        raise InvalidInput(("times", "count"), "a whole number", show(count))
     if count < 1:
         raise InvalidInput(("times", "count"), "at least 1", str(count))
     if count > MOST_TIMES:
         raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(count)[:30])
     count, (start, stop) = int(count), ends
     if count > 1 and not start < stop:
-        raise InvalidInput(("times", "stop"), f"a time greater than start ({shown(grid['start'])})", shown(grid["stop"]))
+        raise InvalidInput(("times", "stop"), f"a time greater than start ({show(grid['start'])})", show(grid["stop"]))
     low, high = to_float(ends).tolist()
     if not np.isfinite(high - low):
         raise InvalidInput(("times", "stop"), "a span within the range of a float", f"{low!r} to {high!r}")

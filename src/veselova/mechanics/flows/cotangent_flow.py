@@ -88,15 +88,15 @@ class CotangentFlow(Flow):
 
     def project(self, state: Array) -> Array:
         """Return states (..., 2nr) as rotations of the start, with its energy."""
-        pairs = self._rotated(state.reshape(*state.shape[:-1], *self.start.shape))
+        pairs = self._rotate(state.reshape(*state.shape[:-1], *self.start.shape))
         omega, momentum = self._momenta(pairs)
         torque = momentum @ omega - omega @ momentum
         # Turned by ξ, the energy changes by ⟨ξ,[𝓘ω,ω]⟩ to first order.
         excess = (product(momentum, omega) - self._twice_energy) / 2
         turn = torque * (-excess / (product(torque, torque) + _LEAST_TORQUE))[..., None, None]
-        return self._rotated(pairs + turn[..., None, :, :] @ pairs).reshape(state.shape)
+        return self._rotate(pairs + turn[..., None, :, :] @ pairs).reshape(state.shape)
 
-    def _rotated(self, pairs: Array) -> Array:
+    def _rotate(self, pairs: Array) -> Array:
         """Return the rotations of the start that are nearest to (X, P), shape (..., 2, n, r)."""
         now, start = (np.concatenate([pair[..., 0, :, :], pair[..., 1, :, :]], axis=-1) for pair in (pairs, self.start))
         left, _, right = np.linalg.svd(now @ start.T)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Operations, PointFlow
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 
 __all__ = ["GeodesicFlow"]
 
@@ -63,4 +63,4 @@ class GeodesicFlow(PointFlow):
         N = states[:, 2 * n : -1].reshape(len(states), n, n - 2)
         pair = np.stack([q, V], axis=2)
         N = N - pair @ (np.swapaxes(pair, 1, 2) @ N)
-        return orthonormalized(np.concatenate([q[:, :, None], N, V[:, :, None]], axis=2))
+        return orthonormalize(np.concatenate([q[:, :, None], N, V[:, :, None]], axis=2))

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.inertia_operator import Inertia, applied
+from veselova.mechanics.bodies.inertia_operator import Inertia, apply_operator
 from veselova.mechanics.core.flow import FLOATS, Operations, restoring_step
 from veselova.mechanics.flows.collision import SingularFlow
-from veselova.mechanics.groups.distribution import Distribution, combined
+from veselova.mechanics.groups.distribution import Distribution, combine
 from veselova.mechanics.potentials.on_group import GroupPotential
 
 __all__ = ["LRFlow", "MomentumFlow", "MultiplierFlow", "jacobi_integral", "multipliers_of"]
@@ -72,7 +72,7 @@ class LRFlow(SingularFlow):
 
     def omega(self, g: Array, along: Array) -> Array:
         """Return ω from m_k and the group elements, in coordinates (…, D)."""
-        W, F = self.distribution.seen(g)
+        W, F = self.distribution.in_body(g)
         return np.asarray(self.distribution.velocity(self._operator, W, F, along, self.across), dtype=np.float64)
 
     def jacobi(self, g: Array, omega: Array) -> Array:
@@ -140,7 +140,7 @@ class MomentumFlow(LRFlow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (gω, m_k' = −⟨y(v), 𝒲_k⟩)."""
         g, along = self._split(state)
-        W, F = self.distribution.seen(g, ops)
+        W, F = self.distribution.in_body(g, ops)
         operator, rest = np.split(parameters, [self._operator.size])
         m = along if self.potential else rest[rest.size - self.along.size :]
         c = rest[: self.across.size] if np.any(self.across) else self.across
@@ -154,7 +154,7 @@ class MomentumFlow(LRFlow):
     def _energy(self) -> float:
         return float(self.jacobi(self.g, self.omega(self.g, self.along)))
 
-    def _restored(self, states: Array) -> tuple[Array, Array]:
+    def _restore(self, states: Array) -> tuple[Array, Array]:
         """Return g and m_k of states (…, m) with g on the group and the energy of the start, by one step along its gradient.
 
         The gradient at constant momentum is [ω,𝓘ω] + y(v); it vanishes at steady rotations too.
@@ -173,12 +173,12 @@ class MomentumFlow(LRFlow):
 
     def project(self, state: Array) -> Array:
         """Return the state with g on the group and the energy of the start."""
-        g, along = self._restored(state)
+        g, along = self._restore(state)
         return np.concatenate([g.ravel(), along])
 
     def motion(self, states: Array) -> tuple[Array, Array]:
         """Return g and ω, with the energy restored: between steps the integrator interpolates, ten times less accurately."""
-        g, along = self._restored(states)
+        g, along = self._restore(states)
         return g, self.omega(g, along if self.potential else self.along)
 
 
@@ -208,12 +208,12 @@ class MultiplierFlow(LRFlow):
         group, (omega, g) = self.distribution.group, self._split(state)
         shape, area = self.inertia.operator.shape, self.inertia.operator.size
         inverse, operator = parameters[:area].reshape(shape), parameters[area : 2 * area].reshape(shape)
-        force = group.bracket(applied(operator, omega, ops), omega, ops) + self._torque(g, parameters, ops)
-        omega_dot = applied(inverse, force, ops)
+        force = group.bracket(apply_operator(operator, omega, ops), omega, ops) + self._torque(g, parameters, ops)
+        omega_dot = apply_operator(inverse, force, ops)
         if self.distribution.constraints:
-            F = self.distribution.seen(g, ops)[1]
-            multipliers, turned = multipliers_of(inverse, F, force, ops)
-            omega_dot = omega_dot + combined(multipliers, turned, ops)
+            F = self.distribution.in_body(g, ops)[1]
+            multipliers, rotated = multipliers_of(inverse, F, force, ops)
+            omega_dot = omega_dot + combine(multipliers, rotated, ops)
         return np.concatenate([omega_dot, ops.dot(g, group.element(omega, ops)).ravel()])
 
     def project(self, state: Array) -> Array:
@@ -238,6 +238,6 @@ def jacobi_integral(
 
 def multipliers_of(inverse: Any, F: Any, force: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:
     """Return λ_s with ⟨𝓘⁻¹(force + Σ λ_l ℱ_l), ℱ_s⟩ = 0, (…, m), and 𝓘⁻¹ℱ_s, (…, m, D)."""
-    turned = applied(inverse, F, ops)
-    matrix = ops.dot(turned, np.swapaxes(F, -1, -2))
-    return ops.solve(matrix, -ops.dot(turned, force[..., None]))[..., 0], turned
+    rotated = apply_operator(inverse, F, ops)
+    matrix = ops.dot(rotated, np.swapaxes(F, -1, -2))
+    return ops.solve(matrix, -ops.dot(rotated, force[..., None]))[..., 0], rotated

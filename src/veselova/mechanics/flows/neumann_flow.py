@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Operations, PointFlow, restoring_step
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 
 __all__ = ["GaussFlow", "NeumannFlow"]
 
@@ -39,7 +39,7 @@ class NeumannFlow(PointFlow):
 
     def neighbour(self, distance: float) -> NeumannFlow:
         """Return the flow of a start moved by about ``distance``."""
-        moved = _on_sphere(_moved(self.initial, distance, self.n), self.n)
+        moved = _on_sphere(_perturb(self.initial, distance, self.n), self.n)
         return replace(self, initial=np.concatenate(_flat(moved)))
 
     def unpack(self, states: Array) -> dict[str, Array]:
@@ -75,7 +75,7 @@ class GaussFlow(PointFlow):
 
     def neighbour(self, distance: float) -> GaussFlow:
         """Return the flow of a start moved by about ``distance``, and √J, a datum of its own here, by half of it."""
-        initial = self.project(np.append(_moved(self.initial[:-1], distance, self.n), 0.0))
+        initial = self.project(np.append(_perturb(self.initial[:-1], distance, self.n), 0.0))
         side = 1 if self.n % 2 else -1  # either would do, and not always the same one
         root_J = self.parameters[-1] * (1 + side * distance / 2)
         return replace(self, initial=initial, parameters=np.append(self.parameters[:-1], root_J))
@@ -92,11 +92,11 @@ def _neumann_field(state: Any, inverse: Any, ops: Operations) -> Any:
     v, E = state[:n], state[n:].reshape(n, n)
     q = E[:, 0]
     multiplier = (ops.dot(inverse * q, q) - ops.dot(v, v)) / ops.dot(q, q)
-    turned = np.outer(v, ops.dot(q, E)) - np.outer(q, ops.dot(v, E))
-    return np.concatenate([multiplier * q - inverse * q, turned.ravel()])
+    rotated = np.outer(v, ops.dot(q, E)) - np.outer(q, ops.dot(v, E))
+    return np.concatenate([multiplier * q - inverse * q, rotated.ravel()])
 
 
-def _moved(state: Array, distance: float, n: int) -> Array:
+def _perturb(state: Array, distance: float, n: int) -> Array:
     """Return a state (a vector, then a frame) whose vector and first column are moved by about ``distance``."""
     direction = np.random.default_rng(n).normal(size=(2, n)) / np.sqrt(n)
     size = max(float(np.linalg.norm(state[:n])), 1.0)
@@ -115,7 +115,7 @@ def _on_spheres(states: Array, n: int) -> tuple[Array, Array]:
     v, E = states[:, :n], states[:, n:].reshape(-1, n, n)
     q = E[:, :, :1] / np.linalg.norm(E[:, :, :1], axis=1, keepdims=True)
     rest = E[:, :, 1:] - q @ (np.swapaxes(q, 1, 2) @ E[:, :, 1:])
-    E = orthonormalized(np.concatenate([q, rest], axis=2))
+    E = orthonormalize(np.concatenate([q, rest], axis=2))
     q = E[:, :, 0]
     return v - np.sum(q * v, axis=1, keepdims=True) * q, E
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Flow, Operations
 from veselova.mechanics.geometry.integrals_of_motion import sliding_velocity, unit_scale
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 
 __all__ = ["ReducedFlow"]
 
@@ -61,7 +61,7 @@ class ReducedFlow(Flow):
         p, E = self.initial[:n], self.initial[n:-1].reshape(n, n)
         q = E[:, 0] + distance * direction[:n]
         q /= np.linalg.norm(q)
-        E = orthonormalized(np.column_stack([q, E[:, 1:]]))
+        E = orthonormalize(np.column_stack([q, E[:, 1:]]))
         p = p + distance * float(np.linalg.norm(p)) * direction[n : 2 * n]
         p = p - (p @ E[:, 0]) * E[:, 0]
         twice_energy = float(p @ (self.inverse * p) / (E[:, 0] @ (self.A * E[:, 0])))
@@ -99,7 +99,7 @@ class ReducedFlow(Flow):
         Without it a start that is one rounding off the manifold makes the energy drift quadratically in time.
         """
         n = self.n
-        E = orthonormalized(state[n:-1].reshape(n, n))
+        E = orthonormalize(state[n:-1].reshape(n, n))
         q = E[:, 0]
         p = state[:n] - (state[:n] @ q) * q
         p = p * np.sqrt(self.twice_energy * (q @ (self.A * q)) / (p @ (self.inverse * p)))
@@ -111,7 +111,7 @@ class ReducedFlow(Flow):
         Frames are made orthonormal and p orthogonal to q; the energy is left as integrated, so that its drift can be seen.
         """
         n = self.n
-        p, E = states[:, :n], orthonormalized(states[:, n:-1].reshape(-1, n, n))
+        p, E = states[:, :n], orthonormalize(states[:, n:-1].reshape(-1, n, n))
         q = E[:, :, 0]
         p_inverse = self.inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
         qAq = np.sum(q * self.A * q, axis=1, keepdims=True)

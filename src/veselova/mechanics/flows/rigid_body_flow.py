@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Operations, restoring_step
 from veselova.mechanics.flows.collision import SingularFlow
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
 
 __all__ = ["RigidBodyFlow", "angular_velocity", "momentum"]
@@ -93,14 +93,14 @@ class RigidBodyFlow(SingularFlow):
         space the constraint holds by itself, and the energy is left as a check. The additional integral is always left: near
         separatrices it hardly differs from the energy, and restoring it cost a digit there.
         """
-        first, E = state[..., :3], orthonormalized(_frames(state))
+        first, E = state[..., :3], orthonormalize(_frames(state))
         if not self.spatial:
             values, slopes, sizes = self._constants(first, E)
             lengths = np.linalg.norm(slopes, axis=-1)
             lack = restoring_step(self._wanted - values, lengths**2, sizes) * lengths
             rows = _by(1 / np.where(lengths > 0, lengths, 1.0), slopes)  # no slopes at rest
             step = (np.linalg.pinv(rows, rcond=_PARALLEL) @ lack[..., None])[..., 0]
-            E = orthonormalized(E + np.cross(E, step[..., None, 3:], axisa=-2, axisc=-2))
+            E = orthonormalize(E + np.cross(E, step[..., None, 3:], axisa=-2, axisc=-2))
             first = self._on_constraint(first + step[..., :3], E[..., 0])
         return np.concatenate([first, E.reshape(*E.shape[:-2], 9)], axis=-1)
 
@@ -141,7 +141,7 @@ class RigidBodyFlow(SingularFlow):
     def neighbour(self, distance: float) -> RigidBodyFlow:
         """Return the flow of a start moved by about ``distance``; (Ω,γ) or (𝓘Ω,γ) keeps its value."""
         direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
-        E = orthonormalized(self.frame + distance * _turning(direction[:3]) @ self.frame)
+        E = orthonormalize(self.frame + distance * _turning(direction[:3]) @ self.frame)
         size = max(1.0, float(np.linalg.norm(self.Omega)))
         Omega = self._on_constraint(self.Omega + distance * size * direction[3:], E[:, 0])
         return replace(self, Omega=Omega, frame=E)

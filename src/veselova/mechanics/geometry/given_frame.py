@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_matrix, over_common_denominator, to_float
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["ExactFrame", "admissible_frame", "given_frame"]
@@ -45,13 +45,13 @@ def given_frame(frame: Any, q: tuple[Fraction, ...], normalize: bool, name: str 
             raise
     else:
         return exact
-    return _mended(exact, q, name)
+    return _mend(exact, q, name)
 
 
 def admissible_frame(frame: Array, q: Array) -> Array:
     """Return a nearly orthogonal frame, first column nearly q, made so to rounding."""
     rest = frame[:, 1:] - np.outer(q, q @ frame[:, 1:])
-    return orthonormalized(np.column_stack([q, rest]))
+    return orthonormalize(np.column_stack([q, rest]))
 
 
 def _require_admissible(frame: Array, q: Array, name: str) -> None:
@@ -73,11 +73,11 @@ def _unit(q: tuple[Fraction, ...]) -> Array:
     return np.asarray(scaled / np.linalg.norm(scaled))
 
 
-def _mended(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
+def _mend(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
     """Return q/|q| and the other columns after Gram–Schmidt in integers, ``1 << bits`` for one."""
     bits = _ALL_BITS if len(q) <= _WITH_DIGITS else _DOUBLE_BITS
-    columns = [_scaled(column, bits) for column in zip(*frame, strict=True)]
-    found = [_to_unit(_scaled(q, bits), bits)]
+    columns = [_scale(column, bits) for column in zip(*frame, strict=True)]
+    found = [_to_unit(_scale(q, bits), bits)]
     for i, column in enumerate(columns[1:], start=2):
         rest = column
         for unit in found:
@@ -96,7 +96,7 @@ def _mended(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame
     return tuple(tuple(Fraction(int(x), 1 << bits) for x in row) for row in zip(*found, strict=True))
 
 
-def _scaled(vector: tuple[Fraction, ...], bits: int) -> Any:
+def _scale(vector: tuple[Fraction, ...], bits: int) -> Any:
     """Return a vector over its largest entry as integers; zero stays zero."""
     whole, _ = over_common_denominator(vector)
     largest = max(abs(x) for x in whole) or 1

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 __all__ = [
     "StateIntegrals",
-    "clock_rate",
     "constants_of_motion",
     "energy",
     "linear_integrals",
@@ -27,6 +26,7 @@ __all__ = [
     "norm",
     "sliding_velocity",
     "tangent_basis",
+    "time_rate",
     "uhlenbeck_integrals",
     "unit_scale",
 ]
@@ -74,7 +74,7 @@ def momentum(A: Array, q: Array, q_dot: Array) -> Array:
     return StateIntegrals(A, q, q_dot).momentum
 
 
-def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
+def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
     """Return dτ₁/dt = √(2h det A/(q,Aq)), equation (4.6), shape (...).
 
     Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is A-orthogonal to q.
@@ -84,7 +84,7 @@ def clock_rate(A: Array, q: Array, q_dot: Array) -> Array:
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     """Return q' = dq/dτ₁ = q̇/(dτ₁/dt), shape (..., n); zero for a body at rest."""
-    return _over_rate(q_dot, clock_rate(A, q, q_dot))
+    return _over_rate(q_dot, time_rate(A, q, q_dot))
 
 
 def _over_rate(q_dot: Array, rate: Array) -> Array:

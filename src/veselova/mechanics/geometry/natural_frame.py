@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.exact_input import over_common_denominator
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis
 
-__all__ = ["moser_frame", "natural_frame", "orthonormalized", "refined"]
+__all__ = ["moser_frame", "natural_frame", "orthonormalize", "refine"]
 
 Array = NDArray[np.float64]
 
@@ -55,10 +55,10 @@ def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
     frame[:, 1:] *= np.where(q_prime @ frame[:, 1:] < 0, -1.0, 1.0)
     if np.linalg.det(frame) < 0:
         frame[:, 1] = -frame[:, 1]
-    return orthonormalized(frame)
+    return orthonormalize(frame)
 
 
-def orthonormalized(frame: Array) -> Array:
+def orthonormalize(frame: Array) -> Array:
     """Return the nearest orthogonal matrices to nearly orthogonal ones, shape (..., n, n).
 
     One Newton–Schulz step E(3 − EᵀE)/2 squares the defect: 1e-9 becomes 1e-18.
@@ -67,7 +67,7 @@ def orthonormalized(frame: Array) -> Array:
     return np.asarray(0.5 * (3.0 * frame - frame @ gram), dtype=np.float64)
 
 
-def refined(
+def refine(
     frame: Array, A: Sequence[Fraction], q: Sequence[Fraction], tangent: Sequence[Fraction], rate_squared: Fraction | None = None
 ) -> Array:
     """Return a natural frame to the last bit, from one in double precision and the exact data.
@@ -81,12 +81,12 @@ def refined(
         return frame
     largest = 1 / min(A)
     if rate_squared is None:
-        qAq, vAv, qAv = (_weighted(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
+        qAq, vAv, qAv = (_weighted_product(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
         rate_squared = (vAv * qAq - qAv * qAv) / qAq
-    velocity = _fixed_square(tangent, 1 / (rate_squared * largest))
-    M = _fixed(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
+    velocity = _outer_square(tangent, 1 / (rate_squared * largest))
+    M = _to_fixed_point(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
     unit = _unit_vector(q)
-    N, one = _fixed(frame[:, 1:].tolist()), np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
+    N, one = _to_fixed_point(frame[:, 1:].tolist()), np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
     for _ in range(_STEPS):
         N = N - _product(unit, _product(unit.T, N))
         N = _product(N, 3 * one - _product(N.T, N)) >> 1
@@ -106,25 +106,25 @@ def refined(
     return np.column_stack([frame[:, 0], (N / (1 << _BITS)).astype(np.float64)])
 
 
-def _weighted(A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
+def _weighted_product(A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
     (a, over_a), (b, over_b), (c, over_c) = map(over_common_denominator, (A, x, y))
     return Fraction(sum(map(math.prod, zip(a, b, c, strict=True))), over_a * over_b * over_c)
 
 
-def _fixed(rows: Any) -> Any:
+def _to_fixed_point(rows: Any) -> Any:
     """Return floats or ratios as integers of _BITS bits after the point."""
-    return np.array([[_shifted(*x.as_integer_ratio()) for x in row] for row in rows], dtype=object)
+    return np.array([[_shift(*x.as_integer_ratio()) for x in row] for row in rows], dtype=object)
 
 
-def _shifted(numerator: int, denominator: int) -> int:
+def _shift(numerator: int, denominator: int) -> int:
     return (numerator << _BITS) // denominator
 
 
-def _fixed_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
+def _outer_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
     """Return scale·vvᵀ as integers of _BITS bits after the point."""
     whole, common = over_common_denominator(vector)
     times, over = scale.numerator, scale.denominator * common**2
-    return np.array([[_shifted(x * y * times, over) for y in whole] for x in whole], dtype=object)
+    return np.array([[_shift(x * y * times, over) for y in whole] for x in whole], dtype=object)
 
 
 def _product(a: Any, b: Any) -> Any:
@@ -134,5 +134,5 @@ def _product(a: Any, b: Any) -> Any:
 def _unit_vector(q: Sequence[Fraction]) -> Any:
     """Return q/|q| as a column of integers."""
     largest = max(abs(x) for x in q)
-    column = _fixed([[x / largest] for x in q])
+    column = _to_fixed_point([[x / largest] for x in q])
     return (column << _BITS) // math.isqrt(int(np.sum(column * column)))

@@ -32,7 +32,7 @@ def dimension(n: int, r: int) -> int:
     return r * n - r * (r + 1) // 2
 
 
-def _transposed(matrix: Array) -> Array:
+def _transpose(matrix: Array) -> Array:
     return np.swapaxes(matrix, -1, -2)
 
 
@@ -49,14 +49,14 @@ def nearest_orthonormal(X: Array) -> Array:
 
 def tangent_part(X: Array, Z: Array) -> Array:
     """Return Z − X sym(XᵀZ), which meets (cond_X) as a velocity and (condX) as a momentum."""
-    along = _transposed(X) @ Z
-    return np.asarray(Z - X @ (along + _transposed(along)) / 2, dtype=np.float64)
+    along = _transpose(X) @ Z
+    return np.asarray(Z - X @ (along + _transpose(along)) / 2, dtype=np.float64)
 
 
 def angular_velocity(X: Array, X_dot: Array) -> Array:
     """Return ω = Φ(X,Ẋ) = XẊᵀ − ẊXᵀ + ½X[XᵀẊ − ẊᵀX]Xᵀ, equation (4.3), shape (..., n, n); then Ẋ = −ωX, (Poisson)."""
-    outer, inner = X @ _transposed(X_dot), _transposed(X) @ X_dot
-    return np.asarray(outer - _transposed(outer) + X @ (inner - _transposed(inner)) @ _transposed(X) / 2, dtype=np.float64)
+    outer, inner = X @ _transpose(X_dot), _transpose(X) @ X_dot
+    return np.asarray(outer - _transpose(outer) + X @ (inner - _transpose(inner)) @ _transpose(X) / 2, dtype=np.float64)
 
 
 def momentum_map(X: Array, P: Array) -> Array:
@@ -65,19 +65,19 @@ def momentum_map(X: Array, P: Array) -> Array:
     The third term that (mom^*) prints belongs to another P, that of the normal metric, for which Σ dP∧dX is not the symplectic
     form when r > 1; ``cotangent`` is the way back.
     """
-    outer = X @ _transposed(P)
-    return np.asarray(outer - _transposed(outer), dtype=np.float64)
+    outer = X @ _transpose(P)
+    return np.asarray(outer - _transpose(outer), dtype=np.float64)
 
 
 def cotangent(X: Array, momentum: Array) -> Array:
     """Return P = ∂L/∂Ẋ = −𝓜X + ½XXᵀ𝓜X, shape (..., n, r), for 𝓜 = 𝓘ω or its part in 𝓓_r; XᵀP is skew."""
     image = momentum @ X
-    return np.asarray(X @ (_transposed(X) @ image) / 2 - image, dtype=np.float64)
+    return np.asarray(X @ (_transpose(X) @ image) / 2 - image, dtype=np.float64)
 
 
 def admissible_part(X: Array, Z: Array) -> Array:
     """Return pr_𝓓 Z = ΓZ + ZΓ − ΓZΓ of skew matrices Z, the projection before (4.1c), as Z − (1−Γ)Z(1−Γ)."""
-    rest = np.eye(X.shape[-2]) - X @ _transposed(X)
+    rest = np.eye(X.shape[-2]) - X @ _transpose(X)
     return np.asarray(Z - rest @ Z @ rest, dtype=np.float64)
 
 
@@ -91,7 +91,7 @@ def admissible_basis(X: Array) -> Array:
     pairs = [(a, j) for a in range(r) for j in range(a + 1, n)]
     first, second = (frame[:, list(column)].T for column in zip(*pairs))
     outer = first[:, :, None] * second[:, None, :]
-    return np.asarray(outer - _transposed(outer), dtype=np.float64)
+    return np.asarray(outer - _transpose(outer), dtype=np.float64)
 
 
 def trace_integrals(X: Array, momentum: Array) -> Array:
@@ -100,7 +100,7 @@ def trace_integrals(X: Array, momentum: Array) -> Array:
     Those with odd j vanish, since (𝓜+λΓ)ᵀ = −𝓜+λΓ; j = 0 gives r; and traces beyond the n-th power follow from the others.
     """
     n = X.shape[-2]
-    gamma = X @ _transposed(X)
+    gamma = X @ _transpose(X)
     powers = [np.broadcast_to(np.eye(n), momentum.shape)]  # the part of (𝓜+λΓ)^k of degree j in 𝓜, by j
     values = []
     for k in range(1, n + 1):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.inertia_operator import applied
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.bodies.inertia_operator import apply_operator
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
@@ -52,7 +52,7 @@ class Distribution:
     def orthogonal_to(cls, group: MatrixGroup, h: Any) -> Distribution:
         """Return the distribution whose 𝔥 is spanned by given matrices of 𝔤; none leaves the group free. Raises InvalidInput."""
         if isinstance(h, (str, bytes)) or not isinstance(h, (Sequence, np.ndarray)):
-            raise InvalidInput(("h",), "a list of matrices of the Lie algebra", shown(h))
+            raise InvalidInput(("h",), "a list of matrices of the Lie algebra", show(h))
         rows = [group.algebra_element(matrix, ("h", s)) for s, matrix in enumerate(h)]
         done: list[Array] = []
         for s, row in enumerate(rows):
@@ -94,9 +94,9 @@ class Distribution:
         """Return whether 𝔥 is a Lie algebra, so that the system is a generalized Chaplygin system on G → H\\G."""
         return self.subalgebra_defect <= _CLOSED
 
-    def seen(self, g: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:
+    def in_body(self, g: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:
         """Return the coordinates of 𝒲_k = g⁻¹w_k g, (…, d, D), and of ℱ_s = g⁻¹h_s g, (…, m, D)."""
-        rows = self.group.seen(g, ops)
+        rows = self.group.adjoint_matrix(g, ops)
         if not self._is_basis:
             rows = ops.dot(self.space, rows)
         return rows[..., : self.rank, :], rows[..., self.rank :, :]
@@ -134,17 +134,17 @@ class Distribution:
         ω = Σ u_k 𝒲_k + Σ c_s ℱ_s with d equations for u.
         """
         given, unknown, known, wanted = (m, F, W, c) if self.uses_inverse else (c, W, F, m)
-        part = combined(given, known, ops)
+        part = combine(given, known, ops)
         if unknown.shape[-2] == 0:
-            return applied(operator, part, ops) if self.uses_inverse else part
-        turned = applied(operator, unknown, ops)
-        matrix = ops.dot(turned, np.swapaxes(unknown, -1, -2))
-        solution = ops.solve(matrix, wanted[..., None] - ops.dot(turned, part[..., None]))[..., 0]
+            return apply_operator(operator, part, ops) if self.uses_inverse else part
+        rotated = apply_operator(operator, unknown, ops)
+        matrix = ops.dot(rotated, np.swapaxes(unknown, -1, -2))
+        solution = ops.solve(matrix, wanted[..., None] - ops.dot(rotated, part[..., None]))[..., 0]
         if self.uses_inverse:
-            return applied(operator, part, ops) + combined(solution, turned, ops)
-        return part + combined(solution, unknown, ops)
+            return apply_operator(operator, part, ops) + combine(solution, rotated, ops)
+        return part + combine(solution, unknown, ops)
 
 
-def combined(coefficients: Any, rows: Any, ops: Operations) -> Any:
+def combine(coefficients: Any, rows: Any, ops: Operations) -> Any:
     """Return Σ coefficients_k rows_k, (…, D)."""
     return ops.dot(coefficients[..., None, :], rows)[..., 0, :]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, read_only, whole_number
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.so_n import skew
@@ -85,7 +85,7 @@ class MatrixGroup:
     def product(cls, *factors: MatrixGroup) -> MatrixGroup:
         """Return the direct product, block-diagonal, with the sum of the products; the bases follow one another."""
         if not factors or not all(isinstance(factor, MatrixGroup) for factor in factors):
-            raise InvalidInput(("factors",), "one or more matrix groups", shown(factors))
+            raise InvalidInput(("factors",), "one or more matrix groups", show(factors))
         size = sum(factor.size for factor in factors)
         basis, weight = np.zeros((sum(factor.dimension for factor in factors), size, size)), np.zeros((size, size))
         corner = first = 0
@@ -139,7 +139,7 @@ class MatrixGroup:
         products = self.basis[:, None] @ self.basis[None, :]
         return read_only(self.coordinates(products - np.swapaxes(products, 0, 1)))
 
-    def seen(self, g: Any, ops: Operations = FLOATS) -> Any:
+    def adjoint_matrix(self, g: Any, ops: Operations = FLOATS) -> Any:
         """Return R (…, D, D) whose row a has the coordinates of g⁻¹Y_a g; Ad_g = R acts on columns, Ad_{g⁻¹} = Rᵀ."""
         N, D, leading = self.size, self.dimension, g.shape[:-2]
         wide = self.basis.transpose(1, 0, 2).reshape(N, D * N)
@@ -173,7 +173,7 @@ class MatrixGroup:
         """Return how far matrices (…, N, N) are from the group, (…): the largest entry of what ``project`` has to mend."""
         return self._projection.defect(g)
 
-    def admitted(self, g: Any, path: tuple[str | int, ...] = ("g",)) -> Array:
+    def validate(self, g: Any, path: tuple[str | int, ...] = ("g",)) -> Array:
         """Return a given matrix (real, or complex where the group is) on the group; raises InvalidInput beyond 1e-9."""
         matrix = self._of_this_size(g, path)
         largest = float(np.max(np.abs(matrix)))
@@ -224,12 +224,12 @@ def _square(value: Any, path: tuple[str | int, ...]) -> Any:
     """Return a square matrix of validated numbers, complex only where one of them is."""
     rows = value.tolist() if isinstance(value, np.ndarray) else value
     if isinstance(rows, (str, bytes)) or not isinstance(rows, Sequence) or len(rows) == 0:
-        raise InvalidInput(path, "a square matrix", shown(value))
+        raise InvalidInput(path, "a square matrix", show(value))
     entries = []
     for i, row in enumerate(rows):
         row = row.tolist() if isinstance(row, np.ndarray) else row
         if isinstance(row, (str, bytes)) or not isinstance(row, Sequence) or len(row) != len(rows):
-            raise InvalidInput((*path, i), f"a list of {len(rows)} numbers", shown(row))
+            raise InvalidInput((*path, i), f"a list of {len(rows)} numbers", show(row))
         entries.append([_entry(x, (*path, i, j)) for j, x in enumerate(row)])
     return np.array(entries)
 
@@ -244,7 +244,7 @@ def _matrices(basis: Any) -> tuple[Array, float]:
     """Return given basis matrices in real form, and the weight of ⟨X,Y⟩ there: ½ where they were complex."""
     items = list(basis) if isinstance(basis, (Sequence, np.ndarray)) and not isinstance(basis, (str, bytes)) else []
     if not items:
-        raise InvalidInput(("basis",), "a list of square matrices", shown(basis))
+        raise InvalidInput(("basis",), "a list of square matrices", show(basis))
     found = [_square(matrix, ("basis", a)) for a, matrix in enumerate(items)]
     for a, matrix in enumerate(found):
         if matrix.shape != found[0].shape:

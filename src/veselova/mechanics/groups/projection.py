@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 
 __all__ = ["GroupProjection"]
 
@@ -39,8 +39,8 @@ class GroupProjection:
         self._envelope = None if len(span) == N * N else span.T @ span
         self._transverse = _skew_complement(span.reshape(-1, N, N), basis)
         if len(self._transverse):
-            turned = self._transverse[None] @ basis[:, None] - basis[:, None] @ self._transverse[None]  # [Z_z, Y_a]
-            turning = np.moveaxis(self._off(turned), 1, -1).reshape(-1, len(self._transverse))
+            rotated = self._transverse[None] @ basis[:, None] - basis[:, None] @ self._transverse[None]  # [Z_z, Y_a]
+            turning = np.moveaxis(self._off(rotated), 1, -1).reshape(-1, len(self._transverse))
             left, values, right = np.linalg.svd(turning, full_matrices=False)
             moved = values > _NULL  # the others commute with 𝔤
             self._mend = right[moved].T / values[moved] @ left[:, moved].T
@@ -65,9 +65,9 @@ class GroupProjection:
         """Return the group elements next to nearly such matrices, (…, N, N)."""
         if self._envelope is not None:
             g = (g.reshape((*g.shape[:-2], -1)) @ self._envelope).reshape(g.shape)
-        g = orthonormalized(g)
+        g = orthonormalize(g)
         if len(self._transverse):
-            g = orthonormalized(g - g @ self._turn(g))
+            g = orthonormalize(g - g @ self._turn(g))
         for V, phase in zip(self._blocks, self._phases(g), strict=True):
             projector = V @ V.conj().T
             plane, rotation = 2 * projector.real, -2 * projector.imag

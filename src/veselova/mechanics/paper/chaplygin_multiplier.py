@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry.stiefel import (
     admissible_basis,
@@ -97,9 +97,9 @@ class ChaplyginMultiplier:
     def of(cls, inertia: Any, n: int, rank: int, potential: Callable[[Array], float] | None = None) -> ChaplyginMultiplier:
         """Return the multiplier of an inertia operator, given as in ``StiefelFlow``; raises InvalidInput as that does."""
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 2:
-            raise InvalidInput(("n",), "a whole number from 2", shown(n))
+            raise InvalidInput(("n",), "a whole number from 2", show(n))
         if isinstance(rank, bool) or not isinstance(rank, (int, np.integer)) or not 1 <= rank <= n:
-            raise InvalidInput(("rank",), f"a whole number from 1 to {n}", shown(rank))
+            raise InvalidInput(("rank",), f"a whole number from 1 to {n}", show(rank))
         return cls(body_inertia(inertia, int(n)), int(rank), potential)
 
     @property

@@ -59,7 +59,7 @@ def momentum_density(inertia: Inertia, W: Any) -> Any:
 
 def duality_defect(distribution: Distribution, inertia: Inertia, g: Array) -> Array:
     """Return μ² det 𝓘/μ̃² − 1, zero by (duality), at group elements (…, N, N)."""
-    W, F = distribution.seen(g)
+    W, F = distribution.in_body(g)
     total = np.prod(inertia.moments)
     return np.asarray(restricted_determinant(inertia.solve, F) * total / restricted_determinant(inertia, W) - 1)
 
@@ -115,8 +115,8 @@ def constraint_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
     rows = state.reshape(-1, group.dimension)
     omega, F = rows[0], rows[1:]
     force = group.bracket(inertia(omega), omega)
-    multipliers, turned = multipliers_of(inertia.inverse, F, force)
-    omega_dot = inertia.solve(force) + multipliers @ turned
+    multipliers, rotated = multipliers_of(inertia.inverse, F, force)
+    omega_dot = inertia.solve(force) + multipliers @ rotated
     return np.vstack([omega_dot, group.bracket(F, np.broadcast_to(omega, F.shape))]).reshape(state.shape)
 
 

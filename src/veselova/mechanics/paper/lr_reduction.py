@@ -69,7 +69,7 @@ class ChaplyginReduction:
 
     def projector(self, g: Array) -> Array:
         """Return the matrix (D, D) of pr_{g⁻¹𝔡g}, functions on H\\G that are there also where H fixes no vector."""
-        W, _ = self.system.distribution.seen(g)
+        W, _ = self.system.distribution.in_body(g)
         return np.asarray(np.swapaxes(W, -1, -2) @ W, dtype=np.float64)
 
     def _quasivelocity(self, g: Array, g_dot: Array) -> Array:
@@ -80,13 +80,13 @@ class ChaplyginReduction:
     def _element(self, x: Any) -> Array:
         return np.asarray(self.system.distribution.group.element(x), dtype=np.float64)
 
-    def _lifted(self, g: Array, u: Any) -> Array:
+    def _lift(self, g: Array, u: Any) -> Array:
         distribution = self.system.distribution
         return distribution.body(g, u, np.zeros((*u.shape[:-1], distribution.constraints)))
 
     def momentum_map(self, g: Array, g_dot: Array) -> Array:
         """Return Φ(q,q̇) = pr_{g⁻¹𝔡g} g⁻¹ġ, an element of 𝔤; (4.3) on the Stiefel variety."""
-        return self._element(self._lifted(g, self._quasivelocity(g, g_dot)))
+        return self._element(self._lift(g, self._quasivelocity(g, g_dot)))
 
     def lagrangian(self, g: Array, g_dot: Array) -> Array:
         """Return L(q,q̇) = ½⟨𝓘Φ,Φ⟩ − V(q)."""
@@ -94,7 +94,7 @@ class ChaplyginReduction:
 
     def energy(self, g: Array, g_dot: Array) -> Array:
         """Return E(q,q̇) = ½⟨𝓘Φ,Φ⟩ + V(q), an integral."""
-        phi = self._lifted(g, self._quasivelocity(g, g_dot))
+        phi = self._lift(g, self._quasivelocity(g, g_dot))
         return np.asarray(np.sum(self.system.inertia(phi) * phi, axis=-1) / 2 + self._potential(g))
 
     def _potential(self, g: Array) -> Any:
@@ -102,19 +102,19 @@ class ChaplyginReduction:
 
     def metric(self, g: Array) -> Array:
         """Return ⟨𝓘𝒲_k, 𝒲_l⟩, the metric ds²_{𝓘,D} in the frame of Q whose quasivelocities are u_k, (…, d, d)."""
-        W, _ = self.system.distribution.seen(g)
+        W, _ = self.system.distribution.in_body(g)
         return np.asarray(self.system.inertia(W) @ np.swapaxes(W, -1, -2), dtype=np.float64)
 
     def curvature(self, g: Array, g_dot: Array, xi: Array) -> Array:
         """Return pr_{g⁻¹𝔥g}[Φ(q,q̇), Φ(q,ξ)], g⁻¹ times the curvature B(ġ,ξ) of the connection, an element of 𝔤."""
         distribution = self.system.distribution
-        one, other = (self._lifted(g, self._quasivelocity(g, vector)) for vector in (g_dot, xi))
+        one, other = (self._lift(g, self._quasivelocity(g, vector)) for vector in (g_dot, xi))
         _, across = distribution.components(g, distribution.group.bracket(one, other))
         return self._element(distribution.body(g, np.zeros((*across.shape[:-1], distribution.rank)), across))
 
     def constraint_force(self, g: Array, g_dot: Array, xi: Array) -> Array:
         """Return ⟨𝓘Φ(q,q̇), pr_{g⁻¹𝔥g}[Φ(q,q̇),Φ(q,ξ)]⟩, the right side of (1.2)."""
-        phi = self._lifted(g, self._quasivelocity(g, g_dot))
+        phi = self._lift(g, self._quasivelocity(g, g_dot))
         curvature = self.system.distribution.group.coordinates(self.curvature(g, g_dot, xi))
         return np.asarray(np.sum(self.system.inertia(phi) * curvature, axis=-1))
 
@@ -126,7 +126,7 @@ class ChaplyginReduction:
         """
         distribution = self.system.distribution
         group = distribution.group
-        W, _ = distribution.seen(g)
+        W, _ = distribution.in_body(g)
         phi = self._quasivelocity(g, g_dot) @ W
         brackets = group.bracket(np.broadcast_to(phi, W.shape), W)
         along, across = distribution.components(g, brackets)
@@ -140,15 +140,15 @@ class ChaplyginReduction:
     def momentum(self, g: Array, g_dot: Array) -> Array:
         """Return Φ*(q,p) = pr_{g⁻¹𝔡g} 𝓘Φ(q,q̇) for p = ∂L/∂q̇, equation (*), an element of 𝔤."""
         distribution = self.system.distribution
-        phi = self._lifted(g, self._quasivelocity(g, g_dot))
+        phi = self._lift(g, self._quasivelocity(g, g_dot))
         along, _ = distribution.components(g, self.system.inertia(phi))
-        return self._element(self._lifted(g, along))
+        return self._element(self._lift(g, along))
 
     def velocity(self, g: Array, momentum: Array) -> Array:
         """Return Φ(q,q̇) of the velocity with p = ∂L/∂q̇, from Φ*(q,p): the inverse of (*), an element of 𝔤."""
         distribution = self.system.distribution
         along, _ = distribution.components(g, distribution.group.coordinates(momentum))
-        return self._element(self._lifted(g, np.linalg.solve(self.metric(g), along)))
+        return self._element(self._lift(g, np.linalg.solve(self.metric(g), along)))
 
     def momentum_rate(self, g: Array, momentum: Array) -> Array:
         """Return [Φ*(q,p), Φ(q,q̇)], the right side of the reduced momentum equation (**), without potential."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_matrix, to_float
-from veselova.mechanics.geometry.natural_frame import orthonormalized
+from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
@@ -25,19 +25,19 @@ Array = NDArray[np.float64]
 
 def rotation(problem: Veselova) -> Array:
     """Return the constant ℜ of (orth), (n−1, n−1), that takes the natural frame at the start to the frame of the problem."""
-    return orthonormalized(_natural(problem).frame[:, 1:].T @ problem.frame[:, 1:])
+    return orthonormalize(_natural(problem).frame[:, 1:].T @ problem.frame[:, 1:])
 
 
 def with_rotation(problem: Veselova, matrix: Any) -> Veselova:
     """Return the problem with the same q(t) whose frame is the natural one turned by ℜ; raises InvalidInput unless ℜ ∈ O(n−1)."""
-    turned = _turned(_natural(problem).frame, _orthogonal(matrix, problem.n - 1))
-    return Veselova(**_without_frame(problem), frame=problem.to_body_axes(turned[None])[0])
+    rotated = _turn(_natural(problem).frame, _orthogonal(matrix, problem.n - 1))
+    return Veselova(**_without_frame(problem), frame=problem.to_body_axes(rotated[None])[0])
 
 
 def natural_frames(trajectory: Trajectory) -> Array:
     """Return the natural frame along a trajectory of ``Veselova``, (N, n, n): (q, n_2, …, γ)(t), carried on from the start."""
     problem = _veselova(trajectory)
-    return _turned(trajectory.series("frame"), rotation(problem).T)
+    return _turn(trajectory.series("frame"), rotation(problem).T)
 
 
 def frames_over(trajectory: Trajectory, matrix: Any) -> Array:
@@ -45,7 +45,7 @@ def frames_over(trajectory: Trajectory, matrix: Any) -> Array:
 
     Their error is that of the trajectory times at most n−1. Raises InvalidInput unless ℜ is orthogonal to 1e-9.
     """
-    return _turned(natural_frames(trajectory), _orthogonal(matrix, _veselova(trajectory).n - 1))
+    return _turn(natural_frames(trajectory), _orthogonal(matrix, _veselova(trajectory).n - 1))
 
 
 def linear_integrals(trajectory: Trajectory) -> Array:
@@ -71,7 +71,7 @@ def _veselova(trajectory: Trajectory) -> Veselova:
     return trajectory.problem
 
 
-def _turned(frames: Array, matrix: Array) -> Array:
+def _turn(frames: Array, matrix: Array) -> Array:
     """Return frames with the columns after the first multiplied by a matrix."""
     return np.concatenate([frames[..., :1], frames[..., 1:] @ matrix], axis=-1)
 
@@ -82,4 +82,4 @@ def _orthogonal(matrix: Any, size: int) -> Array:
         defect = float(np.max(np.abs(array.T @ array - np.eye(size))))
     if not defect <= INPUT_TOLERANCE:
         raise InvalidInput(("matrix",), f"an orthogonal {size} × {size} matrix to 1e-9", f"one with |ℜᵀℜ − 1| up to {defect:.3g}")
-    return orthonormalized(array)
+    return orthonormalize(array)

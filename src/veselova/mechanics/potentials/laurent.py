@@ -42,7 +42,7 @@ class LaurentPolynomial:
     def quadratic(cls, form: Array) -> LaurentPolynomial:
         """Return (Sγ,γ) for a symmetric matrix S, (3, 3)."""
         units: list[Powers] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-        return cls.of((float(form[i, j]), _added(units[i], units[j])) for i in range(3) for j in range(3))
+        return cls.of((float(form[i, j]), _add(units[i], units[j])) for i in range(3) for j in range(3))
 
     def __bool__(self) -> bool:
         return bool(self.powers)
@@ -51,7 +51,7 @@ class LaurentPolynomial:
         return LaurentPolynomial.of([*self._terms, *other._terms])
 
     def __mul__(self, other: LaurentPolynomial) -> LaurentPolynomial:
-        return LaurentPolynomial.of((c * d, _added(p, r)) for c, p in self._terms for d, r in other._terms)
+        return LaurentPolynomial.of((c * d, _add(p, r)) for c, p in self._terms for d, r in other._terms)
 
     def times(self, factor: float) -> LaurentPolynomial:
         """Return the polynomial multiplied by a number."""
@@ -117,5 +117,5 @@ def monomials(exponents: Array, gamma: Any) -> Any:
     return products
 
 
-def _added(p: Powers, r: Powers) -> Powers:
+def _add(p: Powers, r: Powers) -> Powers:
     return p[0] + r[0], p[1] + r[1], p[2] + r[2]

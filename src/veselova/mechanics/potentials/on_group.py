@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, plain, read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
@@ -46,17 +46,17 @@ class GroupPotential:
         """Return the potential that a list of monomials states, i and j from 1 to ``size``; raises InvalidInput."""
         path = ("potential",)
         if isinstance(value, (str, bytes)) or not isinstance(value, Sequence) or not 0 < len(value) <= _MOST_MONOMIALS:
-            raise InvalidInput(path, f"null or a list of 1 to {_MOST_MONOMIALS} monomials", shown(value))
+            raise InvalidInput(path, f"null or a list of 1 to {_MOST_MONOMIALS} monomials", show(value))
         coefficients, powers, given = [], [], []
         for k, monomial in enumerate(value):
             if not isinstance(monomial, Mapping) or set(monomial) != {"coefficient", "powers"}:
-                raise InvalidInput((*path, k), _MONOMIAL, shown(monomial))
+                raise InvalidInput((*path, k), _MONOMIAL, show(monomial))
             coefficients.append(float(exact_number(monomial["coefficient"], (*path, k, "coefficient"))))
             powers.append(_factors(monomial["powers"], size, (*path, k, "powers")))
             given.append({name: plain(monomial[name]) for name in ("coefficient", "powers")})
         return cls(read_only(np.array(coefficients)), tuple(powers), given)
 
-    def scaled(self, factor: float) -> GroupPotential:
+    def scale(self, factor: float) -> GroupPotential:
         """Return the potential times a factor."""
         return replace(self, coefficients=factor * self.coefficients)
 
@@ -127,17 +127,17 @@ def _product(first: Any, factors: list[Any]) -> Any:
 
 def _factors(value: Any, size: int, path: tuple[str | int, ...]) -> tuple[tuple[int, int, int], ...]:
     if isinstance(value, (str, bytes)) or not isinstance(value, Sequence) or len(value) > _MOST_FACTORS:
-        raise InvalidInput(path, f"a list of at most {_MOST_FACTORS} triples [i, j, p]", shown(value))
+        raise InvalidInput(path, f"a list of at most {_MOST_FACTORS} triples [i, j, p]", show(value))
     powers: dict[tuple[int, int], int] = {}
     for l, item in enumerate(value):
         whole = isinstance(item, Sequence) and not isinstance(item, (str, bytes)) and len(item) == 3
         if not whole or not all(isinstance(x, int) and not isinstance(x, bool) for x in item):
-            raise InvalidInput((*path, l), "three whole numbers [i, j, p]", shown(item))
+            raise InvalidInput((*path, l), "three whole numbers [i, j, p]", show(item))
         i, j, p = item
         if not (1 <= i <= size and 1 <= j <= size):
             raise InvalidInput((*path, l), f"an entry g_ij with i and j from 1 to {size}", f"i = {i}, j = {j}"[:60])
         if abs(p) > _LARGEST_POWER:
-            raise InvalidInput((*path, l, 2), f"a power from −{_LARGEST_POWER} to {_LARGEST_POWER}", shown(p))
+            raise InvalidInput((*path, l, 2), f"a power from −{_LARGEST_POWER} to {_LARGEST_POWER}", show(p))
         powers[i - 1, j - 1] = powers.get((i - 1, j - 1), 0) + p
     if any(abs(p) > _LARGEST_POWER for p in powers.values()):
         raise InvalidInput(path, f"powers of one entry that sum to at most {_LARGEST_POWER}", "more")

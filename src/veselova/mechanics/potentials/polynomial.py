@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.potentials.laurent import LaurentPolynomial
@@ -56,10 +56,10 @@ class Potential:
         if given is None:
             return cls(none, none, True, None)
         if not isinstance(given, Mapping) or not given:
-            raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", shown(given))
+            raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given))
         for name in given:
             if name not in _PARTS:
-                raise InvalidInput(("potential",), f"no fields but {', '.join(_PARTS)}", shown(name))
+                raise InvalidInput(("potential",), f"no fields but {', '.join(_PARTS)}", show(name))
         pairs = []
         if "clebsch" in given:
             alpha = float(exact_number(given["clebsch"], ("potential", "clebsch")))
@@ -77,7 +77,7 @@ class Potential:
             raise InvalidInput(("potential", "companion"), "a polynomial that it belongs to", "none")
         unconditional = False
         if companion is not None:
-            unconditional = _paired(terms, companion, inverse if dual else inertia, dual, "companion" in given)
+            unconditional = _check_pair(terms, companion, inverse if dual else inertia, dual, "companion" in given)
         return cls(terms, companion, unconditional, plain(given))
 
     def require_finite(self, gamma: Array) -> None:
@@ -123,7 +123,7 @@ def duality_defect(V: LaurentPolynomial, F: LaurentPolynomial, inertia: Array, g
     return np.asarray(np.cross(np.cross(gamma, F.gradient(gamma)) - force, gamma), dtype=np.float64)
 
 
-def _paired(terms: LaurentPolynomial, companion: LaurentPolynomial, inertia: Array, dual: bool, user: bool) -> bool:
+def _check_pair(terms: LaurentPolynomial, companion: LaurentPolynomial, inertia: Array, dual: bool, user: bool) -> bool:
     """Return whether the integral holds for any value of the constants; raises InvalidInput for a wrong companion of a user's."""
     points = np.random.default_rng(3).uniform(0.3, 1.0, (_POINTS, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
@@ -152,7 +152,7 @@ def _polynomial(given: Any, name: str) -> LaurentPolynomial:
     path = ("potential", name)
     form = 'a list of terms {"coefficient": c, "powers": [a, b, c]}'
     if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
-        raise InvalidInput(path, form, shown(given))
+        raise InvalidInput(path, form, show(given))
     if not 0 < len(given) <= _MOST_TERMS:
         raise InvalidInput(path, f"1 to {_MOST_TERMS} terms", f"{len(given)}")
     return LaurentPolynomial.of(_term(item, (*path, i)) for i, item in enumerate(given))
@@ -160,15 +160,15 @@ def _polynomial(given: Any, name: str) -> LaurentPolynomial:
 
 def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int, int]]:
     if not isinstance(item, Mapping) or set(item) != {"coefficient", "powers"}:
-        raise InvalidInput(path, 'a term {"coefficient": c, "powers": [a, b, c]}', shown(item))
+        raise InvalidInput(path, 'a term {"coefficient": c, "powers": [a, b, c]}', show(item))
     coefficient = float(exact_number(item["coefficient"], (*path, "coefficient")))
     powers = item["powers"].tolist() if isinstance(item["powers"], np.ndarray) else item["powers"]
     if isinstance(powers, (str, bytes)) or not isinstance(powers, Sequence) or len(powers) != 3:
-        raise InvalidInput((*path, "powers"), "a list of 3 whole numbers", shown(powers))
+        raise InvalidInput((*path, "powers"), "a list of 3 whole numbers", show(powers))
     for j, power in enumerate(powers):
         if isinstance(power, bool) or not isinstance(power, Integral) or abs(int(power)) > _LARGEST_POWER:
             required = f"a whole number from -{_LARGEST_POWER} to {_LARGEST_POWER}"
-            raise InvalidInput((*path, "powers", j), required, shown(power))
+            raise InvalidInput((*path, "powers", j), required, show(power))
     a, b, c = (int(power) for power in powers)
     return coefficient, (a, b, c)
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, did_you_mean, shown
+from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
@@ -114,7 +114,7 @@ class ClosedForm:
         try:
             document = json.loads(text)
         except (ValueError, RecursionError) as fault:
-            raise InvalidInput(("document",), "JSON text", f"{shown(text)} ({fault})") from None
+            raise InvalidInput(("document",), "JSON text", f"{show(text)} ({fault})") from None
         return cls(document)
 
     def to_latex(self, digits: int = 6) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = ["FORMAT", "SCHEMA", "require_document"]
 
@@ -95,20 +95,20 @@ SCHEMA: dict[str, Any] = {
 def require_document(document: Any) -> None:
     """Raise InvalidInput unless the value has every field of the format with numbers of the right shapes."""
     if not isinstance(document, Mapping):
-        raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, shown(document))
+        raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
     if document.get("format") != FORMAT:
-        raise InvalidInput(("document", "format"), FORMAT, shown(document.get("format")))
+        raise InvalidInput(("document", "format"), FORMAT, show(document.get("format")))
     missing = [name for name in _FIELDS if name not in document]
     if missing:
         raise InvalidInput(("document",), f"the fields {', '.join(missing)} too", f"only {', '.join(map(str, document))}"[:200])
     problem = document["problem"]
     if not isinstance(problem, Mapping) or not isinstance(problem.get("system"), str):
-        raise InvalidInput(("document", "problem"), "an object with the field system", shown(problem))
+        raise InvalidInput(("document", "problem"), "an object with the field system", show(problem))
     g = document["genus"]
     if isinstance(g, bool) or not isinstance(g, int) or g < 1:
-        raise InvalidInput(("document", "genus"), "a whole number of at least 1", shown(g))
+        raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
     if isinstance(document["digits"], bool) or not isinstance(document["digits"], int) or document["digits"] < 15:
-        raise InvalidInput(("document", "digits"), "a whole number of at least 15", shown(document["digits"]))
+        raise InvalidInput(("document", "digits"), "a whole number of at least 15", show(document["digits"]))
     _require_shapes(document, g)
 
 
@@ -142,7 +142,7 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
             _require_numbers((name, key), inner.get(key) if isinstance(inner, Mapping) else None, ())
     place = document["rate"]["characteristic"]
     if not isinstance(place, int) or not 0 <= place < functions:
-        raise InvalidInput(("document", "rate", "characteristic"), f"an index below {functions}", shown(place))
+        raise InvalidInput(("document", "rate", "characteristic"), f"an index below {functions}", show(place))
 
 
 def _require_reduction(reduction: Any, g: int) -> None:
@@ -151,25 +151,25 @@ def _require_reduction(reduction: Any, g: int) -> None:
     _require_numbers(("reduction", "basis"), basis, (g, g))
     matrix = np.array(basis, dtype=float)
     if np.any(matrix != np.rint(matrix)) or abs(abs(np.linalg.det(matrix)) - 1) > 1e-6:
-        raise InvalidInput(("document", "reduction", "basis"), "whole numbers with determinant 1 or −1", shown(basis))
+        raise InvalidInput(("document", "reduction", "basis"), "whole numbers with determinant 1 or −1", show(basis))
     waves = reduction.get("waves")
     if not isinstance(waves, list) or not all(isinstance(i, int) and 0 <= i < g for i in waves) or len(set(waves)) < len(waves):
-        raise InvalidInput(("document", "reduction", "waves"), f"different whole numbers from 0 to {g - 1}", shown(waves))
+        raise InvalidInput(("document", "reduction", "waves"), f"different whole numbers from 0 to {g - 1}", show(waves))
 
 
 def _length(document: Mapping[str, Any], name: str, wanted: int | None) -> int:
     value = document[name]
     if not isinstance(value, list) or (wanted is not None and len(value) != wanted):
-        raise InvalidInput(("document", name), "a list" + (f" of length {wanted}" if wanted is not None else ""), shown(value))
+        raise InvalidInput(("document", name), "a list" + (f" of length {wanted}" if wanted is not None else ""), show(value))
     return len(value)
 
 
 def _require_pairs(path: tuple[str | int, ...], value: Any, length: int, functions: int) -> None:
     if not isinstance(value, list) or len(value) != length:
-        raise InvalidInput(("document", *path), f"a list of {length} pairs [index, constant]", shown(value))
+        raise InvalidInput(("document", *path), f"a list of {length} pairs [index, constant]", show(value))
     for i, pair in enumerate(value):
         if not isinstance(pair, list) or len(pair) != 2 or not isinstance(pair[0], int) or not 0 <= pair[0] < functions:
-            raise InvalidInput(("document", *path, i), f"a pair [index below {functions}, constant]", shown(pair))
+            raise InvalidInput(("document", *path, i), f"a pair [index below {functions}, constant]", show(pair))
         _require_numbers((*path, i, 1), pair[1], ())
 
 
@@ -177,7 +177,7 @@ def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, 
     """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or strings of them."""
     if shape:
         if not isinstance(value, list) or len(value) != shape[0]:
-            raise InvalidInput(("document", *path), f"a list of length {shape[0]}", shown(value))
+            raise InvalidInput(("document", *path), f"a list of length {shape[0]}", show(value))
         for i, item in enumerate(value):
             _require_numbers((*path, i), item, shape[1:])
         return
@@ -186,4 +186,4 @@ def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, 
     except (ValueError, OverflowError):
         number = float("nan")
     if not abs(number) < float("inf"):
-        raise InvalidInput(("document", *path), "a finite number, or a string of one", shown(value))
+        raise InvalidInput(("document", *path), "a finite number, or a string of one", show(value))

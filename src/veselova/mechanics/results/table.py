@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import BackendMissing, InternalContradiction
 
-__all__ = ["Table", "Target", "flat_columns", "opened", "row_blocks"]
+__all__ = ["Table", "Target", "flat_columns", "open_target", "row_blocks"]
 
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
@@ -39,7 +39,7 @@ def flat_columns(name: str, values: NDArray[Any]) -> Columns:
 
 
 @contextmanager
-def opened(target: Target) -> Iterator[BinaryIO]:
+def open_target(target: Target) -> Iterator[BinaryIO]:
     """Open a path for writing, or pass on a stream and leave it open."""
     if isinstance(target, (str, Path)):
         with Path(target).open("wb") as stream:
@@ -62,7 +62,7 @@ class Table:
 
     def to_csv(self, target: Target) -> None:
         """Write comma-separated values under one line of names: the shortest text of every double, all digits of decimals."""
-        with opened(target) as stream:
+        with open_target(target) as stream:
             stream.write((",".join(self.columns) + "\n").encode())
             for block in self._blocks(_TEXT_BLOCK):
                 stream.write(_lines(np.column_stack(list(block.values()))))
@@ -74,7 +74,7 @@ class Table:
         except ImportError:
             raise _pyarrow_missing("Parquet") from None
         # Without dictionaries, which no two numbers of a motion share; a table is a row group, written at once.
-        with opened(target) as stream, parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer:
+        with open_target(target) as stream, parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer:
             for table in self._tables():
                 writer.write_table(table)
 
@@ -84,7 +84,7 @@ class Table:
             from pyarrow import ipc
         except ImportError:
             raise _pyarrow_missing("Arrow") from None
-        with opened(target) as stream, ipc.new_stream(stream, self._schema()) as writer:
+        with open_target(target) as stream, ipc.new_stream(stream, self._schema()) as writer:
             for table in self._tables():
                 writer.write_table(table)
 

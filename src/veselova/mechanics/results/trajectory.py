@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, did_you_mean, shown, unknown_name
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, did_you_mean, show, unknown_name
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.npz import decimal_arrays, read_decimals, write_archive
-from veselova.mechanics.results.table import Table, Target, flat_columns, opened, row_blocks
+from veselova.mechanics.results.table import Table, Target, flat_columns, open_target, row_blocks
 from veselova.version import __version__
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Trajectory:
     def series(self, name: str) -> Array:
         """Return one of the problem's outputs by name; raises InvalidInput for another."""
         if name not in self.arrays:
-            self._chosen([name])
+            self._choose([name])
             values = self.problem.derive(name, self.arrays)
             values.setflags(write=False)
             self.arrays[name] = values  # type: ignore[index]
@@ -174,14 +174,14 @@ class Trajectory:
     def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
         """Return the flat table of all or the chosen series: time, error, every component, named like ``frame_1_2`` (from 1), and
         every integral of motion, like ``integral_energy``."""
-        return self._table(self.error, {name: self.series(name) for name in self._chosen(outputs)})
+        return self._table(self.error, {name: self.series(name) for name in self._choose(outputs)})
 
-    def _chosen(self, outputs: Iterable[str] | None) -> tuple[str, ...]:
+    def _choose(self, outputs: Iterable[str] | None) -> tuple[str, ...]:
         """Return the names of the chosen series, all where none are named; raises InvalidInput for others, and for none."""
         names = self.problem.outputs
         chosen = tuple(names if outputs is None else outputs)
         if isinstance(outputs, str) or not chosen:
-            raise InvalidInput(("outputs",), f"a list of one or more of {', '.join(names)}", shown(outputs))
+            raise InvalidInput(("outputs",), f"a list of one or more of {', '.join(names)}", show(outputs))
         for i, name in enumerate(chosen):
             if name not in names:
                 raise unknown_name(("outputs", i), name, list(names))
@@ -200,8 +200,8 @@ class Trajectory:
 
     def to_npz(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal, q_radius …)."""
-        chosen = self._chosen(outputs)
-        with opened(target) as stream:
+        chosen = self._choose(outputs)
+        with open_target(target) as stream:
             write_archive(stream, self._archive(chosen))
 
     def _archive(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -246,7 +246,7 @@ class Trajectory:
 
     def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table as comma-separated values, one row per time: doubles to the last bit, or all of the decimals."""
-        chosen = self._chosen(outputs)
+        chosen = self._choose(outputs)
         table: Mapping[str, NDArray[Any]] = self.columns(chosen)
         if self.decimals is not None:
             table = self._table(self.decimals.error, {name: self.decimals.midpoints[name] for name in chosen})

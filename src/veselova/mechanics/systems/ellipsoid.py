@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_vector, read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.exact_input import exact_vector, given_arguments, read_only, require_truth_value, to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.geodesic_flow import GeodesicFlow
 from veselova.mechanics.flows.neumann_flow import GaussFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalized, refined
+from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize, refine
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -83,11 +83,11 @@ class EllipsoidGeodesic(TorusProblem):
             raise InvalidInput(("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal")
         A_float = to_float(diagonal)
         normal, velocity = unit(to_float(over_largest(q))), to_float(over_largest(exact.tangent))
-        frame = orthonormalized(refined(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent))
+        frame = orthonormalize(refine(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent))
         if frame[:, -1] @ velocity < 0:  # n = 2, where γ has no partner whose sign makes the determinant positive
             frame[:, -1] = -frame[:, -1]
         self._set(A=A_float, X=position(A_float, normal), X_dot=frame[:, -1], near_frame=frame, exact=exact)
-        self._set(given=stated(A=A, X=X, X_dot=X_dot, normalize=normalize))
+        self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "X", "X_dot"))
@@ -155,7 +155,7 @@ class EllipsoidGeodesic(TorusProblem):
             return derive_position_pair(self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits)
         return midpoints["frame"][:, :, -1], radii["frame"][:, :, -1]
 
-    def completed(self, series: Series) -> Series:
+    def complete(self, series: Series) -> Series:
         """Return frame and Neumann time."""
         return {"frame": series["frame"], "tau1": series["tau1"]}
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import plain, require_truth_value, whole_number
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, jacobi_integral, multipliers_of
@@ -83,7 +83,7 @@ class LRSystem(Problem):
         size = whole_number(n, ("n",), 2, LARGEST)
         r = whole_number(rank, ("rank",), 1, size - 1)
         if omega is None or not hasattr(omega, "__len__") or len(omega) != size:
-            raise InvalidInput(("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", shown(omega))
+            raise InvalidInput(("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", show(omega))
         operator = Inertia.of(inertia, size)
         self._become(Distribution.of_rank(size, r), operator, g, omega, potential, homogeneous)
         given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
@@ -108,7 +108,7 @@ class LRSystem(Problem):
         g, omega  matrices of the group and of its algebra, as the group's basis was given; entries of v are those of the real g
         """
         if not isinstance(group, MatrixGroup):
-            raise InvalidInput(("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", shown(group))
+            raise InvalidInput(("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", show(group))
         if omega is None:
             raise InvalidInput(("omega",), "a matrix of the Lie algebra", "nothing")
         system = cls.__new__(cls)
@@ -130,7 +130,7 @@ class LRSystem(Problem):
     def _become(self, distribution: Distribution, inertia: Inertia, g: Any, omega: Any, potential: Any, homogeneous: Any) -> None:
         require_truth_value(homogeneous, "homogeneous")
         group = distribution.group
-        start = np.eye(group.size) if g is None else group.admitted(g)
+        start = np.eye(group.size) if g is None else group.validate(g)
         velocity = group.algebra_element(omega, ("omega",))
         along, across = distribution.components(start, velocity)
         size, off = float(np.max(np.abs(velocity))), float(np.max(np.abs(across), initial=0.0))
@@ -194,20 +194,20 @@ class LRSystem(Problem):
     def flow(self, formulation: str = "momentum") -> LRFlow:
         """Return the momentum equation on the group, or Euler–Poincaré with multipliers, in units of this problem."""
         unit, k = 1 / self.turning, self.inertia.exponent
-        inertia, velocity = self.inertia.scaled(), self.omega * unit
+        inertia, velocity = self.inertia.rescale(), self.omega * unit
         along = self.distribution.components(self.g, inertia(velocity))[0]
         across = self.constraint * unit
-        potential = self.potential.scaled(unit * unit * 2.0**-k) if self.potential else None
+        potential = self.potential.scale(unit * unit * 2.0**-k) if self.potential else None
         kind = MomentumFlow if formulation == "momentum" else MultiplierFlow
         return kind(self.distribution, inertia, potential, unit, self.g, along, across, self._invariant[1])
 
-    def _taken_apart(self, series: Series) -> tuple[Array, Array]:
+    def _split(self, series: Series) -> tuple[Array, Array]:
         """Return g and the coordinates of ω along series."""
         return np.swapaxes(series["frame"], -1, -2), self.distribution.group.coordinates(series["omega"])
 
     def derive(self, name: str, series: Series) -> Array:
         """Return 𝓜 of (mom) as matrices (N, n, n), or the multipliers λ_s of (EPS), (N, m)."""
-        g, omega = self._taken_apart(series)
+        g, omega = self._split(series)
         group = self.distribution.group
         if name == "momentum":
             return np.asarray(group.element(self.distribution.momentum(self.inertia, g, omega)), dtype=np.float64)
@@ -215,7 +215,7 @@ class LRSystem(Problem):
         if self.potential:
             force = force - self.potential.gradient(group, g)
         parts = self.distribution.parts(g, force)
-        return np.concatenate([multipliers_of(self.inertia.inverse, self.distribution.seen(h)[1], f)[0] for h, f in parts])
+        return np.concatenate([multipliers_of(self.inertia.inverse, self.distribution.in_body(h)[1], f)[0] for h, f in parts])
 
     def _jacobi(self, g: Array, omega: Array) -> Array:
         return jacobi_integral(self.distribution, self.inertia, self.constraint, self.potential, g, omega)
@@ -249,7 +249,7 @@ class LRSystem(Problem):
                         s is the largest component of 𝓜 at t = 0
         ``group``       the largest entry of what is wrong with the frame
         """
-        g, omega = self._taken_apart(series)
+        g, omega = self._split(series)
         directions, jacobi = self._invariant
         along = self.distribution.components(g, self.inertia(omega))[0] @ directions.T
         found = {"energy": self._jacobi(g, omega)} if jacobi else {}

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.exact_input import given_arguments, read_only, require_truth_value, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
 from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues, norm, uhlenbeck_integrals
-from veselova.mechanics.geometry.natural_frame import moser_frame, refined
+from veselova.mechanics.geometry.natural_frame import moser_frame, refine
 from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -68,7 +68,7 @@ class NeumannSystem(TorusProblem):
         self._set(A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact)
         _require_representable(self.A, self.q_prime)
         near_frame = moser_frame(self.A, self.q, self.q_prime)
-        self._set(near_frame=near_frame, given=stated(A=A, q=q, q_prime=q_prime, normalize=normalize))
+        self._set(near_frame=near_frame, given=given_arguments(A=A, q=q, q_prime=q_prime, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_prime"))
@@ -82,7 +82,7 @@ class NeumannSystem(TorusProblem):
     @cached_property
     def frame(self) -> Array:
         """Return the frame at τ₁ = 0, (n, n), to the last bit."""
-        return read_only(refined(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent, Fraction(1)))
+        return read_only(refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent, Fraction(1)))
 
     @property
     def energy(self) -> float:
@@ -115,7 +115,7 @@ class NeumannSystem(TorusProblem):
         """Return q, the first column of the frame."""
         return np.asarray(series["frame"][..., 0])
 
-    def completed(self, series: Series) -> Series:
+    def complete(self, series: Series) -> Series:
         """Return the engine's series under the names of this system, with the spheroconic coordinates."""
         spheroconic = series.get("spheroconic")
         if spheroconic is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.bodies.principal_inertia import principal_inertia, require_moderate, symmetric_matrix
 from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_vector, is_matrix, require_truth_value, stated, to_float
+from veselova.mechanics.core.exact_input import exact_vector, given_arguments, is_matrix, require_truth_value, to_float
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
 from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
@@ -89,7 +89,7 @@ class RigidBody(Problem):
         self._set(moments=moments, wide_axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
-        given = stated(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
+        given = given_arguments(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
         self._set(given=given)
 
     @property
@@ -97,10 +97,10 @@ class RigidBody(Problem):
         """Return the principal axes as columns, (3, 3), where a matrix was given."""
         return None if self.wide_axes is None else self.wide_axes.rounded
 
-    def along_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+    def to_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
         """Return γ, of any length, and Ω along the principal axes, as given."""
         given, axes = (self.exact_gamma, self.exact_Omega), self.wide_axes
-        return given if axes is None else (axes.along(given[0]), axes.along(given[1]))
+        return given if axes is None else (axes.to_axes(given[0]), axes.to_axes(given[1]))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6)}" for name in ("inertia", "gamma", "Omega"))

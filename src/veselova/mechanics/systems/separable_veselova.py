@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
-from veselova.mechanics.core.errors import InvalidInput, shown
-from veselova.mechanics.core.exact_input import exact_number, exact_vector, require_truth_value, stated, to_float
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, given_arguments, require_truth_value, to_float
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.separable_flow import SeparableFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
@@ -68,12 +68,12 @@ class SeparableVeselova(Problem):
         n = len(diagonal)
         for i, value in enumerate(diagonal):
             if value in diagonal[:i]:
-                raise InvalidInput(("A", i), "a number different from the others", shown(A[i]))
+                raise InvalidInput(("A", i), "a number different from the others", show(A[i]))
         exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
         parts = _potential(potential, n)
         for i, beta in enumerate(parts[2]):
             if beta and not exact.q[i]:
-                raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", shown(beta))
+                raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", show(beta))
         self._set(A=to_float(diagonal), q=unit(position), q_dot=to_float(exact.tangent), exact=exact, potential=parts)
         for name, values in {"potential": (*parts[:2], *parts[2]), "q_dot": exact.tangent}.items():
             largest = max(abs(x) for x in values)
@@ -81,7 +81,7 @@ class SeparableVeselova(Problem):
                 raise InvalidInput((name,), f"numbers up to {float(_LARGEST):.0e}", f"{float(largest):.3g}")
         if not np.isfinite(self.energy):
             raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
-        self._set(given=stated(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
+        self._set(given=given_arguments(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
@@ -166,7 +166,7 @@ def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, 
     if given is None:
         return Fraction(0), Fraction(0), (Fraction(0),) * n
     if not isinstance(given, Mapping) or not given or set(given) - set(_PARTS):
-        raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", shown(given))
+        raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given))
     quartic, quadratic = (exact_number(given.get(name, 0), ("potential", name)) for name in _PARTS[:2])
     betas = exact_vector(given["centrifugal"], ("potential", "centrifugal"), n) if "centrifugal" in given else (Fraction(0),) * n
     return quartic, quadratic, betas

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
-from veselova.mechanics.core.errors import InvalidInput, shown
-from veselova.mechanics.core.exact_input import exact_matrix, is_matrix, require_truth_value, stated, to_float
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_matrix, given_arguments, is_matrix, require_truth_value, to_float
 from veselova.mechanics.core.flow import FLOATS, Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.cotangent_flow import CotangentFlow, MomentumFlow
@@ -70,7 +70,7 @@ class StiefelFlow(Problem):
         if (P is None) == (X_dot is None):
             raise InvalidInput(("P",), "either P or X_dot", "neither" if P is None else "both")
         if not is_matrix(X) or len(X) < 2:
-            raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", shown(X))
+            raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", show(X))
         n, r = len(X), len(X[0])
         if not 1 <= r <= n:
             raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
@@ -82,7 +82,7 @@ class StiefelFlow(Problem):
         self._set(inertia=operator, X=columns, P=momentum)
         if not (np.isfinite(self.energy) and np.all(np.isfinite(self.omega)) and bool(np.any(momentum)) == (self.energy > 0)):
             raise InvalidInput((name,), "an energy and angular velocity within the range of a float", f"energy {self.energy}")
-        self._set(given=stated(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize))
+        self._set(given=given_arguments(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
         parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("X", "P"))

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
-from veselova.mechanics.core.errors import InvalidInput, shown
-from veselova.mechanics.core.exact_input import exact_number, read_only, require_truth_value, stated, to_float
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_number, given_arguments, read_only, require_truth_value, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
-from veselova.mechanics.geometry.natural_frame import moser_frame, refined
+from veselova.mechanics.geometry.natural_frame import moser_frame, refine
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.neumann import NeumannSystem
@@ -76,10 +76,10 @@ class Veselova(TorusProblem):
         exact_frame = None if frame is None else given_frame(frame, exact.q, normalize)
         if axes is not None:
             # The tangential part, so that a body at rest stays so.
-            exact = replace(exact, q=axes.along(exact.q), q_dot=axes.along(exact.tangent))
+            exact = replace(exact, q=axes.to_axes(exact.q), q_dot=axes.to_axes(exact.tangent))
             position = to_float(over_largest(exact.q))
         exact = replace(exact, frame=exact_frame)
-        position, velocity = unit(position), _rounded(exact.tangent)
+        position, velocity = unit(position), _round(exact.tangent)
         A_float = to_float(diagonal)
         found = integrals.StateIntegrals(A_float, position, velocity)
         _require_representable_energy(float(found.scaled_energy), velocity)
@@ -88,7 +88,7 @@ class Veselova(TorusProblem):
         else:
             along = to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
             near_frame = admissible_frame(along, position)
-        given = stated(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
+        given = given_arguments(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
         self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given)
         self._set(axes=None if axes is None else axes.rounded)
 
@@ -100,7 +100,7 @@ class Veselova(TorusProblem):
         """
         h = float(exact_number(energy, ("energy",)))
         if h <= 0:
-            raise InvalidInput(("energy",), "a number greater than 0", shown(energy))
+            raise InvalidInput(("energy",), "a number greater than 0", show(energy))
         A, q, v = system.A, system.q, system.q_prime
         F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
         if abs(F0) > INPUT_TOLERANCE:
@@ -131,7 +131,7 @@ class Veselova(TorusProblem):
         """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the last bit."""
         if not self.exact.natural:
             return self.near_frame
-        return read_only(refined(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
+        return read_only(refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
 
     @cached_property
     def energy(self) -> float:
@@ -167,7 +167,7 @@ class Veselova(TorusProblem):
     def start(self) -> Series:
         """Return the series at t = 0."""
         series = {"tau1": np.zeros(1), "q_dot": self.q_dot[None], "frame": self.frame[None]}
-        return self.completed({**series, "spheroconic": self.spheroconic[None]})
+        return self.complete({**series, "spheroconic": self.spheroconic[None]})
 
     def flow(self, formulation: str = "reduced") -> ReducedFlow:
         """Return the reduced flow (extended) with the frame, in units of this problem; the body must move."""
@@ -194,10 +194,10 @@ class Veselova(TorusProblem):
             return derive_velocity_pair(midpoints, radii, digits)
         return super().derive_decimals(name, midpoints, radii, digits)
 
-    def completed(self, series: Series) -> Series:
+    def complete(self, series: Series) -> Series:
         """Return series along the principal axes of A in the body axes; spheroconic coordinates only where they were found."""
-        turned = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
-        return {**series, **turned}
+        rotated = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
+        return {**series, **rotated}
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along states in the body axes, by name, first axis the times.
@@ -229,7 +229,7 @@ class Veselova(TorusProblem):
         return np.asarray(vectors @ self.axes.T if vectors.ndim < 3 else self.axes @ vectors, dtype=np.float64)
 
 
-def _rounded(tangent: tuple[Fraction, ...]) -> Array:
+def _round(tangent: tuple[Fraction, ...]) -> Array:
     try:
         return to_float(tangent)
     except OverflowError:

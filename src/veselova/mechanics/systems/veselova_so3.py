@@ -179,7 +179,7 @@ class VeselovaSO3(RigidBody):
         self._require_geodesic()
         if not np.any(self.Omega):
             raise Unsolved("not-rank-one", "a body at rest has no Neumann time: dτ₁/dt = 0")
-        exact_gamma, exact_Omega = self.along_axes()
+        exact_gamma, exact_Omega = self.to_axes()
         gamma, Omega = unit(to_float(over_largest(exact_gamma))), to_float(exact_Omega)
         moments = to_float(self.moments)
         rate = np.sqrt(Omega @ (moments * Omega) / np.prod(moments) / (gamma @ (gamma / moments)))

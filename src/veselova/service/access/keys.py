@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.service.access.database import api_keys, connect, in_utc, is_outage, writing
 from veselova.service.api.caller import SCOPES, SOLVE
 from veselova.service.api.problem_details import Refused
@@ -79,9 +79,9 @@ class Keys:
         ``same_as``: the id of a key whose owner the new one shares. Raises InvalidInput.
         """
         if not 0 < len(name) <= _LONGEST_NAME or not name.isprintable():
-            raise InvalidInput(("NAME",), f"1 to {_LONGEST_NAME} printable characters", shown(name))
+            raise InvalidInput(("NAME",), f"1 to {_LONGEST_NAME} printable characters", show(name))
         if scope not in SCOPES:
-            raise InvalidInput(("--scope",), f"one of {', '.join(SCOPES)}", shown(scope))
+            raise InvalidInput(("--scope",), f"one of {', '.join(SCOPES)}", show(scope))
         key_id = secrets.token_hex(6)
         owner = key_id if same_as is None else self._existing(same_as, "--same-owner-as").owner
         key = Key(key_id, name, datetime.now(UTC), None, scope, owner, expires_at)
@@ -111,7 +111,7 @@ class Keys:
             with self._reading() as connection:
                 row = connection.execute(sa.select(api_keys).where(api_keys.c.id == key_id)).one_or_none()
         if row is None:
-            raise InvalidInput((field,), "the id of a key (veselova keys list)", shown(key_id))
+            raise InvalidInput((field,), "the id of a key (veselova keys list)", show(key_id))
         return _key(row)
 
     def holder(self, text: str) -> Key | None:

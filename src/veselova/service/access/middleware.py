@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from veselova.service.access.keys import Key, Keys
 from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller, put_caller
 from veselova.service.api.problem_details import Refused, problem_response
-from veselova.service.api.rate_limits import Allowance, Rate, network_of, rate_of
+from veselova.service.api.rate_limits import Allowance, RateLimit, network_of, rate_of
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note
 
@@ -44,9 +44,9 @@ class Policy:
     """
 
     keys: Keys | None
-    by_key: Rate | None
-    by_address: Rate | None
-    failures: Rate | None
+    by_key: RateLimit | None
+    by_address: RateLimit | None
+    failures: RateLimit | None
 
     @staticmethod
     def requires_keys(settings: Settings, loopback: bool) -> bool:
@@ -145,7 +145,7 @@ def _require_scope(key: Key, needed: str, headers: dict[str, str]) -> None:
         raise Refused("insufficient-scope", f"The API key: required scope {needed}; given one of scope {key.scope}.")
 
 
-async def _spend(rate: Rate | None, caller: str, kind: str, headers: dict[str, str]) -> None:
+async def _spend(rate: RateLimit | None, caller: str, kind: str, headers: dict[str, str]) -> None:
     if rate is not None:
         allowance = await rate.spend(caller)
         headers.update(allowance.headers)

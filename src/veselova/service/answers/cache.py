@@ -75,7 +75,7 @@ class Cache:
     def make_room(self) -> None:
         """Remove the entries used longest ago where all together are too large, and see how many bytes may be added."""
         try:
-            self._room = self._searched()
+            self._room = self._evict()
         except OSError as error:
             self._report(error)
 
@@ -91,7 +91,7 @@ class Cache:
     def _path(self, name: str) -> Path:
         return self._folder / f"{name}{_WHOLE}"
 
-    def _searched(self) -> int:
+    def _evict(self) -> int:
         """Remove entries until the others fit, and return how many bytes may be added before the next search.
 
         The newest stays: it fits by itself. What another server removes meanwhile is gone as well.

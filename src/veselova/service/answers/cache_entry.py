@@ -22,7 +22,7 @@ from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.trajectory import Provenance, Trajectory
 from veselova.service.api.request_models import TrajectoryRequest
 
-__all__ = ["DamagedEntry", "Entry", "packed", "read_entry", "unpacked"]
+__all__ = ["DamagedEntry", "Entry", "pack", "read_entry", "unpack"]
 
 Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 
@@ -50,13 +50,13 @@ class Entry:
         arrays = _arrays(trajectory)
         if _bytes(arrays) > self.most:
             return 0
-        return self._placed(lambda stream: _write(stream, request, trajectory, arrays))
+        return self._place(lambda stream: _write(stream, request, trajectory, arrays))
 
     def write_packed(self, content: bytes) -> int:
         """Keep what ``packed`` gave; returns and raises the same."""
-        return self._placed(lambda stream: stream.write(content))
+        return self._place(lambda stream: stream.write(content))
 
-    def _placed(self, write: Callable[[BinaryIO], object]) -> int:
+    def _place(self, write: Callable[[BinaryIO], object]) -> int:
         part = Path(self.part)
         try:
             try:
@@ -78,7 +78,7 @@ class Entry:
         return 0
 
 
-def packed(request: Mapping[str, Any], trajectory: Trajectory, most: int) -> bytes | None:
+def pack(request: Mapping[str, Any], trajectory: Trajectory, most: int) -> bytes | None:
     """Return the content of the entry of a trajectory, None where it has more bytes than that."""
     arrays = _arrays(trajectory)
     if _bytes(arrays) > most:
@@ -140,12 +140,12 @@ def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
     """
     os.utime(path)
     try:
-        return unpacked(Path(path).read_bytes())
+        return unpack(Path(path).read_bytes())
     except (ValueError, KeyError, TypeError, VeselovaError) as error:
         raise DamagedEntry(f"{path}: {type(error).__name__}") from None
 
 
-def unpacked(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
+def unpack(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
     """Return what the content of an entry holds; raises ValueError, KeyError, TypeError or VeselovaError where it is damaged."""
     whole, checksum = memoryview(content)[: -_CHECKSUM.size], content[-_CHECKSUM.size :]
     if _CHECKSUM.pack(zlib.crc32(whole)) != checksum:

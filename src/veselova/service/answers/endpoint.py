@@ -15,13 +15,13 @@ from veselova.service.answers.cache import Cache
 from veselova.service.answers.cache_entry import DamagedEntry
 from veselova.service.answers.disconnect import while_connected
 from veselova.service.answers.etag import entity_tag, is_identity, matches
-from veselova.service.answers.rendering import Delivery, Wanted, answered, restored, solved
+from veselova.service.answers.rendering import Rendering, Representation, render_answer, render_kept, render_solution
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.answers.spool import Spool, SpooledResponse
-from veselova.service.answers.write_behind import Pending
+from veselova.service.answers.write_behind import WriteBehind
 from veselova.service.api.caller import caller_of
-from veselova.service.api.content_negotiation import accepted_coding, accepted_type
+from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS, Format, format_of
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -49,7 +49,7 @@ class Answers:
     def __init__(self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics) -> None:
         self._settings, self._workers, self._reader, self._metrics = settings, workers, reader, metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
-        self._pending = Pending(self._cache)
+        self._write_behind = WriteBehind(self._cache)
         self._spool = Spool(settings.data_dir / "spool")
 
     @asynccontextmanager
@@ -57,7 +57,7 @@ class Answers:
         """Keep the spool open, and write what is to be kept, for the life of the server."""
         await to_thread.run_sync(self._spool.open)
         try:
-            async with self._pending.writing():
+            async with self._write_behind.writing():
                 yield
         finally:
             self._spool.close()
@@ -65,40 +65,40 @@ class Answers:
     async def document(self, kind: str, request: Request) -> Response:
         """Return the JSON answer of a comparison or a torus."""
         require_acceptable(_header(request, "accept"))
-        asked = await self._reader.asked(kind, request)
-        wanted = Wanted("json", _coding(request), self._place(asked.large))
+        asked = await self._reader.parse_body(kind, request)
+        wanted = Representation("json", _coding(request), self._place(asked.large))
 
         async def work() -> Response:
             with self._metrics.work(kind, asked.system, asked.engine):
                 delivery = await self._workers.run(
-                    answered, kind, asked.content, wanted, budget_s=asked.budget_s, caller=caller_of(request).name
+                    render_answer, kind, asked.content, wanted, budget_s=asked.budget_s, caller=caller_of(request).name
                 )
             return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
 
-        return await self._guarded(request, work, wanted.place)
+        return await self._run_while_connected(request, work, wanted.place)
 
     async def trajectory(self, request: Request) -> Response:
         """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
         form = _format(request)
-        asked = await self._reader.asked("trajectory", request)
+        asked = await self._reader.parse_body("trajectory", request)
         name = asked.name
-        kept_as = _kept_as(name, request)
+        kept_as = _cache_name(name, request)
         await self._require_news(request, kept_as, entity_tag(name, form.name))
-        wanted = Wanted(form.name, _coding(request), self._place(asked.large))
-        entry, content = self._cache.entry(kept_as), self._pending.find(kept_as)
-        task = (restored, content, wanted) if content else (solved, asked.content, wanted, entry)
+        wanted = Representation(form.name, _coding(request), self._place(asked.large))
+        entry, content = self._cache.entry(kept_as), self._write_behind.find(kept_as)
+        task = (render_kept, content, wanted) if content else (render_solution, asked.content, wanted, entry)
 
         async def work() -> Response:
             with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
                     delivery = await self._workers.run(*task, budget_s=asked.budget_s, caller=caller_of(request).name)
-                    ending.kept = delivery.kept
+                    ending.cached = delivery.cached
                 finally:
-                    self._metrics.cached(hit=ending.kept)
-            headers = _headers(name, form, await self._kept(kept_as, delivery))
-            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.kept else headers)
+                    self._metrics.count_cached(hit=ending.cached)
+            headers = _headers(name, form, await self._keep(kept_as, delivery))
+            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.cached else headers)
 
-        return await self._guarded(request, work, wanted.place, None if entry is None else entry.part)
+        return await self._run_while_connected(request, work, wanted.place, None if entry is None else entry.part)
 
     async def _require_news(self, request: Request, kept_as: str, tag: str) -> None:
         """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304 answers GET and HEAD alone."""
@@ -110,9 +110,9 @@ class Answers:
 
     async def _find(self, name: str) -> bytes | str | None:
         """Return an entry that is kept: the content of one that is not written yet, the file of another."""
-        return self._pending.find(name) or await to_thread.run_sync(self._cache.find, name)
+        return self._write_behind.find(name) or await to_thread.run_sync(self._cache.find, name)
 
-    async def _kept(self, name: str, delivery: Delivery) -> bool:
+    async def _keep(self, name: str, delivery: Rendering) -> bool:
         """See to what the cache has to do with an answer, and return whether it can be had again."""
         if delivery.damaged:
             await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
@@ -121,15 +121,15 @@ class Answers:
         if delivery.stored and self._cache.is_full(delivery.stored):
             await to_thread.run_sync(self._cache.make_room)
         if delivery.entry is not None:
-            return await self._pending.keep(name, delivery.entry)
-        return delivery.kept or delivery.stored > 0
+            return await self._write_behind.keep(name, delivery.entry)
+        return delivery.cached or delivery.stored > 0
 
-    async def named(self, name: str, request: Request) -> Response:
+    async def get_kept(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
         form = _format(request)
-        kept_as = _kept_as(name, request)
-        kept = await self._find(kept_as) if is_identity(name) else None
-        if kept is None:
+        kept_as = _cache_name(name, request)
+        cached = await self._find(kept_as) if is_identity(name) else None
+        if cached is None:
             raise _not_kept(name)
         headers = {**_headers(name, form), "Cache-Control": _FOREVER}
         if matches(_header(request, "if-none-match"), headers["ETag"], exists=True):
@@ -138,20 +138,20 @@ class Answers:
             response = Response(headers={**headers, "Content-Type": form.media_type})
             del response.headers["content-length"]  # that of the GET is not known before it
             return response
-        wanted = Wanted(form.name, _coding(request), self._place(_bytes(kept) > _LARGE_BYTES))
+        wanted = Representation(form.name, _coding(request), self._place(_bytes(cached) > _LARGE_BYTES))
 
         async def work() -> Response:
-            delivery = await self._restored(kept_as, kept, wanted, caller_of(request).name)
+            delivery = await self._restore(kept_as, cached, wanted, caller_of(request).name)
             if delivery is None:
                 raise _not_kept(name)
             return _response(delivery, wanted, {**headers, "Cache-Status": _HIT})
 
-        return await self._guarded(request, work, wanted.place)
+        return await self._run_while_connected(request, work, wanted.place)
 
-    async def _restored(self, name: str, kept: bytes | str, wanted: Wanted, caller: str) -> Delivery | None:
+    async def _restore(self, name: str, cached: bytes | str, wanted: Representation, caller: str) -> Rendering | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
-            return await self._workers.run(restored, kept, wanted, budget_s=self._settings.max_budget_s, caller=caller)
+            return await self._workers.run(render_kept, cached, wanted, budget_s=self._settings.max_budget_s, caller=caller)
         except DamagedEntry:
             await to_thread.run_sync(self._cache.discard, name)
         except FileNotFoundError:
@@ -162,7 +162,7 @@ class Answers:
         return self._spool.place() if needed else None
 
     @staticmethod
-    async def _guarded(request: Request, work: Any, *places: str | None) -> Response:
+    async def _run_while_connected(request: Request, work: Any, *places: str | None) -> Response:
         """Return what the work gives while the client is there; of work that was stopped no file is left."""
         try:
             return await while_connected(request, work)
@@ -173,7 +173,7 @@ class Answers:
             raise
 
 
-def _response(delivery: Delivery, wanted: Wanted, headers: Mapping[str, str]) -> Response:
+def _response(delivery: Rendering, wanted: Representation, headers: Mapping[str, str]) -> Response:
     fields = {**headers, "Content-Type": FORMATS[wanted.format].media_type}
     if delivery.coding != "identity":
         fields["Content-Encoding"] = delivery.coding
@@ -184,12 +184,12 @@ def _response(delivery: Delivery, wanted: Wanted, headers: Mapping[str, str]) ->
     return SpooledResponse(str(wanted.place), fields)
 
 
-def _headers(name: str, form: Format, kept: bool = True) -> dict[str, str]:
+def _headers(name: str, form: Format, cached: bool = True) -> dict[str, str]:
     """Return what the headers of a trajectory say of its name: its own address where it can be had there again."""
     headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
     if form.name != "json":
         headers["Content-Disposition"] = f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
-    return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if kept else headers
+    return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if cached else headers
 
 
 def _header(request: Request, name: str) -> str | None:
@@ -197,21 +197,21 @@ def _header(request: Request, name: str) -> str | None:
 
 
 def _format(request: Request) -> Format:
-    return format_of(accepted_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()]))
+    return format_of(negotiate_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()]))
 
 
 def _coding(request: Request) -> str:
-    return accepted_coding(_header(request, "accept-encoding"))
+    return negotiate_coding(_header(request, "accept-encoding"))
 
 
-def _bytes(kept: bytes | str) -> int:
+def _bytes(cached: bytes | str) -> int:
     try:
-        return len(kept) if isinstance(kept, bytes) else Path(kept).stat().st_size
+        return len(cached) if isinstance(cached, bytes) else Path(cached).stat().st_size
     except OSError:
         return 0
 
 
-def _kept_as(name: str, request: Request) -> str:
+def _cache_name(name: str, request: Request) -> str:
     """Return the name under which the cache has an answer: that of an owner is no name of an answer, and so nobody else's."""
     owner = caller_of(request).owner
     return f"{owner}-{name}" if owner else name

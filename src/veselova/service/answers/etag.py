@@ -11,14 +11,14 @@ from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.request_models import TrajectoryRequest
 from veselova.version import __version__
 
-__all__ = ["entity_tag", "identity", "is_identity", "matches"]
+__all__ = ["cache_key", "entity_tag", "is_identity", "matches"]
 
 
 #: Canonical text: a dictionary has no order.
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 
 
-def identity(request: TrajectoryRequest, stated: Mapping[str, Any]) -> str:
+def cache_key(request: TrajectoryRequest, stated: Mapping[str, Any]) -> str:
     """Return the SHA-256 of the canonical request and of the version of the package, which answers it, in hexadecimal.
 
     ``stated`` is the request as JSON values.

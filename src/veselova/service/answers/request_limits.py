@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.api.content_negotiation import accepted_type
+from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import ComparisonRequest, TorusRequest
 from veselova.service.api.settings import Settings
@@ -16,7 +16,7 @@ __all__ = ["admit", "require_acceptable", "require_modest"]
 
 def require_acceptable(accept: str | None) -> None:
     """Raise Refused unless an Accept header allows application/json."""
-    accepted_type(accept, ["application/json"])
+    negotiate_type(accept, ["application/json"])
 
 
 def require_modest(document: Any, settings: Settings) -> None:

@@ -13,10 +13,10 @@ from anyio import to_thread
 from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.service.answers.etag import identity
+from veselova.service.answers.etag import cache_key
 from veselova.service.answers.request_limits import admit, require_modest
 from veselova.service.api.caller import caller_of
-from veselova.service.api.json_text import decoded
+from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
 from veselova.service.api.settings import Settings
@@ -62,7 +62,7 @@ class Reader:
     def __init__(self, settings: Settings, workers: Workers) -> None:
         self._settings, self._workers = settings, workers
 
-    async def asked(self, kind: str, request: Request) -> Asked:
+    async def parse_body(self, kind: str, request: Request) -> Asked:
         """Return what the body of a request asks, of a kind of TASKS or of a sweep.
 
         Raises Refused for another media type, a body over the limit, one that does not come whole, or text that is not JSON;
@@ -105,7 +105,7 @@ def _require_json(request: Request) -> None:
 
 def _read(kind: str, body: bytes, settings: Settings) -> Asked:
     """Return what a body asks; raises Refused and InvalidInput as ``Reader.asked`` does."""
-    document = decoded(body)
+    document = decode(body)
     require_modest(document, settings)
     model: type[TorusRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
     request: Any = read_request(model, document)
@@ -115,7 +115,7 @@ def _read(kind: str, body: bytes, settings: Settings) -> Asked:
         return Asked(request.problem.system, request.engine or "", request.budget_s, False, request.id, content)
     stated, name, engine = request.model_dump(), "", "both" if kind == "comparison" else "analytic"
     if isinstance(request, TrajectoryRequest):
-        name, engine = identity(request, stated), request.chosen_engine
+        name, engine = cache_key(request, stated), request.chosen_engine
     content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
     return Asked(request.problem.system, engine, request.budget_s, _is_large(request), name, content)
 

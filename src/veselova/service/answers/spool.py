@@ -49,7 +49,7 @@ class Spool:
                     own_folder(parent)
                 _remove_orphans(parent)
                 self._folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
-                self._lock = _locked(self._folder)
+                self._lock = _lock(self._folder)
             except (OSError, InvalidInput) as error:
                 _LOG.warning("%s cannot hold large answers on their way: %s", parent, getattr(error, "strerror", None) or error)
             else:
@@ -74,12 +74,12 @@ def _remove_orphans(parent: Path) -> None:
             state = folder.lstat()
             if not stat.S_ISDIR(state.st_mode) or (hasattr(os, "geteuid") and state.st_uid != os.geteuid()):
                 continue
-            if time.time() - state.st_mtime > _NEW_S and (lock := _locked(folder)) is not None:
+            if time.time() - state.st_mtime > _NEW_S and (lock := _lock(folder)) is not None:
                 shutil.rmtree(folder, ignore_errors=True)
                 os.close(lock)
 
 
-def _locked(folder: Path) -> int | None:
+def _lock(folder: Path) -> int | None:
     """Return a lock on a folder, which ends with this process; raises OSError where another has it. None without locks."""
     try:
         import fcntl

@@ -10,7 +10,7 @@ from anyio import to_thread
 
 from veselova.service.answers.cache import Cache
 
-__all__ = ["Pending"]
+__all__ = ["WriteBehind"]
 
 #: Bytes that may be on their way together.
 _MOST = 8_000_000
@@ -19,7 +19,7 @@ _MOST = 8_000_000
 _PAUSE_S = 0.005
 
 
-class Pending:
+class WriteBehind:
     """What is kept and not written yet. Writing follows the answers as long as it works and keeps up with them.
 
     An entry is written before its answer leaves where the last one could not be written, where none has been yet, and where

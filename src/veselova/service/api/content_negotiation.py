@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from veselova.service.api.problem_details import Refused
 
-__all__ = ["CODINGS", "accepted_coding", "accepted_type"]
+__all__ = ["CODINGS", "negotiate_coding", "negotiate_type"]
 
 #: Content codings on offer; of two that a client likes equally, the first is taken.
 CODINGS = ("zstd", "gzip")
 
 
-def accepted_type(accept: str | None, offered: Sequence[str]) -> str:
+def negotiate_type(accept: str | None, offered: Sequence[str]) -> str:
     """Return the offered media type of the highest quality, the first of equals; raises Refused where none is acceptable."""
     if not accept:
         return offered[0]
@@ -29,7 +29,7 @@ def accepted_type(accept: str | None, offered: Sequence[str]) -> str:
     raise Refused("not-acceptable", f"Accept: required one of {', '.join(offered)}; given {accept[:100]}.")
 
 
-def accepted_coding(accept_encoding: str | None) -> str:
+def negotiate_coding(accept_encoding: str | None) -> str:
     """Return the content coding that a client prefers, or ``identity``, which is never refused."""
     qualities = _qualities(accept_encoding or "")
     plain = qualities.get("identity", 0.0)

@@ -34,7 +34,7 @@ ANSWERS: dict[str, Any] = {
             "digits": 15,
             "version": "0.2.0",
             "seconds": 0.013,
-            "details": {"clock": "panels", "clock_size": 144, "theta_terms": 445},
+            "details": {"time_map": "panels", "time_map_size": 144, "theta_terms": 445},
         },
     },
     "torus": {

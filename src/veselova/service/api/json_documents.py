@@ -21,7 +21,7 @@ from veselova.mechanics.results.trajectory import Provenance, Trajectory
 __all__ = [
     "comparison_document",
     "comparison_of",
-    "encoded",
+    "encode",
     "torus_of",
     "trajectory_document",
     "trajectory_of",
@@ -106,7 +106,7 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
     return Torus(**{**values, "origins": tuple(values["origins"])})
 
 
-def encoded(document: Mapping[str, Any]) -> bytes:
+def encode(document: Mapping[str, Any]) -> bytes:
     """Return a document as JSON bytes; NaN and infinity, which JSON cannot say and orjson writes as null, are our bug."""
     stream = io.BytesIO()
     write_document(document, stream)

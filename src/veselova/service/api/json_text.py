@@ -12,7 +12,7 @@ from typing import Any
 from veselova.mechanics.core.errors import MOST_FAULTS, InvalidInput, InvalidRequest
 from veselova.service.api.problem_details import Refused
 
-__all__ = ["BeyondFloat", "decoded", "layers"]
+__all__ = ["BeyondFloat", "decode", "layers"]
 
 Path = tuple[str | int, ...]
 
@@ -45,7 +45,7 @@ class BeyondFloat(float):
 _SHOWN_DIGITS = 100
 
 
-def decoded(text: bytes) -> Any:
+def decode(text: bytes) -> Any:
     """Return the document that a text states; raises Refused when it is not JSON, InvalidRequest where names come twice.
 
     NaN, Infinity and 1e999 are no JSON, but their sender is helped more by the name of the field: Python's own parser takes

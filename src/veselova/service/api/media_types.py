@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, TypeAlias, cast
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import trajectory_document, write_document
 
-__all__ = ["FORMATS", "JSON", "Format", "coded", "format_of"]
+__all__ = ["FORMATS", "JSON", "Format", "encode_stream", "format_of"]
 
 Outputs: TypeAlias = "Iterable[str] | None"
 
@@ -54,7 +54,7 @@ def format_of(media_type: str) -> Format:
 
 
 @contextmanager
-def coded(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
+def encode_stream(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
     """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or ``identity``."""
     if coding == "identity":
         yield stream

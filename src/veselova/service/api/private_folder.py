@@ -52,11 +52,11 @@ def require_own(path: Path) -> None:
         return
     account = os.geteuid()
     if stat.S_ISLNK(link.st_mode) and (link.st_uid not in (account, 0) or _is_shared(path.parent)):
-        raise _refused(path, f"a link of account {link.st_uid} to another place")
+        raise _refusal(path, f"a link of account {link.st_uid} to another place")
     if folder.st_uid != account:
-        raise _refused(path, f"one of account {folder.st_uid}, while this is account {account}")
+        raise _refusal(path, f"one of account {folder.st_uid}, while this is account {account}")
     if folder.st_mode & _OTHERS_WRITE:
-        raise _refused(path, f"one of mode {stat.S_IMODE(folder.st_mode):04o} (chmod go-w '{path}')")
+        raise _refusal(path, f"one of mode {stat.S_IMODE(folder.st_mode):04o} (chmod go-w '{path}')")
 
 
 def _is_shared(folder: Path) -> bool:
@@ -77,6 +77,6 @@ def restrict_file(path: Path) -> None:
         return
 
 
-def _refused(path: Path, given: str) -> InvalidInput:
+def _refusal(path: Path, given: str) -> InvalidInput:
     required = f"a folder of state that this account owns and nobody else may write, in place of {path}"
     return InvalidInput(("VESELOVA_DATA_DIR",), required, given)

@@ -12,7 +12,7 @@ from limits import RateLimitItem, parse
 from limits.aio.storage import MemoryStorage
 from limits.aio.strategies import FixedWindowRateLimiter
 
-__all__ = ["Allowance", "Rate", "network_of", "rate_of"]
+__all__ = ["Allowance", "RateLimit", "network_of", "rate_of"]
 
 #: One subscriber of IPv6 has at least a network of this length, and may take a new address in it for every request.
 _IPV6_PREFIX = 64
@@ -41,7 +41,7 @@ class Allowance:
         }
 
 
-class Rate:
+class RateLimit:
     """A limit such as 120/minute, counted for every caller by itself.
 
     A fixed window costs one counter for each caller, and its end is known exactly; around it a caller may spend two quotas.
@@ -54,15 +54,15 @@ class Rate:
 
     async def spend(self, caller: str) -> Allowance:
         """Count one request of a caller, and return what is left."""
-        counted = self._counted(caller)
+        counted = self._count(caller)
         return await self._allowance(counted, await self._limiter.hit(self._item, counted))
 
     async def look(self, caller: str) -> Allowance:
         """Return what is left without counting; ``granted`` says whether one more would be."""
-        counted = self._counted(caller)
+        counted = self._count(caller)
         return await self._allowance(counted, await self._limiter.test(self._item, counted))
 
-    def _counted(self, caller: str) -> str:
+    def _count(self, caller: str) -> str:
         known = self._storage.expirations
         return caller if len(known) < _MOST_CALLERS or self._item.key_for(caller) in known else "everyone else"
 
@@ -72,7 +72,7 @@ class Rate:
         return Allowance(self._item.amount, self._item.get_expiry(), max(0, left), reset, granted)
 
 
-def rate_of(text: str) -> Rate | None:
+def rate_of(text: str) -> RateLimit | None:
     """Return the limit that a text states, None for ``none``; raises ValueError for a text that states no limit."""
     if text == "none":
         return None
@@ -82,7 +82,7 @@ def rate_of(text: str) -> Rate | None:
         item = None
     if item is None or item.amount < 1 or ";" in text or "," in text:
         raise ValueError("required requests per second, minute, hour or day, such as 120/minute, or none")
-    return Rate(item)
+    return RateLimit(item)
 
 
 @lru_cache(_MOST_CALLERS)

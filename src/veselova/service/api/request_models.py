@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.engines import require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, InvalidRequest, VeselovaError, did_you_mean, shown, unknown_name
+from veselova.mechanics.core.errors import Faults, InvalidInput, InvalidRequest, VeselovaError, did_you_mean, show, unknown_name
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
@@ -78,7 +78,7 @@ class ComparisonRequest(TorusRequest):
         """Return the times asked for; raises InvalidInput located at ``times``."""
         if not isinstance(self.times, (list, dict)):  # Python takes a single number too, the schema of requests does not
             required = "a list of numbers, or exactly the fields start, stop, count"
-            raise InvalidInput(("times",), required, shown(self.times))
+            raise InvalidInput(("times",), required, show(self.times))
         return TimeGrid.of(self.times, self._exact)
 
     @property
@@ -182,7 +182,7 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
     if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:  # where pydantic says which model it took
         path = ("problem", *path[2:])
-    kind, given = item["type"], shown(item.get("input"))
+    kind, given = item["type"], show(item.get("input"))
     if kind == "union_tag_not_found":
         if isinstance(item.get("input"), dict):
             return InvalidInput((*path, "system"), "this field", "nothing")
@@ -192,7 +192,7 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     if kind == "missing":
         return InvalidInput(path, "this field", "nothing")
     if kind == "extra_forbidden":
-        return InvalidInput(path, "no field of this name", f"the field {shown(str(path[-1]))}{did_you_mean(path[-1], fields)}")
+        return InvalidInput(path, "no field of this name", f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}")
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return InvalidInput(path, "a JSON object", given)
     required: str = {

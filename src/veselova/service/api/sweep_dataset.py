@@ -11,7 +11,7 @@ import numpy as np
 from veselova.mechanics.core.errors import BackendMissing, install_extra
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.problem_models import SYSTEMS
-from veselova.service.api.sweep_parameters import components, tabulated
+from veselova.service.api.sweep_parameters import components, to_table_value
 from veselova.service.api.sweep_request import SweepRequest
 
 __all__ = ["sweep_dataset"]
@@ -52,7 +52,7 @@ def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[s
     variables: dict[str, Any] = {}
     given = {"row"}
     for axis in sweep.axes:
-        parts = [[tabulated(scalar) for _, scalar in components(axis.name, value)] for value in axis.values]
+        parts = [[to_table_value(scalar) for _, scalar in components(axis.name, value)] for value in axis.values]
         names = [name for name, _ in components(axis.name, axis.values[0])]
         given |= set(names)
         for name, values in zip(names, zip(*parts, strict=True), strict=True):

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import InvalidInput, shown, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
 from veselova.mechanics.core.exact_input import exact_number
 
-__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replaced", "tabulated"]
+__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replace_values", "to_table_value"]
 
 Path = tuple[str | int, ...]
 
@@ -55,7 +55,7 @@ class Draw(Parameter):
     bounds: tuple[float, float]
     shape: tuple[int, ...]
 
-    def drawn(self, random: np.random.Generator) -> Any:
+    def draw(self, random: np.random.Generator) -> Any:
         """Return one draw: a number, or nested lists of numbers."""
         first, second = self.bounds
         if self.distribution == "normal":
@@ -72,7 +72,7 @@ def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[
     distributions that are none; all axes together have at most ``most_values`` values.
     """
     if not isinstance(vary, Mapping) or not vary or len(vary) > _MOST_PARAMETERS:
-        raise InvalidInput(("vary",), f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem", shown(vary))
+        raise InvalidInput(("vary",), f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem", show(vary))
     found: list[Parameter] = []
     for pointer, stated in vary.items():
         where = ("vary", str(pointer)[:100].encode("utf-8", "backslashreplace").decode("utf-8"))
@@ -93,7 +93,7 @@ def _value_at(document: Any, path: Path) -> Any:
     return document
 
 
-def replaced(document: Mapping[str, Any], values: Mapping[Path, Any]) -> dict[str, Any]:
+def replace_values(document: Mapping[str, Any], values: Mapping[Path, Any]) -> dict[str, Any]:
     """Return the document with the values at their places."""
     changed: dict[str, Any] = copy.deepcopy(dict(document))
     for path, value in values.items():
@@ -115,7 +115,7 @@ def is_double(value: Any) -> bool:
     return (type(value) is float and math.isfinite(value)) or (type(value) is int and abs(value) <= _LARGEST_INTEGER)
 
 
-def tabulated(value: Any) -> float | str | None:
+def to_table_value(value: Any) -> float | str | None:
     """Return a scalar of the JSON as tables hold it: a number wherever it states one."""
     if is_double(value):
         return float(value) + 0.0  # a zero has no sign
@@ -138,10 +138,10 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         elif isinstance(place, list) and name.isascii() and name.isdigit() and len(name) < 6 and int(name) < len(place):
             path.append(int(name))
         else:
-            raise InvalidInput(where, required, shown(pointer))
+            raise InvalidInput(where, required, show(pointer))
         place = place[path[-1]]
     if parts[0] or not path:
-        raise InvalidInput(where, required, shown(pointer))
+        raise InvalidInput(where, required, show(pointer))
     return tuple(path)
 
 
@@ -153,10 +153,10 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int
         return Draw(path, distribution, _bounds(distribution, bounds, (*where, distribution)), _shape(base, where))
     if isinstance(stated, Mapping) and {"start", "stop", "count"} <= set(stated) <= {"start", "stop", "count", "spacing"}:
         if _shape(base, where):
-            raise InvalidInput(where, "a list of values (a grid is for one number, and this place holds a list)", shown(stated))
+            raise InvalidInput(where, "a list of values (a grid is for one number, and this place holds a list)", show(stated))
         return Axis(path, _grid(stated, where, most_values))
     forms = f"a list of values, a grid (start, stop, count, spacing), or one of {', '.join(_DISTRIBUTIONS)} with two numbers"
-    raise InvalidInput(where, forms, shown(stated))
+    raise InvalidInput(where, forms, show(stated))
 
 
 def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
@@ -166,16 +166,16 @@ def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
     for i, value in enumerate(stated):
         scalars = dict(components("", value))
         if list(scalars) != names or isinstance(value, Mapping):
-            raise InvalidInput((*where, i), "a value of the same shape as in the problem", shown(value))
+            raise InvalidInput((*where, i), "a value of the same shape as in the problem", show(value))
         if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
-            raise InvalidInput((*where, i), "finite numbers", shown(value))
+            raise InvalidInput((*where, i), "finite numbers", show(value))
     return stated
 
 
 def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
     count, spacing = stated["count"], stated.get("spacing", "linear")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
-        raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", shown(count))
+        raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", show(count))
     if spacing not in _SPACINGS:
         raise unknown_name((*where, "spacing"), spacing, _SPACINGS)
     start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
@@ -190,7 +190,7 @@ def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
 
 def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
     if not isinstance(stated, list) or len(stated) != 2:
-        raise InvalidInput(where, "two numbers", shown(stated))
+        raise InvalidInput(where, "two numbers", show(stated))
     first, second = (float(exact_number(value, (*where, i))) for i, value in enumerate(stated))
     if distribution == "normal":
         if second < 0:
@@ -207,7 +207,7 @@ def _shape(base: Any, where: Path) -> tuple[int, ...]:
     if isinstance(base, list):
         inner = {_shape(item, where) for item in base}
         if len(inner) != 1:
-            raise InvalidInput(where, "a place that holds a number, a vector or a matrix", shown(base))
+            raise InvalidInput(where, "a place that holds a number, a vector or a matrix", show(base))
         return (len(base), *inner.pop())
     exact_number(base, where)
     return ()

@@ -13,7 +13,7 @@ import numpy as np
 import orjson
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.mechanics.core.errors import InvalidInput, VeselovaError, shown
+from veselova.mechanics.core.errors import InvalidInput, VeselovaError, show
 from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
@@ -29,8 +29,8 @@ from veselova.service.api.sweep_parameters import (
     components,
     is_double,
     parameters,
-    replaced,
-    tabulated,
+    replace_values,
+    to_table_value,
 )
 from veselova.version import __version__
 
@@ -181,14 +181,14 @@ class SweepRequest(TorusRequest):
         random = np.random.default_rng([self.seed, row]) if self.draws else None
         found: dict[Path, Any] = {axis.path: axis.values[int(i)] for axis, i in zip(self.axes, position)}
         if random is not None:
-            found |= {draw.path: draw.drawn(random) for draw in self.draws}
+            found |= {draw.path: draw.draw(random) for draw in self.draws}
         return {parameter.path: found[parameter.path] for parameter in self.varied}
 
     def columns(self, values: Mapping[Path, Any]) -> Iterator[tuple[str, Any]]:
         """Yield the values of the parameters in one problem by the names of their columns, component by component."""
         for path, value in values.items():
             for name, scalar in components(".".join(map(str, path)), value):
-                found = tabulated(scalar)
+                found = to_table_value(scalar)
                 yield name, str(found) if name in self._texts and found is not None else found
 
     @cached_property
@@ -196,11 +196,11 @@ class SweepRequest(TorusRequest):
         """Return the columns of which any value states no number: they have texts in every chunk."""
         scalars = (item for axis in self.axes for value in axis.values for item in components(axis.name, value))
         stated = ((name, scalar) for name, scalar in scalars if isinstance(scalar, (str, bool)))
-        return frozenset(name for name, scalar in stated if isinstance(tabulated(scalar), str))
+        return frozenset(name for name, scalar in stated if isinstance(to_table_value(scalar), str))
 
     def request_of(self, values: Mapping[Path, Any]) -> TorusRequest | TrajectoryRequest:
         """Return the request of one problem: for its motion where there are times, for its torus else. Raises InvalidRequest."""
-        problem = replaced(self.problem.model_dump(exclude_none=True), values)
+        problem = replace_values(self.problem.model_dump(exclude_none=True), values)
         if self.times is None:
             return read_request(TorusRequest, {"problem": problem, "budget_s": self.budget_s})
         asked = {name: getattr(self, name) for name in ("times", "engine", "method", "formulation", "outputs", "budget_s")}
@@ -275,9 +275,9 @@ class SweepPlan:
 def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
     """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
     if not isinstance(problem, (Problem, Mapping)):
-        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", shown(problem))
+        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", show(problem))
     if not isinstance(vary, Mapping):
-        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', shown(vary))
+        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', show(vary))
     stated = plain(vary)
     times = None if times is None else as_request(times)
     return {"problem": problem.as_request() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}

@@ -61,7 +61,7 @@ class Measurement:
     @property
     def row(self) -> str:
         """Return the line of the table."""
-        ours, theirs = _shown(self.seconds), _shown(self.peer_seconds)
+        ours, theirs = _show(self.seconds), _show(self.peer_seconds)
         return f"| {self.question} | {ours} | {self.peer} | {theirs} | {self.ratio:.3g} | {self.difference:.0e} |"
 
 
@@ -86,7 +86,7 @@ def measurements() -> Iterator[Measurement]:
     for n in (3, 4):  # imports and compilation are no part of any figure
         solve(_body(n, 1), _SHORT)
         for name in methods:
-            _integrated(_body(n, 1), _SHORT, name)
+            _integrate(_body(n, 1), _SHORT, name)
     for n in (3, 4):
         yield _orbit(n, method)
     for n in (3, 4):
@@ -112,8 +112,8 @@ def run(show: Callable[[str], None]) -> dict[str, Any]:
 
 def _orbit(n: int, method: str) -> Measurement:
     times = np.linspace(0.0, _SPANS[method], _TIMES)
-    seconds, closed = _timed(lambda: solve(_body(n, 2), times))
-    theirs, frames = _timed(lambda: _integrated(_body(n, 2), times, method))
+    seconds, closed = _time(lambda: solve(_body(n, 2), times))
+    theirs, frames = _time(lambda: _integrate(_body(n, 2), times, method))
     question = f"n = {n}: {_TIMES} attitudes in [0, {times[-1]:g}]"
     return Measurement(question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames))
 
@@ -121,21 +121,21 @@ def _orbit(n: int, method: str) -> Measurement:
 def _far(n: int, method: str) -> Measurement:
     """Ask for one attitude far out, after others; integrating there is scaled up from a shorter stretch."""
     closed, span = solve(_body(n, 3), [_FAR]), _SPANS[method]
-    seconds, _ = _timed(lambda: closed.at([_FAR - 1]))
-    theirs, frames = _timed(lambda: _integrated(_body(n, 3), np.array([span]), method))
+    seconds, _ = _time(lambda: closed.at([_FAR - 1]))
+    theirs, frames = _time(lambda: _integrate(_body(n, 3), np.array([span]), method))
     difference = _largest(closed.at([span]).frame - frames)
     question = f"n = {n}: one more attitude at t = {_FAR:.0e}"
     return Measurement(question, seconds, f"integration ({method}), from t = {span:g}", theirs * _FAR / span, difference)
 
 
 def _short(n: int, method: str) -> Measurement:
-    seconds, closed = _timed(lambda: solve(_body(n, 4), _SHORT), _CALLS)
-    theirs, frames = _timed(lambda: _integrated(_body(n, 4), _SHORT, method), _CALLS)
+    seconds, closed = _time(lambda: solve(_body(n, 4), _SHORT), _CALLS)
+    theirs, frames = _time(lambda: _integrate(_body(n, 4), _SHORT, method), _CALLS)
     question = f"n = {n}: a new body, {_SHORT.size} times in [0, {_SHORT[-1]:g}]"
     return Measurement(question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames))
 
 
-def _integrated(body: Veselova, times: Array, method: str) -> Array:
+def _integrate(body: Veselova, times: Array, method: str) -> Array:
     """Return the frames by one integrator; DOP853 integrates twice, for its error."""
     return HeyokaPeer(body)(times)[-1] if method == "heyoka" else solve(body, times, "numeric", method).frame
 
@@ -144,9 +144,9 @@ def _tori(n: int) -> Measurement:
     rng = np.random.default_rng(n)
     A, q, q_dot = np.exp(rng.uniform(0, np.log(5), (_TOGETHER, n))), *rng.normal(size=(2, _TOGETHER, n))
     tori(A[:_SINGLE], q[:_SINGLE], q_dot[:_SINGLE])
-    together, found = _timed(lambda: tori(A, q, q_dot))
+    together, found = _time(lambda: tori(A, q, q_dot))
     bodies = [Veselova(A[i], q[i], q_dot[i], normalize=True) for i in np.flatnonzero(found.known)[:_SINGLE]]
-    single, alone = _timed(lambda: [torus(body) for body in bodies])
+    single, alone = _time(lambda: [torus(body) for body in bodies])
     expected = np.array([one.frequencies_t for one in alone])
     difference = _largest(found.frequencies_t[found.known][:_SINGLE] / expected - 1)
     question = f"n = {n}: a torus, {_TOGETHER} together"
@@ -162,7 +162,7 @@ def _body(n: int, seed: int) -> Veselova:
     return Veselova(A, q, q_dot / np.linalg.norm(q_dot), normalize=True)
 
 
-def _timed(call: Callable[[], Any], calls: int = 1) -> tuple[float, Any]:
+def _time(call: Callable[[], Any], calls: int = 1) -> tuple[float, Any]:
     """Return the least processor seconds of some calls, and the last answer."""
     least = np.inf
     for _ in range(calls):
@@ -176,7 +176,7 @@ def _largest(values: Any) -> float:
     return float(np.max(np.abs(values)))
 
 
-def _shown(seconds: float) -> str:
+def _show(seconds: float) -> str:
     """Return a duration in the unit that suits it."""
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if seconds >= size:

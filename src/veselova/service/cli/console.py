@@ -13,7 +13,7 @@ from rich.table import Table
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.json_documents import encoded
+from veselova.service.api.json_documents import encode
 
 __all__ = ["print_comparison", "print_json", "print_torus", "print_trajectory", "terminal"]
 
@@ -31,7 +31,7 @@ def terminal() -> Console:
 
 def print_json(document: Mapping[str, Any]) -> None:
     """Print a document on one line."""
-    sys.stdout.buffer.write(encoded(document) + b"\n")
+    sys.stdout.buffer.write(encode(document) + b"\n")
     sys.stdout.buffer.flush()
 
 
@@ -48,12 +48,12 @@ def _heading(console: Console, text: str) -> None:
 
 def _describe(trajectory: Trajectory) -> str:
     problem, provenance = trajectory.problem, trajectory.provenance
-    count, shown = trajectory.times.size, _told_apart(np.array([trajectory.times.min(), trajectory.times.max()]))
+    count, shown = trajectory.times.size, _format_distinct(np.array([trajectory.times.min(), trajectory.times.max()]))
     span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
     return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
 
 
-def _told_apart(times: Any) -> list[str]:
+def _format_distinct(times: Any) -> list[str]:
     """Return times in the fewest digits, six or more, in which no two are the same."""
     different = np.unique(times).size
     for digits in range(6, 18):
@@ -75,7 +75,7 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
-    for i, time in zip(shown, _told_apart(trajectory.times[shown]), strict=True):
+    for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
         components = [
             *(f"{trajectory.series(name)[i]:z.6f}" for name in clock),
             *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from datetime import UTC, datetime, timedelta
 
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = ["expiry"]
 
@@ -33,4 +33,4 @@ def expiry(text: str | None, now: datetime) -> datetime | None:
             moment = now
         if moment > now:
             return moment
-    raise InvalidInput(("--expires",), "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31", shown(text))
+    raise InvalidInput(("--expires",), "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31", show(text))

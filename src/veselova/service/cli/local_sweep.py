@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import anyio
 from anyio.from_thread import start_blocking_portal
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, install_extra, shown
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, install_extra, show
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -92,7 +92,7 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
     if workers is not None:
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-            raise InvalidInput(("workers",), "a whole number of at least 1", shown(workers))
+            raise InvalidInput(("workers",), "a whole number of at least 1", show(workers))
         changes["sweep_workers"] = workers
     return Settings(**{**settings.model_dump(), **changes})
 
@@ -122,7 +122,7 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
         sweeps.begin(job.id)
-        ending = asyncio.ensure_future(sweeps.ended(job.id))
+        ending = asyncio.ensure_future(sweeps.wait_ended(job.id))
         try:
             while not ending.done():
                 await asyncio.wait([ending], timeout=_REPORT_S)

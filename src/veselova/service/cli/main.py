@@ -35,12 +35,12 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if sys.stdout is None or sys.stderr is None:  # started with a closed stream
         raise SystemExit(1)
-    with _reported():
+    with _report_errors():
         app()
 
 
 @contextmanager
-def _reported() -> Iterator[None]:
+def _report_errors() -> Iterator[None]:
     from veselova.mechanics.core.errors import InvalidInput, VeselovaError
     from veselova.service.api.problem_details import Refused
 
@@ -125,13 +125,13 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     from veselova.service.api.json_documents import trajectory_document
     from veselova.service.api.request_models import TrajectoryRequest, read_request
     from veselova.service.cli.console import print_json, print_trajectory, terminal
-    from veselova.service.workers.tasks import requested_trajectory
+    from veselova.service.workers.tasks import solve_request
 
     document = _document(file)
     request = read_request(TrajectoryRequest, document)
     _check_files(output, plot)
     with _within_budget(document):
-        trajectory = requested_trajectory(request)
+        trajectory = solve_request(request)
     if output:
         _write(trajectory, output, request.outputs)
     if plot:
@@ -156,14 +156,14 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     from veselova.service.api.json_documents import comparison_document
     from veselova.service.api.request_models import ComparisonRequest, read_request
     from veselova.service.cli.console import print_comparison, print_json, terminal
-    from veselova.service.workers.tasks import requested_comparison
+    from veselova.service.workers.tasks import compare_request
 
     if isinstance(document, dict):
         document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
     request = read_request(ComparisonRequest, document)
     _check_files(output, plot)
     with _within_budget(document):
-        comparison = requested_comparison(request)
+        comparison = compare_request(request)
     if output:
         _write(comparison.analytic, output, request.outputs)
     if plot:
@@ -180,14 +180,14 @@ def torus(file: _File, json: _Json = False) -> None:
     """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
     from veselova.service.api.request_models import TorusRequest, read_request
     from veselova.service.cli.console import print_json, print_torus, terminal
-    from veselova.service.workers.tasks import requested_torus
+    from veselova.service.workers.tasks import torus_request
 
     document = _document(file)
     if isinstance(document, dict):  # the file of a motion serves here too
         document = {name: value for name, value in document.items() if name not in _OF_MOTIONS}
     request = read_request(TorusRequest, document)
     with _within_budget(document):
-        answer = requested_torus(request)
+        answer = torus_request(request)
     if json:
         print_json(answer.as_dict())
     else:
@@ -227,7 +227,7 @@ app.add_typer(server_commands.keys, name="keys")
 
 def _document(file: str) -> Any:
     from veselova.mechanics.core.errors import InvalidInput
-    from veselova.service.api.json_text import decoded
+    from veselova.service.api.json_text import decode
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
@@ -235,7 +235,7 @@ def _document(file: str) -> Any:
         text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
     except OSError as error:
         raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
-    return decoded(text)
+    return decode(text)
 
 
 #: Fields of a motion's request that say nothing of its torus.
@@ -259,10 +259,10 @@ def _check_files(output: Path | None, plot: Path | None) -> None:
 
 
 def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:
-    from veselova.service.api.json_documents import encoded, trajectory_document
+    from veselova.service.api.json_documents import encode, trajectory_document
 
     if path.suffix.lower() == ".json":
-        path.write_bytes(encoded(trajectory_document(trajectory, outputs)))
+        path.write_bytes(encode(trajectory_document(trajectory, outputs)))
     else:
         getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
 

@@ -20,7 +20,7 @@ import httpx2 as httpx
 import orjson
 from anyio import to_thread
 
-from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, shown
+from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, show
 from veselova.mechanics.core.problem import Problem
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
 from veselova.service.client.requests import Call, compare_call, download_call, torus_call, trajectory_call
@@ -104,7 +104,7 @@ class _Core:
         except orjson.JSONDecodeError:
             document = None
         if not isinstance(document, dict):
-            document = {"title": response.reason_phrase, "status": response.status_code, "detail": shown(response.text)}
+            document = {"title": response.reason_phrase, "status": response.status_code, "detail": show(response.text)}
         failure = ProblemResponse(response.status_code, document)
         if response.status_code not in _RETRIED_STATUSES:
             raise failure
@@ -162,7 +162,7 @@ class Client(_Core):
         if call.sink is None or response.status_code != httpx.codes.OK:
             response.read()
             return
-        with call.sink.opened() as write:
+        with call.sink.open() as write:
             for chunk in response.iter_bytes():
                 write(chunk)
 
@@ -251,7 +251,7 @@ class AsyncClient(_Core):
         if call.sink is None or response.status_code != httpx.codes.OK:
             await response.aread()
             return
-        with call.sink.opened() as write:
+        with call.sink.open() as write:
             async for chunk in response.aiter_bytes():
                 await to_thread.run_sync(write, chunk)
 

@@ -10,12 +10,12 @@ from typing import Any, BinaryIO
 
 import orjson
 
-from veselova.mechanics.core.errors import InvalidInput, shown, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
 from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.trajectory import Provenance
-from veselova.service.api.atomic_file import whole_file
+from veselova.service.api.atomic_file import atomic_file
 
-__all__ = ["MEDIA_TYPES", "Sink", "media_type_of", "provenance_of", "sink_of"]
+__all__ = ["MEDIA_TYPES", "DownloadTarget", "media_type_of", "provenance_of", "sink_of"]
 
 #: Format → media type; a test holds it against the formats of the server.
 MEDIA_TYPES: Mapping[str, str] = {
@@ -40,7 +40,7 @@ def provenance_of(headers: Mapping[str, str]) -> Provenance:
 
 
 @dataclass
-class Sink:
+class DownloadTarget:
     """Where a download goes: a file that takes its name when it is whole, or an open stream, which can be written to once."""
 
     path: Path | None
@@ -49,24 +49,24 @@ class Sink:
     untouched: bool = True
 
     @contextmanager
-    def opened(self) -> Iterator[Callable[[bytes], Any]]:
+    def open(self) -> Iterator[Callable[[bytes], Any]]:
         """Give what takes the chunks; the file appears, or replaces another, at the end of the block and not before."""
         if self.stream is not None:
             self.untouched = False
             yield self.stream.write
             return
         assert self.path is not None
-        with whole_file(self.path) as part, part.open("xb") as file:
+        with atomic_file(self.path) as part, part.open("xb") as file:
             yield file.write
 
 
-def sink_of(target: Target) -> Sink:
+def sink_of(target: Target) -> DownloadTarget:
     """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, or a folder that is not there."""
     if isinstance(target, (str, Path)):
         path = Path(target)
         if not path.parent.is_dir() or path.is_dir():
-            raise InvalidInput(("target",), "a file in an existing folder", shown(str(target)))
-        return Sink(path, None)
+            raise InvalidInput(("target",), "a file in an existing folder", show(str(target)))
+        return DownloadTarget(path, None)
     if not callable(getattr(target, "write", None)):
-        raise InvalidInput(("target",), "a path, or a binary stream that is open for writing", shown(target))
-    return Sink(None, target)
+        raise InvalidInput(("target",), "a path, or a binary stream that is open for writing", show(target))
+    return DownloadTarget(None, target)

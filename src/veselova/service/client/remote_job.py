@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 from urllib.parse import quote
 
-from veselova.mechanics.core.errors import InvalidInput, ServiceError, shown
+from veselova.mechanics.core.errors import InvalidInput, ServiceError, show
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import Target
 from veselova.service.api.request_models import read_request
@@ -56,7 +56,7 @@ class RemoteJob:
 
     def __init__(self, client: Runner, job_id: str) -> None:
         if not isinstance(job_id, str) or not job_id.strip("."):  # no part of an address is empty, or dots alone
-            raise InvalidInput(("job_id",), "the id of a job", shown(job_id))
+            raise InvalidInput(("job_id",), "the id of a job", show(job_id))
         self._client = client
         self.id = job_id
 
@@ -72,7 +72,7 @@ class RemoteJob:
 
         Raises ServiceError where it has failed or was cancelled.
         """
-        return self._client.run(self._finished(progress))
+        return self._client.run(self._finish(progress))
 
     def cancel(self) -> Any:
         """Stop the job, keeping what is done, and return its document; the same sweep asked for again goes on from there."""
@@ -84,7 +84,7 @@ class RemoteJob:
 
     def download(self, target: Target) -> Any:
         """Write the table, as Parquet, to a path or a binary stream when the job has finished."""
-        return self._client.run(self._downloaded(target))
+        return self._client.run(self._download(target))
 
     def dataset(self, progress: Callable[[int, int], object] | None = None) -> Any:
         """Return the results as an xarray Dataset (see ``veselova.sweep``) when the job has finished."""
@@ -100,7 +100,7 @@ class RemoteJob:
     def _one(call: Call[Any]) -> Flow:
         return (yield call)
 
-    def _finished(self, progress: Callable[[int, int], object] | None) -> Flow:
+    def _finish(self, progress: Callable[[int, int], object] | None) -> Flow:
         pause = _FIRST_PAUSE_S
         while True:
             document = yield self._get()
@@ -116,14 +116,14 @@ class RemoteJob:
     def _fetch(self, part: str, media_type: str, target: Target) -> Call[None]:
         return Call(self._link(part), None, _PREPARATION_S, lambda _: None, media_type, sink_of(target), "GET")
 
-    def _downloaded(self, target: Target) -> Flow:
-        yield from self._finished(None)
+    def _download(self, target: Target) -> Flow:
+        yield from self._finish(None)
         yield self._fetch("/result", MEDIA_TYPES["parquet"], target)
 
     def _dataset(self, progress: Callable[[int, int], object] | None) -> Flow:
         from veselova.service.api.sweep_dataset import sweep_dataset
 
-        document = yield from self._finished(progress)
+        document = yield from self._finish(progress)
         sweep, table = read_request(SweepRequest, document["request"]), io.BytesIO()
         yield self._fetch("/result", MEDIA_TYPES["parquet"], table)
         with tempfile.TemporaryDirectory() as folder:

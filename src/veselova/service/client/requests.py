@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import InvalidInput, shown
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.comparison import Comparison
@@ -16,7 +16,7 @@ from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Provenance, Trajectory
 from veselova.service.api.json_documents import comparison_of, torus_of, trajectory_of
-from veselova.service.client.download import Sink, media_type_of, provenance_of, sink_of
+from veselova.service.client.download import DownloadTarget, media_type_of, provenance_of, sink_of
 
 __all__ = ["Call", "compare_call", "download_call", "torus_call", "trajectory_call"]
 
@@ -35,7 +35,7 @@ class Call(Generic[T]):
     budget_s: float
     result: Callable[[Any], T]
     accept: str = "application/json"
-    sink: Sink | None = None
+    sink: DownloadTarget | None = None
     method: str = "POST"
 
 
@@ -45,7 +45,7 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
         return problem
     if not isinstance(problem, Mapping):
         raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", shown(problem)
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", show(problem)
         )
     from veselova.service.api.request_models import TorusRequest, read_request
 

@@ -17,7 +17,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Match, Route
 
-from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, VeselovaError, shown
+from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, VeselovaError, show
 from veselova.service.access.keys import open_keys
 from veselova.service.access.middleware import UNLIMITED, Access, Policy
 from veselova.service.answers.endpoint import Answers
@@ -97,7 +97,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
 def _surround(app: FastAPI, settings: Settings, policy: Policy, hosts: frozenset[str] | None, metrics: Metrics) -> None:
     """Put what looks at every request around an application: each of these stands around those before it."""
     metrics.serve(app)
-    app.add_middleware(Access, policy=policy, refused=metrics.refused)
+    app.add_middleware(Access, policy=policy, refused=metrics.count_refused)
     app.add_middleware(Failures)
     if settings.cors_origins:
         app.add_middleware(
@@ -121,14 +121,14 @@ def _is_request_id(text: str) -> bool:
 
 async def _answer_problem(metrics: Metrics, routes: list[BaseRoute], request: Request, error: Exception) -> Response:
     if isinstance(error, RequestValidationError):  # parameters and headers, which the framework reads
-        faults = [InvalidInput(item["loc"][1:], item["msg"].lower(), shown(item.get("input"))) for item in error.errors()]
+        faults = [InvalidInput(item["loc"][1:], item["msg"].lower(), show(item.get("input"))) for item in error.errors()]
         error = InvalidRequest(faults)
     response = problem_response(error)
     if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED and (methods := _methods(routes, request)):
         response.headers["Allow"] = ", ".join(sorted(methods))  # the framework names those of one route alone
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
-        metrics.refused(error.code)
+        metrics.count_refused(error.code)
     elif response.status_code >= 500:
         _LOG.error("a request failed", exc_info=error)
     return response

@@ -36,7 +36,7 @@ class Hosts:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with 421."""
         reached = (scope.get("server") or ("",))[0]  # the address of the socket, which is no name that a page could choose
-        if scope["type"] == "http" and not all(self._is_allowed(name, reached) for name in _stated(scope)):
+        if scope["type"] == "http" and not all(self._is_allowed(name, reached) for name in _stated_host(scope)):
             error = Refused("unknown-host", "Host: required a name of this server (VESELOVA_ALLOWED_HOSTS); given another.")
             note(outcome=error.code)
             await problem_response(error)(scope, receive, send)
@@ -53,7 +53,7 @@ class Hosts:
             return False
 
 
-def _stated(scope: Scope) -> list[str]:
+def _stated_host(scope: Scope) -> list[str]:
     """Return the Host of a request, empty where it states none."""
     return [value.decode("latin-1") for name, value in scope["headers"] if name == b"host"] or [""]
 

@@ -16,7 +16,7 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
-from veselova.service.api.content_negotiation import accepted_type
+from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
@@ -71,7 +71,7 @@ def job_router(reader: Reader, service: JobService) -> APIRouter:
     accepted: dict[str, Any] = {"status_code": 202, "openapi_extra": _BODY}
     table: tuple[tuple[str, str, Any, str, str, dict[str, Any], dict[int | str, Any]], ...] = (
         ("POST", "/v1/sweeps", jobs.sweep, "create_sweep", "Solve many problems", accepted, _ACCEPTED),
-        ("GET", "/v1/jobs", jobs.listed, "list_jobs", "List the jobs, newest first", {}, _LIST),
+        ("GET", "/v1/jobs", jobs.list_jobs, "list_jobs", "List the jobs, newest first", {}, _LIST),
         ("GET", _ONE, jobs.job, "get_job", "Tell how far a job is", {}, _JOB),
         ("GET", f"{_ONE}/result", jobs.result, "get_job_result", "Give the table of a finished job", {}, _TABLE),
         (
@@ -112,14 +112,14 @@ class _JobRoutes:
         require_acceptable(request.headers.get("accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")
-        asked = await self._reader.asked("sweep", request)
+        asked = await self._reader.parse_body("sweep", request)
         owner = caller_of(request).owner
         job = await self._service.ask(lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key, owner))
         if not job.ended:
             (await self._service.sweeps()).begin(job.id)
         return _json(await self._document(job.id, request, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
 
-    async def listed(self, request: Request, everybody: _All = False) -> Response:
+    async def list_jobs(self, request: Request, everybody: _All = False) -> Response:
         """List the last jobs of the caller, or of all."""
         caller = caller_of(request)
         if everybody and not caller.may(ADMIN):
@@ -144,11 +144,11 @@ class _JobRoutes:
             yield ServerSentEvent(data=document, event=document["state"])
             if document["finished_at"] is not None:
                 return
-            await (await self._service.sweeps()).changed(_REPEAT_S)
+            await (await self._service.sweeps()).wait_changed(_REPEAT_S)
 
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
-        media_type = accepted_type(request.headers.get("accept"), list(_TABLES))
+        media_type = negotiate_type(request.headers.get("accept"), list(_TABLES))
         await self._require_finished(job_id, request)
         path: Path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
         if not path.is_file():
@@ -185,10 +185,10 @@ class _JobRoutes:
     async def _document(self, job_id: str, request: Request, whole: bool = True) -> dict[str, Any]:
         owner = caller_of(request).seen
 
-        def asked(jobs: Jobs) -> tuple[JobStatus, bool]:
+        def parse(jobs: Jobs) -> tuple[JobStatus, bool]:
             return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(job_id).exists()
 
-        job, kept = await self._service.ask(asked)
+        job, kept = await self._service.ask(parse)
         return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
 
     async def _require_finished(self, job_id: str, request: Request) -> None:

@@ -60,10 +60,10 @@ class JobService:
         """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without the extra ``sweeps``."""
         async with self._opening:
             if self._sweeps is None:
-                self._sweeps = await self._opened()
+                self._sweeps = await self._open()
         return self._sweeps
 
-    async def _opened(self) -> Sweeps:
+    async def _open(self) -> Sweeps:
         try:
             from veselova.service.sweeps.job_store import Jobs
             from veselova.service.sweeps.runner import Sweeps

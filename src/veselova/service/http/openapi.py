@@ -94,7 +94,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
                 if path not in RESOURCES:
                     operation["responses"].pop("422", None)  # the framework's: all refusals are problem documents here
                     _refuse(operation, _refusals(path))
-        document["paths"][KEPT] = {"get": _kept(), "head": _kept_head()}
+        document["paths"][KEPT] = {"get": _get_kept_operation(), "head": _head_kept_operation()}
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
         app.openapi_schema = document
@@ -127,7 +127,7 @@ def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     _refuse(operation, refusals)
 
 
-def _kept() -> dict[str, Any]:
+def _get_kept_operation() -> dict[str, Any]:
     """Return the operation that gives a kept trajectory."""
     answer = {"schema": {"$ref": f"{PREFIX}Trajectory"}}
     operation: dict[str, Any] = {
@@ -144,7 +144,7 @@ def _kept() -> dict[str, Any]:
     return operation
 
 
-def _kept_head() -> dict[str, Any]:
+def _head_kept_operation() -> dict[str, Any]:
     """Return the operation that gives the header of a kept trajectory alone."""
     statuses = {200: "It is kept", 304: "The client has it already", 404: "Not kept, or not any more", 406: _REFUSALS[406]}
     responses = {str(status): {"description": description} for status, description in statuses.items()}

@@ -11,7 +11,7 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from veselova.mechanics.core.errors import shown
+from veselova.mechanics.core.errors import show
 from veselova.service.answers.endpoint import Answers
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.problem_models import SYSTEMS
@@ -66,11 +66,11 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
         described: dict[str, Any] = {"operation_id": _OPERATIONS[kind], "summary": summary, "name": kind, "tags": ["motions"]}
         routes.add_api_route(path, answer, methods=["POST"], route_class_override=_Direct, **described)
 
-    async def kept(request: Request) -> Response:
-        return await answers.named(request.path_params["name"], request)
+    async def get_kept(request: Request) -> Response:
+        return await answers.get_kept(request.path_params["name"], request)
 
     # A route of Starlette, for GET and HEAD at once; openapi describes it.
-    routes.add_route(KEPT, kept, methods=["GET"], name="kept")
+    routes.add_route(KEPT, get_kept, methods=["GET"], name="kept")
 
     async def systems() -> Response:
         return _json({"systems": _systems(), "version": __version__, "limits": settings.limits})
@@ -83,7 +83,7 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
         try:
             return _json(schema_document(name), _SCHEMA_TYPE)
         except KeyError:
-            raise Refused("no-such-resource", f"No schema is called {shown(name)}; GET /v1/schemas lists all.") from None
+            raise Refused("no-such-resource", f"No schema is called {show(name)}; GET /v1/schemas lists all.") from None
 
     async def healthz() -> Response:
         return _json({"status": "ok", "version": __version__})
@@ -94,16 +94,16 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
         return _json({"status": "ready"})
 
     table: tuple[tuple[str, Any, str, str, dict[str, Any]], ...] = (
-        ("/v1/systems", systems, "list_systems", "List the systems that can be solved", _described("SystemList")),
-        ("/v1/schemas", schemas, "list_schemas", "List the JSON schemas of requests and answers", _described("SchemaList")),
+        ("/v1/systems", systems, "list_systems", "List the systems that can be solved", _describe("SystemList")),
+        ("/v1/schemas", schemas, "list_schemas", "List the JSON schemas of requests and answers", _describe("SchemaList")),
         (SCHEMA, schema, "get_schema", "Give one JSON schema", {_SCHEMA_TYPE: {"schema": {"type": "object"}}}),
-        ("/healthz", healthz, "check_health", "Whether the server runs", _described("Health")),
+        ("/healthz", healthz, "check_health", "Whether the server runs", _describe("Health")),
         (
             "/readyz",
             readyz,
             "check_readiness",
             "Whether the server can answer: a warm worker, its database",
-            _described("Health"),
+            _describe("Health"),
         ),
     )
     for path, endpoint, operation, summary, content in table:
@@ -138,7 +138,7 @@ def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Res
     return answer
 
 
-def _described(name: str) -> dict[str, Any]:
+def _describe(name: str) -> dict[str, Any]:
     """Return the content of an answer that a schema describes."""
     return {"application/json": {"schema": {"$ref": f"{PREFIX}{name}"}}}
 

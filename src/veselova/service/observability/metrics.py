@@ -26,9 +26,9 @@ _BUCKETS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 60)
 
 @dataclass
 class Ending:
-    """What is found out about work while it is done: whether its answer was ``kept``."""
+    """What is found out about work while it is done: whether its answer was ``cached``."""
 
-    kept: bool = False
+    cached: bool = False
 
 
 class Metrics:
@@ -50,7 +50,7 @@ class Metrics:
     def work(self, kind: str, system: str, engine: str) -> Iterator[Ending]:
         """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too.
 
-        An answer that was kept, and so needed no work, is not counted.
+        An answer that was cached, and so needed no work, is not counted.
         """
         outcome, began, ending = "stopped", time.perf_counter(), Ending()
         try:
@@ -60,16 +60,16 @@ class Metrics:
             outcome = problem_code(error)
             raise
         finally:
-            if not ending.kept:
+            if not ending.cached:
                 self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
                 self._outcomes.labels(kind, engine, outcome).inc()
                 note(system=system, engine=engine, outcome=outcome)
 
-    def refused(self, code: str) -> None:
+    def count_refused(self, code: str) -> None:
         """Count a request that the service refused with this problem code."""
         self._refusals.labels(code).inc()
 
-    def cached(self, hit: bool) -> None:
+    def count_cached(self, hit: bool) -> None:
         """Count an answer that was looked up in the cache."""
         self._cache.labels("hit" if hit else "miss").inc()
 

@@ -21,11 +21,11 @@ from veselova.service.api.request_models import TorusRequest, TrajectoryRequest,
 from veselova.service.api.sweep_parameters import Path, components
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.sweeps.torus_columns import columns_at_once, columns_of_torus
-from veselova.service.workers.tasks import requested_trajectory, warm_up
+from veselova.service.workers.tasks import solve_request, warm_up
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
-__all__ = ["SOLVED", "Chunk", "OtherVersion", "computed_chunk", "lost_chunk"]
+__all__ = ["SOLVED", "Chunk", "OtherVersion", "compute_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
@@ -48,7 +48,7 @@ class OtherVersion(Exception):
     """A worker whose engines could give other numbers than those of the process that asks."""
 
 
-def computed_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
+def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
     """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
 
     A problem that cannot be solved is a row that says why. Raises OtherVersion where this process has another version of the
@@ -130,7 +130,7 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
     elif not isinstance(request, TrajectoryRequest):
         prepared.torus()  # raises the reason
     if isinstance(request, TrajectoryRequest):
-        trajectory = requested_trajectory(request, prepared)
+        trajectory = solve_request(request, prepared)
         names = request.outputs or list(problem.outputs)
         if keep:
             kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)

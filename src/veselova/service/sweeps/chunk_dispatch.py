@@ -10,7 +10,7 @@ from typing import Any
 from uuid import uuid4
 
 from veselova.service.access.database import reason_of
-from veselova.service.sweeps.chunk import Chunk, computed_chunk, lost_chunk
+from veselova.service.sweeps.chunk import Chunk, compute_chunk, lost_chunk
 from veselova.service.sweeps.in_process_cluster import ThisProcess
 from veselova.service.sweeps.job_store import Job
 from veselova.version import __version__
@@ -38,11 +38,11 @@ async def answers(client: Any, job: Job, start: int, stop: int, closing: Callabl
     cluster is lost, ChunkFailed where its worker met with one, OtherVersion where it is not of the same version.
     """
     if isinstance(client, ThisProcess):
-        return await client.computed(job, start, stop)
+        return await client.compute(job, start, stop)
     from distributed.scheduler import KilledWorker
 
     key = f"computed_chunk-{job.id}-{uuid4().hex}"
-    future = client.submit(computed_chunk, job.request, start, stop, __version__, key=key)
+    future = client.submit(compute_chunk, job.request, start, stop, __version__, key=key)
     try:
         return [await future]
     except KilledWorker:

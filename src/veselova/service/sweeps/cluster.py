@@ -16,7 +16,7 @@ import anyio.to_thread
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra
 from veselova.service.api.settings import MEGABYTE, Settings
 from veselova.service.sweeps.in_process_cluster import ThisProcess
-from veselova.service.workers.signals import children_deaf
+from veselova.service.workers.signals import ignore_interrupt_in_children
 
 __all__ = ["open_cluster", "require_scheduler"]
 
@@ -84,7 +84,7 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
     with dask.config.set(_configuration(_preload(niceness))):
         starting = asyncio.ensure_future(LocalCluster(**_machine(settings)))
         try:
-            with children_deaf():
+            with ignore_interrupt_in_children():
                 cluster = await asyncio.shield(starting)
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error

@@ -9,7 +9,7 @@ import anyio
 from anyio import to_thread
 
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.sweeps.chunk import Chunk, computed_chunk
+from veselova.service.sweeps.chunk import Chunk, compute_chunk
 from veselova.service.sweeps.job_store import Job
 from veselova.version import __version__
 
@@ -32,7 +32,7 @@ class ThisProcess:
         """Return how many chunks are computed at a time, by worker."""
         return {"this process": 1}
 
-    async def computed(self, job: Job, start: int, stop: int) -> list[Chunk]:
+    async def compute(self, job: Job, start: int, stop: int) -> list[Chunk]:
         """Return the answers to the problems start … stop−1 of a job, in parts; ends between two once nobody waits."""
         rows = stop - start if job.sweep.tori_at_once else _PART
         stopping = Event()
@@ -40,7 +40,7 @@ class ThisProcess:
         def parts() -> list[Chunk]:
             starts = range(start, stop, rows)
             return [
-                computed_chunk(job.request, first, min(first + rows, stop), __version__)
+                compute_chunk(job.request, first, min(first + rows, stop), __version__)
                 for first in starts
                 if not stopping.is_set()
             ]
@@ -58,10 +58,10 @@ def seconds_of(request: SweepRequest, enough: float) -> float:
     Costs what those problems cost, of which none is begun after so many seconds.
     """
     rows = min(request.total, _TOGETHER if request.tori_at_once else _SINGLE)
-    computed_chunk(request.canonical, 0, 1, __version__)  # what is loaded and compiled at first is needed in any case
+    compute_chunk(request.canonical, 0, 1, __version__)  # what is loaded and compiled at first is needed in any case
     began, passed = time.thread_time(), 0.0
     for start in (0, (request.total - rows) // 2, request.total - rows):
-        computed_chunk(request.canonical, start, start + rows, __version__)
+        compute_chunk(request.canonical, start, start + rows, __version__)
         passed = time.thread_time() - began
         if passed > enough:
             return passed

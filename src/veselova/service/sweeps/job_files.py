@@ -8,7 +8,7 @@ import os
 import shutil
 from pathlib import Path
 
-from veselova.service.api.atomic_file import whole_file
+from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.private_folder import make_private, own_folder
 
 __all__ = ["JobFiles", "write_whole"]
@@ -66,5 +66,5 @@ class JobFiles:
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that a death of the process or the machine leaves it whole or absent."""
     make_private(path.parent)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(content)

@@ -36,7 +36,7 @@ def require_room(connection: sa.Connection, sweep: SweepPlan | SweepRequest, job
         room = f"at most {settings.max_sweep_bytes} bytes of results on this server"
         raise InvalidInput(("trajectories" if sweep.trajectories else "vary",), room, f"about {size}")
     others = jobs.c.id != job_id
-    of_all, of_owner = _taken(connection, others), _taken(connection, others & (jobs.c.owner == owner))
+    of_all, of_owner = _count_taken(connection, others), _count_taken(connection, others & (jobs.c.owner == owner))
     if of_all.waiting >= settings.max_jobs:
         raise Refused("too-many-jobs", f"{of_all.waiting} jobs are waiting or running; try again later.", retry_after=30)
     if owner and of_owner.waiting >= settings.max_jobs_per_key:
@@ -51,7 +51,7 @@ def require_room(connection: sa.Connection, sweep: SweepPlan | SweepRequest, job
         raise Refused("storage-full", detail)
 
 
-def _taken(connection: sa.Connection, which: sa.ColumnElement[bool]) -> Any:
+def _count_taken(connection: sa.Connection, which: sa.ColumnElement[bool]) -> Any:
     """Return the number of jobs that wait or run, as ``waiting``, and the bytes that all have or were promised, as ``bytes``."""
     going_on = sa.func.sum(sa.case((jobs.c.state.not_in(ENDED), 1), else_=0))
     numbers = (sa.func.coalesce(going_on, 0).label("waiting"), sa.func.coalesce(sa.func.sum(jobs.c.bytes), 0).label("bytes"))

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from veselova.service.api.atomic_file import whole_file
+from veselova.service.api.atomic_file import atomic_file
 from veselova.service.sweeps.chunk import Chunk
 from veselova.service.sweeps.job_store import Job, Jobs
 
@@ -38,7 +38,7 @@ class Result:
             row += part.rows
         if any(part.arrays for part in parts):
             os.sync()  # Zarr leaves it to the system when its files reach the disk
-        self._jobs.store(self._job.id, position, sum(part.rows for part in parts), _joined(parts))
+        self._jobs.store(self._job.id, position, sum(part.rows for part in parts), _join(parts))
 
     def _store_arrays(self, row: int, part: Chunk) -> None:
         """Write arrays into their rows of the store; chunks of the computation are chunks of the store, so no two write one."""
@@ -85,11 +85,11 @@ def table_stream(path: Path, form: str) -> Iterator[bytes]:
         with writer:
             for batch in file.iter_batches(_GROUP_ROWS):
                 writer.write(pa.Table.from_batches([batch]))
-                yield _taken(buffer)
-    yield _taken(buffer)
+                yield _take(buffer)
+    yield _take(buffer)
 
 
-def _taken(buffer: io.BytesIO) -> bytes:
+def _take(buffer: io.BytesIO) -> bytes:
     """Return what was written since the last time."""
     content = buffer.getvalue()
     buffer.seek(0)
@@ -97,7 +97,7 @@ def _taken(buffer: io.BytesIO) -> bytes:
     return content
 
 
-def _joined(parts: list[Chunk]) -> bytes:
+def _join(parts: list[Chunk]) -> bytes:
     from pyarrow import concat_tables, parquet
 
     if len(parts) == 1:
@@ -114,7 +114,7 @@ def _concatenate(paths: list[Path], target: Path) -> None:
     from pyarrow import parquet
 
     schema = pa.unify_schemas([parquet.read_schema(path) for path in paths], promote_options="permissive")
-    with whole_file(target) as part, parquet.ParquetWriter(part, schema, compression="zstd") as writer:
+    with atomic_file(target) as part, parquet.ParquetWriter(part, schema, compression="zstd") as writer:
         for group in _groups(paths, schema):
             writer.write_table(group, row_group_size=_GROUP_ROWS)
 
@@ -137,7 +137,7 @@ def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
 
 def _pack(store: Path, target: Path) -> None:
     """Put a Zarr store into one file, in an order and with dates that depend on nothing but its content."""
-    with whole_file(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
+    with atomic_file(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
         for path in sorted(path for path in store.rglob("*") if path.is_file()):
             with path.open("rb") as source, archive.open(zipfile.ZipInfo(path.relative_to(store).as_posix()), "w") as entry:
                 shutil.copyfileobj(source, entry)

@@ -130,7 +130,7 @@ class Sweeps:
             await asyncio.gather(task, return_exceptions=True)
         await self._tell()
 
-    async def ended(self, job_id: str) -> None:
+    async def wait_ended(self, job_id: str) -> None:
         """Return when nothing runs for a job any more."""
         if task := self._tasks.get(job_id):
             await asyncio.gather(task, return_exceptions=True)
@@ -139,7 +139,7 @@ class Sweeps:
         """Return how far a job is that runs in this process."""
         return self._progress.get(job_id)
 
-    async def changed(self, timeout: float) -> None:
+    async def wait_changed(self, timeout: float) -> None:
         """Return when any job has moved on, or after so many seconds."""
         try:
             async with asyncio.timeout(timeout), self._changed:
@@ -158,7 +158,7 @@ class Sweeps:
             try:
                 if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
-                if await self._persist(job_id, _taken, lock):
+                if await self._persist(job_id, _take_lock, lock):
                     await self._run_locked(job_id)
                 else:
                     _LOG.info("job %s runs in another process", job_id)
@@ -282,7 +282,7 @@ class Sweeps:
                 return answer
 
 
-def _taken(lock: FileLock) -> bool:
+def _take_lock(lock: FileLock) -> bool:
     """Take the lock of a job, whose folder is made first; return whether no other process holds it."""
     Path(lock.lock_file).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.results.torus import Torus
-from veselova.service.api.sweep_parameters import Path, components, is_double, replaced
+from veselova.service.api.sweep_parameters import Path, components, is_double, replace_values
 from veselova.service.api.sweep_request import SweepRequest
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def columns_at_once(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]
     stated = sweep.problem.model_dump(exclude_none=True)
     rows, starts = [], []
     for row, places in values.items():
-        if (start := _start(replaced(stated, places))) is not None:
+        if (start := _start(replace_values(stated, places))) is not None:
             rows.append(row)
             starts.append(start)
     if not rows:

@@ -125,7 +125,7 @@ class Workers:
         try:
             with anyio.fail_after(budget_s):
                 async with self._shares.place(caller):
-                    answer: T = await self._asked(call)
+                    answer: T = await self._ask(call)
                     return answer
         except TimeoutError:
             raise Refused("over-budget", f"The work was stopped after its budget of {budget_s:g} s.") from None
@@ -135,14 +135,14 @@ class Workers:
             detail = f"The work needs more than the {self._memory_mb} MB of memory that a worker of this server has"
             raise Refused("worker-memory", f"{detail}; ask for fewer times.") from None
 
-    async def _asked(self, call: bytes) -> Any:
+    async def _ask(self, call: bytes) -> Any:
         """Return what a worker answers: the one that rests since the shortest time, or a new one."""
         while self._resting:
             worker, _ = self._resting.pop()
             if worker.lives:
                 break
         else:
-            worker = await Worker.started(self._memory_mb * MEGABYTE)
+            worker = await Worker.start(self._memory_mb * MEGABYTE)
         try:
             while self._resting and anyio.current_time() - self._resting[0][1] > _LONGEST_REST_S:
                 await self._resting.popleft()[0].end()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
-__all__ = ["children_deaf", "keep_from_children"]
+__all__ = ["ignore_interrupt_in_children", "keep_from_children"]
 
 _MASKS = hasattr(signal, "pthread_sigmask")  # only POSIX systems have them, and interrupts that go to a group of processes
 
@@ -35,7 +35,7 @@ def _hand_on() -> None:
 
 
 @contextmanager
-def children_deaf() -> Iterator[None]:
+def ignore_interrupt_in_children() -> Iterator[None]:
     """Let no process that this thread, or one that it starts, starts within the block receive SIGINT.
 
     Interrupts of this thread mostly come after the block.

@@ -11,13 +11,13 @@ from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.examples import BODY4
-from veselova.service.api.json_documents import comparison_document, encoded, trajectory_document
+from veselova.service.api.json_documents import comparison_document, encode, trajectory_document
 from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest
 
-__all__ = ["TASKS", "requested_comparison", "requested_torus", "requested_trajectory", "warm_up"]
+__all__ = ["TASKS", "compare_request", "solve_request", "torus_request", "warm_up"]
 
 
-def requested_trajectory(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
+def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
     """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that is made already."""
     faults = Faults()
     prepared = prepared or faults.attempt(lambda: Prepared(request.problem.problem()))
@@ -28,26 +28,26 @@ def requested_trajectory(request: TrajectoryRequest, prepared: Prepared | None =
     return prepared.solve(grid, request.engine, request.method, **options)
 
 
-def requested_comparison(request: ComparisonRequest) -> Comparison:
+def compare_request(request: ComparisonRequest) -> Comparison:
     """Return the comparison that a request asks for."""
     return compare(request.problem.problem(), request.time_grid(), request.method)
 
 
-def requested_torus(request: TorusRequest) -> Torus:
+def torus_request(request: TorusRequest) -> Torus:
     """Return the torus that a request asks for."""
     return torus(request.problem.problem())
 
 
 def _trajectory(request: Any) -> dict[str, Any]:
-    return trajectory_document(requested_trajectory(request), request.outputs)
+    return trajectory_document(solve_request(request), request.outputs)
 
 
 def _comparison(request: Any) -> dict[str, Any]:
-    return comparison_document(requested_comparison(request), request.outputs)
+    return comparison_document(compare_request(request), request.outputs)
 
 
 def _torus(request: Any) -> dict[str, Any]:
-    return requested_torus(request).as_dict()
+    return torus_request(request).as_dict()
 
 
 #: Kind of answer → (model of the request, what computes its document).
@@ -61,5 +61,5 @@ TASKS: Mapping[str, tuple[type[TorusRequest], Callable[[Any], dict[str, Any]]]] 
 def warm_up() -> None:
     """Load both engines and run them once, so that the first request finds nothing left to import."""
     request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
-    encoded(_comparison(request))
+    encode(_comparison(request))
     _torus(request)

@@ -33,7 +33,7 @@ class Worker(asyncio.SubprocessProtocol):
         self._ended = asyncio.Event()
 
     @classmethod
-    async def started(cls, most_bytes: int) -> Worker:
+    async def start(cls, most_bytes: int) -> Worker:
         """Return a new worker, whose process may take so much memory; it can be asked at once. Raises WorkerLost."""
         command = (sys.executable, "-m", worker_process.__name__, str(most_bytes))
         try:

@@ -16,7 +16,7 @@ import struct
 import sys
 from typing import Any, BinaryIO
 
-__all__ = ["SIZE", "answered", "message", "serve"]
+__all__ = ["SIZE", "answer", "message", "serve"]
 
 #: Seconds after its budget before a worker ends without having been ended.
 _SERVERS_TURN_S = 1.0
@@ -39,15 +39,15 @@ def serve(most_bytes: int) -> None:
     for name in ("SIGINT", "SIGHUP"):  # what a terminal sends is for the server, which ends its workers
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    calls, answers = _withdrawn(0, "rb"), _withdrawn(1, "wb")
-    sys.path[:] = pickle.loads(_received(calls) or pickle.dumps(sys.path))
+    calls, answers = _withdraw(0, "rb"), _withdraw(1, "wb")
+    sys.path[:] = pickle.loads(_receive(calls) or pickle.dumps(sys.path))
     _limit_memory(most_bytes)
-    while call := _received(calls):
-        answers.write(answered(call))
+    while call := _receive(calls):
+        answers.write(answer(call))
         answers.flush()
 
 
-def _withdrawn(descriptor: int, mode: str) -> Any:
+def _withdraw(descriptor: int, mode: str) -> Any:
     """Return the stream behind a descriptor, which leads nowhere from now on: nothing that a library prints is an answer."""
     stream = os.fdopen(os.dup(descriptor), mode)
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -56,13 +56,13 @@ def _withdrawn(descriptor: int, mode: str) -> Any:
     return stream
 
 
-def _received(calls: BinaryIO) -> bytes:
+def _receive(calls: BinaryIO) -> bytes:
     """Return the pickle that comes next, nothing where the server has closed its end."""
     size = calls.read(SIZE.size)
     return calls.read(SIZE.unpack(size)[0]) if len(size) == SIZE.size else b""
 
 
-def answered(call: bytes) -> bytes:
+def answer(call: bytes) -> bytes:
     """Return the message that answers a call, the pickle of a task, its arguments and the seconds that it may take."""
     try:
         task, arguments, seconds = pickle.loads(call)
