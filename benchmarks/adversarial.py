@@ -1,17 +1,22 @@
-"""Starts at which closed forms usually fail, against 20 digits, binary128 or integration; of every system with a closed form.
+"""Starts at which closed forms usually fail, against 20 digits, binary128 or integration; of every
+system with a closed form.
 
-    python benchmarks/adversarial.py [starts] [seed] [seconds for one truth] [system]      default 1000, 1, 5, veselova
+    python benchmarks/adversarial.py [starts] [seed] [seconds for one truth] [system]      default
+    1000, 1, 5, veselova
 
-Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-300, and exactly zero), equal A's, coordinate subspaces, A's
-over twelve orders of magnitude, speeds and entries from 1e-300 to 1e300, rest, equilibria, degenerate potentials; n = 2…8. One
-start in four to ten radians or twenty cycles of the fastest phase, the others to three tenths of that. Truth of tori has 20
-digits, in balls, within so many seconds of processor time, or 34 from Neumann's equations in binary128, within a few thousand
-steps, whichever is tried first (FIRST_INTEGRATED). Where neither serves, with potentials, the closed form is compared with
-heyoka's Taylor series: the difference, against the sum of both errors.
-Prints per class how many there were, how many were refused by name and how many failed, the largest true error of the bounded
-series, the largest reported one, the median of reported over true errors, and the largest true error over the one reported at
-the same time (at most 1); then the starts that broke a promise. "Without truth" are those for which none could be had. True
-errors count as ε/2 at least. Ctrl-C prints what has been seen.
+Closed and nearly closed cuts and gaps (relative widths from 1 to 1e-300, and exactly zero), equal
+A's, coordinate subspaces, A's over twelve orders of magnitude, speeds and entries from 1e-300 to
+1e300, rest, equilibria, degenerate potentials; n = 2…8. One start in four to ten radians or twenty
+cycles of the fastest phase, the others to three tenths of that. Truth of tori has 20 digits, in
+balls, within so many seconds of processor time, or 34 from Neumann's equations in binary128, within
+a few thousand steps, whichever is tried first (FIRST_INTEGRATED). Where neither serves, with
+potentials, the closed form is compared with heyoka's Taylor series: the difference, against the sum
+of both errors.
+Prints per class how many there were, how many were refused by name and how many failed, the largest
+true error of the bounded series, the largest reported one, the median of reported over true errors,
+and the largest true error over the one reported at the same time (at most 1); then the starts that
+broke a promise. "Without truth" are those for which none could be had. True errors count as ε/2 at
+least. Ctrl-C prints what has been seen.
 """
 
 from __future__ import annotations
@@ -53,14 +58,20 @@ def drawn(rng: np.random.Generator, system: str, n: int) -> tuple[str, Callable[
 
 
 def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, int, Any]:
-    """Return (i, class, n, answer): (true error, reported error, reported/true, largest true/reported), or how it ended."""
+    """Return (i, class, n, answer): (true error, reported error, reported/true, largest
+    true/reported), or how it ended.
+    """
     rng = np.random.default_rng([seed, i])
     n = 2 + i % 7
     name, make = drawn(rng, system, n)
     try:
         with warnings.catch_warnings(action="error"):
             problem = make()
-            times = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * time_unit(problem) * (1.0 if i % 4 == 0 else 0.3)
+            times = (
+                np.array([-10, -3, 0, 0.1, 1, 4, 10])
+                * time_unit(problem)
+                * (1.0 if i % 4 == 0 else 0.3)
+            )
             found = vs.solve(problem, times, "analytic")
     except (vs.InvalidInput, vs.Unsolved) as refusal:
         return i, name, n, (REFUSED, str(refusal))
@@ -72,7 +83,12 @@ def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, i
         return i, name, n, (NO_TRUTH, "")
     except Exception as error:
         return i, name, n, f"the truth, {type(error).__name__}: {error}"[:150]
-    figures = np.max(off), np.max(found.error), np.median(found.error / np.maximum(off, LEAST)), np.max(off / allowed)
+    figures = (
+        np.max(off),
+        np.max(found.error),
+        np.median(found.error / np.maximum(off, LEAST)),
+        np.max(off / allowed),
+    )
     return i, name, n, tuple(float(x) for x in figures)
 
 
@@ -81,7 +97,9 @@ def main(count: int, seed: int, patience: int, system: str) -> None:
     ended: dict[tuple[str, str], int] = defaultdict(int)
     broken = []
     task = partial(measured, seed=seed, patience=patience, system=system)
-    with multiprocessing.get_context("fork").Pool(initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+    with multiprocessing.get_context("fork").Pool(
+        initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+    ) as pool:
         try:
             for i, name, n, answer in pool.imap_unordered(task, range(count)):
                 if isinstance(answer, str):
@@ -92,19 +110,35 @@ def main(count: int, seed: int, patience: int, system: str) -> None:
                 else:
                     rows[name].append(answer)
                     if not answer[3] <= 1:
-                        broken.append((i, name, n, f"true/reported {answer[3]:.3g}, error {answer[0]:.3g}"))
+                        broken.append(
+                            (i, name, n, f"true/reported {answer[3]:.3g}, error {answer[0]:.3g}")
+                        )
         except KeyboardInterrupt:
             pool.terminate()
-    print(f"{system:28s} starts  refused  failed  without truth  largest error  largest reported  reported/true  true/reported")
+    print(
+        f"{system:28s} starts  refused  failed  without truth  largest error  largest "
+        "reported  reported/true  true/reported"
+    )
     for name in CLASSES if system == "veselova" else CLASSES_OF[system]:
         others = [ended[name, how] for how in (REFUSED, "failed", NO_TRUTH)]
-        errors, reported, pessimism, ratios = np.array(rows[name]).reshape(-1, 4).T if rows[name] else np.zeros((4, 1))
-        figures = f"{np.max(errors):13.1e}  {np.max(reported):16.1e}  {np.median(pessimism):13.1f}  {np.max(ratios):13.2f}"
-        print(f"{name:28s} {len(rows[name]) + sum(others):6d}  {others[0]:7d}  {others[1]:6d}  {others[2]:13d}  {figures}")
+        errors, reported, pessimism, ratios = (
+            np.array(rows[name]).reshape(-1, 4).T if rows[name] else np.zeros((4, 1))
+        )
+        figures = (
+            f"{np.max(errors):13.1e}  {np.max(reported):16.1e}  {np.median(pessimism):13.1f} "
+            f" {np.max(ratios):13.2f}"
+        )
+        print(
+            f"{name:28s} {len(rows[name]) + sum(others):6d}  {others[0]:7d}  {others[1]:6d}  "
+            f"{others[2]:13d}  {figures}"
+        )
     for item in broken:
         print(*item)
 
 
 if __name__ == "__main__":
-    starts, first, seconds, chosen = (*sys.argv[1:], *("1000", "1", "5", "veselova")[len(sys.argv) - 1 :])
+    starts, first, seconds, chosen = (
+        *sys.argv[1:],
+        *("1000", "1", "5", "veselova")[len(sys.argv) - 1 :],
+    )
     main(int(starts), int(first), int(seconds), chosen)

@@ -1,9 +1,11 @@
-"""Do the engines agree on random problems? n = 2…8, A log-uniform up to a ratio of 100, |t| ≤ 50, closed form against heyoka.
+"""Do the engines agree on random problems? n = 2…8, A log-uniform up to a ratio of 100, |t| ≤ 50,
+closed form against heyoka.
 
     python benchmarks/agreement.py [problems per n]      default 200; needs the extra `fast`
 
-Prints per n: the largest difference of q and frame, the largest difference over the sum of the two errors, the
-narrowest gap or cut drawn (relative to the largest branch point), seconds per problem of each engine, and every failure.
+Prints per n: the largest difference of q and frame, the largest difference over the sum of the two
+errors, the narrowest gap or cut drawn (relative to the largest branch point), seconds per problem
+of each engine, and every failure.
 Nothing is dropped: a draw that an engine refuses is listed.
 """
 
@@ -31,7 +33,10 @@ def random_problem(rng: np.random.Generator, n: int) -> vs.Veselova:
 
 
 def main(count: int) -> None:
-    print("n   problems  failures   largest difference   over errors      narrowest interval   s analytic   s heyoka")
+    print(
+        "n   problems  failures   largest difference   over errors      narrowest interval   "
+        "s analytic   s heyoka"
+    )
     for n in range(2, 9):
         rng = np.random.default_rng(n)
         worst = ratio = 0.0
@@ -55,7 +60,8 @@ def main(count: int) -> None:
             points = vs.torus(problem).branch_points
             narrowest = min(narrowest, float(np.min(np.diff(points)) / points[-1]))
         print(
-            f"{n}   {count:8d}  {len(failures):8d}   {worst:18.1e}   {ratio:14.2f}   {narrowest:18.1e}"
+            f"{n}   {count:8d}  {len(failures):8d}   {worst:18.1e}   {ratio:14.2f}   "
+            f"{narrowest:18.1e}"
             f"   {seconds[0] / count:10.4f}   {seconds[1] / count:8.4f}",
             flush=True,
         )

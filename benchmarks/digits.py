@@ -1,11 +1,14 @@
-"""What digits cost: the closed form in ball arithmetic, plain and certified, against the same with more digits.
+"""What digits cost: the closed form in ball arithmetic, plain and certified, against the same with
+more digits.
 
     python benchmarks/digits.py [most digits]        default 100
 
-Prints, per dimension and number of digits, the seconds of a whole call (set-up included), those until the frame is there in
-decimals, and those until all series are (decimals are made when they are asked for), the working digits, the clock and its
-evaluations, the largest error reported, and the largest difference of the frame from a run with ten digits more (decimals are
-rounded to three digits beyond those asked for). The last bodies are next to a separatrix, with relative gaps of 1e-6 and 1e-17.
+Prints, per dimension and number of digits, the seconds of a whole call (set-up included), those
+until the frame is there in decimals, and those until all series are (decimals are made when they
+are asked for), the working digits, the clock and its evaluations, the largest error reported, and
+the largest difference of the frame from a run with ten digits more (decimals are rounded to three
+digits beyond those asked for). The last bodies are next to a separatrix, with relative gaps of 1e-6
+and 1e-17.
 """
 
 from __future__ import annotations
@@ -27,13 +30,17 @@ from draws import near_unstable_circle
 
 def problem(n: int) -> vs.Veselova:
     rng = np.random.default_rng(n)
-    A, q, q_dot = ([f"{x:.3f}" for x in values] for values in (rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n)))
+    A, q, q_dot = (
+        [f"{x:.3f}" for x in values]
+        for values in (rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n))
+    )
     return vs.Veselova(A, q, q_dot, normalize=True)
 
 
 def main(most: int) -> None:
     print(
-        "n   times               digits   certified   seconds   frame     all       working   clock      evaluations   "
+        "n   times               digits   certified   seconds   frame     all       working  "
+        " clock      evaluations   "
         "reported   difference"
     )
     near, many, far = np.linspace(0, 10, 10), np.linspace(0, 100, 100), np.array([1e6, 1e12])
@@ -41,9 +48,14 @@ def main(most: int) -> None:
     table = [(n, near, 15, True) for n in (2, 3, 4, 6)]
     table += [(3, near, d, False) for d in (30, 100, 300, 990) if d <= most]
     table += [(n, many, 50, False) for n in (3, 4)] + [(3, far, 30, False), (2, far, 50, False)]
-    table += [(3, orbit, 50, False) for orbit in orbits] + [(4, orbit, 50, False) for orbit in orbits[:2]]
+    table += [(3, orbit, 50, False) for orbit in orbits] + [
+        (4, orbit, 50, False) for orbit in orbits[:2]
+    ]
     rows = [(problem(n), times, digits, certified) for n, times, digits, certified in table]
-    rows += [(near_unstable_circle(*start), far[:1], 20, False) for start in (("1e-3", "1e-4"), ("3.735e-9", "3.758e-11"))]
+    rows += [
+        (near_unstable_circle(*start), far[:1], 20, False)
+        for start in (("1e-3", "1e-4"), ("3.735e-9", "3.758e-11"))
+    ]
     for body, times, digits, certified in rows:
         began = time.perf_counter()
         found = vs.solve(body, times, digits=digits, certified=certified)
@@ -58,7 +70,10 @@ def main(most: int) -> None:
         difference = np.max(np.abs(frame - finer.decimals.midpoints["frame"]))
         details, span = found.provenance.details, f"{times.size} to {times[-1]:g}"
         spent = "   ".join(f"{x:7.2f}" for x in seconds)
-        figures = f"{spent}   {details['working_digits']:7d}   {details['time_map']:8s}   {details['time_map_size']:11d}"
+        figures = (
+            f"{spent}   {details['working_digits']:7d}   {details['time_map']:8s}   "
+            f"{details['time_map_size']:11d}"
+        )
         errors = f"{max(found.decimals.error):8.1e}   {difference:8.1e}"
         print(f"{body.n}   {span:17s}   {digits:6d}   {certified!s:9s}   {figures}   {errors}")
 

@@ -2,10 +2,11 @@
 
     python benchmarks/far_time.py      needs the extra `fast`
 
-Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶ after it (median of 9),
-heyoka's least time of five to integrate to t = 1000, called as its users call it, in the same run and scaled to 10⁶ (its cost is
-proportional to time), their ratio; then the reported error,
-the difference to the same closed form without guard digits, and the conditioning floor ε|ω|t.
+Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶
+after it (median of 9), heyoka's least time of five to integrate to t = 1000, called as its users
+call it, in the same run and scaled to 10⁶ (its cost is proportional to time), their ratio; then the
+reported error, the difference to the same closed form without guard digits, and the conditioning
+floor ε|ω|t.
 """
 
 from __future__ import annotations
@@ -26,10 +27,18 @@ FAR = 1e6
 
 
 def main() -> None:
-    print("n    modes   set-up s   one attitude ms   integrating s (scaled)      ratio      error   unguarded differs    floor")
+    print(
+        "n    modes   set-up s   one attitude ms   integrating s (scaled)      ratio      "
+        "error   unguarded differs    floor"
+    )
     for n in (2, 3, 4, 5, 6):
         rng = np.random.default_rng(n)
-        problem = vs.Veselova(np.exp(rng.uniform(0, np.log(5), n)), rng.normal(size=n), rng.normal(size=n), normalize=True)
+        problem = vs.Veselova(
+            np.exp(rng.uniform(0, np.log(5), n)),
+            rng.normal(size=n),
+            rng.normal(size=n),
+            normalize=True,
+        )
         speed = float(np.linalg.norm(problem.q_dot))
         times = np.array([FAR / speed])
         began = time.process_time()
@@ -57,7 +66,8 @@ def main() -> None:
         floor = problem.conditioning_floor(times)[0]
         size = trajectory.provenance.details["time_map_size"]
         print(
-            f"{n}   {size:6d}   {setup:8.3f}   {one * 1e3:15.2f}   {integrating:22.1f}   {integrating / one:8.1e}"
+            f"{n}   {size:6d}   {setup:8.3f}   {one * 1e3:15.2f}   {integrating:22.1f}   "
+            f"{integrating / one:8.1e}"
             f"   {trajectory.error[0]:8.1e}   {difference:17.1e}   {floor:6.1e}",
             flush=True,
         )

@@ -1,10 +1,12 @@
-"""Make the fingerprint of the results anew: motions of every system with a closed form, with their errors, by version.
+"""Make the fingerprint of the results anew: motions of every system with a closed form, with their
+errors, by version.
 
     python benchmarks/fingerprint.py
 
-Cached answers and sweeps are trusted as long as the version stays. ``tests/test_fingerprint.py`` compares the results of this
-checkout with ``tests/reference/fingerprint.json`` and fails when a value differs by more than the two errors together.
-Bump ``src/veselova/version.py`` first, and then run this command.
+Cached answers and sweeps are trusted as long as the version stays. ``tests/test_fingerprint.py``
+compares the results of this checkout with ``tests/reference/fingerprint.json`` and fails when a
+value differs by more than the two errors together. Bump ``src/veselova/version.py`` first, and then
+run this command.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
     python benchmarks/fuzz.py [COUNT [SEED]]
 
-COUNT (1 000 000) texts are made from valid requests of every kind and system: values replaced by others of the wrong kind or
-size, fields dropped, doubled or renamed, bytes changed, texts cut off. Each goes the way of a body: decoding, the model of its
-request, then the problem, the times and, for a sweep, its parameters. Exits with status 1 at the first exception that is no
-VeselovaError and no Refused, and prints the text and the seed.
+COUNT (1 000 000) texts are made from valid requests of every kind and system: values replaced by
+others of the wrong kind or size, fields dropped, doubled or renamed, bytes changed, texts cut off.
+Each goes the way of a body: decoding, the model of its request, then the problem, the times and,
+for a sweep, its parameters. Exits with status 1 at the first exception that is no VeselovaError and
+no Refused, and prints the text and the seed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ from typing import Any
 from veselova.mechanics.core.errors import VeselovaError
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused, problem_document
-from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.request_models import (
+    ComparisonRequest,
+    TorusRequest,
+    TrajectoryRequest,
+    read_request,
+)
 from veselova.service.api.sweep_request import SweepRequest
 
 V3 = {"system": "veselova", "A": [3, "3/2", 1], "q": [0.6, 0, "0.8"], "q_dot": [0, 1, 0]}
@@ -31,7 +37,13 @@ PROBLEMS: list[dict[str, Any]] = [
     {**V3, "normalize": True, "frame": [[0.6, 0.8, 0], [0, 0, 1], [0.8, -0.6, 0]]},
     {**V3, "A": [[3, 0.1, 0], [0.1, 2, 0], [0, 0, 1]]},
     {"system": "neumann", "A": [3, 2], "q": [1, 0], "q_prime": [0, 1]},
-    {"system": "ellipsoid-geodesic", "A": [3, 2, 1], "X": [1, 1, 1], "X_dot": [1, -1, 0.2], "normalize": True},
+    {
+        "system": "ellipsoid-geodesic",
+        "A": [3, 2, 1],
+        "X": [1, 1, 1],
+        "X_dot": [1, -1, 0.2],
+        "normalize": True,
+    },
     {
         "system": "veselova-so3",
         "inertia": [1, 2, 3],
@@ -47,8 +59,19 @@ PROBLEMS: list[dict[str, Any]] = [
         "q_dot": [0, 1, 0],
         "potential": {"quartic": 1, "centrifugal": [1, 0, 0]},
     },
-    {"system": "lr", "n": 3, "rank": 1, "inertia": {"special": [3, 2, 1]}, "omega": [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]},
-    {"system": "stiefel", "inertia": {"special": [3, 2, 1]}, "X": [[1], [0], [0]], "X_dot": [[0], [1], [0]]},
+    {
+        "system": "lr",
+        "n": 3,
+        "rank": 1,
+        "inertia": {"special": [3, 2, 1]},
+        "omega": [[0, 1, 0], [-1, 0, 0], [0, 0, 0]],
+    },
+    {
+        "system": "stiefel",
+        "inertia": {"special": [3, 2, 1]},
+        "X": [[1], [0], [0]],
+        "X_dot": [[0], [1], [0]],
+    },
 ]
 MOTION = {"times": [0, 1], "method": None, "outputs": None, "digits": 15, "budget_s": 3}
 VARY = {"/A/0": {"start": 1, "stop": 2, "count": 3}, "/q_dot": {"normal": [0, 1]}, "/A/1": [1, "2"]}
@@ -79,11 +102,39 @@ WRONG: list[Any] = [
         float("nan"),
         float("inf"),
     ),
-    *("", " ", "x", "1/0", "0/1", "1e400", "١", "1_000", "0x10", "∞", "\ud800", "\x00", "7/10" * 700, "/A/0", "~1"),
+    *(
+        "",
+        " ",
+        "x",
+        "1/0",
+        "0/1",
+        "1e400",
+        "١",
+        "1_000",
+        "0x10",
+        "∞",
+        "\ud800",
+        "\x00",
+        "7/10" * 700,
+        "/A/0",
+        "~1",
+    ),
     *("veselova", "lr", "analytic", "theta", "frame"),
     *([], [[]], [None], [0, 0, 0], [1, 0, 0], [[1, 0], [0, 1]], [1] * 65, [1e-300, 1e300, 1]),
-    *({}, {"": 0}, {"start": 0}, {"start": 0, "stop": 1, "count": 10**9}, {"uniform": [0, 1]}, {"normal": [0, -1]}),
-    *({"clebsch": None}, {"polynomial": [{"coefficient": 1, "powers": [2, 0, 99]}]}, {"special": [1, 1, 1]}, {"matrix": [[1]]}),
+    *(
+        {},
+        {"": 0},
+        {"start": 0},
+        {"start": 0, "stop": 1, "count": 10**9},
+        {"uniform": [0, 1]},
+        {"normal": [0, -1]},
+    ),
+    *(
+        {"clebsch": None},
+        {"polynomial": [{"coefficient": 1, "powers": [2, 0, 99]}]},
+        {"special": [1, 1, 1]},
+        {"matrix": [[1]]},
+    ),
 ]
 
 
@@ -104,7 +155,9 @@ def mutated(document: Any, draw: random.Random) -> Any:
         elif action < 0.8:
             del place[key]
         elif isinstance(place, dict):
-            place[draw.choice(["", "x", "/A/9", "times", "q", "é" * 50, "system"])] = copy.deepcopy(place[key])
+            place[draw.choice(["", "x", "/A/9", "times", "q", "é" * 50, "system"])] = copy.deepcopy(
+                place[key]
+            )
         else:
             place.append(copy.deepcopy(draw.choice(WRONG)))
         return document
@@ -152,9 +205,15 @@ def main() -> None:
         try:
             ends[followed(model, text)] += 1
         except Exception as error:
-            print(f"seed {seed}, text {i}, {model.__name__}: {type(error).__name__}: {error}\n{text!r}")
+            print(
+                f"seed {seed}, text {i}, {model.__name__}: {type(error).__name__}: "
+                f"{error}\n{text!r}"
+            )
             raise SystemExit(1) from error
-    print(f"{count} texts in {time.perf_counter() - began:.0f} s, no exception that is not a refusal: {dict(ends)}")
+    print(
+        f"{count} texts in {time.perf_counter() - began:.0f} s, no exception that is not a "
+        f"refusal: {dict(ends)}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Do true errors stay below reported ones? Random problems, n = 2…8, |t| ≤ 50, against integration in binary128.
+"""Do true errors stay below reported ones? Random problems, n = 2…8, |t| ≤ 50, against integration
+in binary128.
 
     python benchmarks/honesty.py [problems per n]      default 40; needs the extra `fast`
 
-Prints per n and method the largest and median true error of the frame, the median reported one, and the largest true error over
-the reported one at the same time, at most 1.
+Prints per n and method the largest and median true error of the frame, the median reported one, and
+the largest true error over the reported one at the same time, at most 1.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem
 from truth import true_motion
 
-METHODS = [("analytic", "theta"), ("analytic", "angles"), ("numeric", "dop853"), ("numeric", "taylor")]
+METHODS = [
+    ("analytic", "theta"),
+    ("analytic", "angles"),
+    ("numeric", "dop853"),
+    ("numeric", "taylor"),
+]
 
 
 def main(count: int) -> None:
@@ -40,12 +46,19 @@ def main(count: int) -> None:
                     continue  # 14 to 25 ms a point, and the same states as by angles
                 found = vs.solve(problem, times, engine, method)
                 error = np.max(np.abs(found.frame - frame), axis=(1, 2))
-                rows[method].append((float(np.max(error)), float(np.max(found.error)), float(np.max(error / found.error))))
+                rows[method].append(
+                    (
+                        float(np.max(error)),
+                        float(np.max(found.error)),
+                        float(np.max(error / found.error)),
+                    )
+                )
         for method, values in rows.items():
             if values:
                 errors, reported, ratios = np.array(values).T
                 figures = (
-                    f"{np.max(errors):13.1e}   {np.median(errors):12.1e}   {np.median(reported):15.1e}   {np.max(ratios):12.2f}"
+                    f"{np.max(errors):13.1e}   {np.median(errors):12.1e}   "
+                    f"{np.median(reported):15.1e}   {np.max(ratios):12.2f}"
                 )
                 print(f"{n}   {method:7s}   {figures}", flush=True)
 

@@ -1,13 +1,15 @@
-"""How many instructions does the processor need from a problem to its first attitude, and to one more at t = 10⁶?
+"""How many instructions does the processor need from a problem to its first attitude, and to one
+more at t = 10⁶?
 
     python benchmarks/instructions.py [n ...]
     python benchmarks/instructions.py calls [n ...]
 
-"calls" takes callgrind instead, and tells how many calls of NumPy's universal functions there are, and what they take of it all.
-Needs valgrind. What other processes do on the machine changes times, but hardly these counts: two runs agree to a percent. So
-they tell versions apart where times do not. A process solves ten random problems (as in setup.py) once, then 0 or 2 times more
-with nothing kept of the solutions before; the difference of the two counts belongs to the solutions alone. Takes two minutes for
-n = 2 and 3 together, three for n = 4, and more beyond.
+"calls" takes callgrind instead, and tells how many calls of NumPy's universal functions there are,
+and what they take of it all. Needs valgrind. What other processes do on the machine changes times,
+but hardly these counts: two runs agree to a percent. So they tell versions apart where times do
+not. A process solves ten random problems (as in setup.py) once, then 0 or 2 times more with nothing
+kept of the solutions before; the difference of the two counts belongs to the solutions alone. Takes
+two minutes for n = 2 and 3 together, three for n = 4, and more beyond.
 """
 
 from __future__ import annotations
@@ -54,7 +56,9 @@ def instructions(what: str, n: int, rounds: int) -> int:
     """Return the instructions of a whole process."""
     command = [*COUNTED, sys.executable, __file__, "work", what, str(n), str(rounds)]
     environment = {**os.environ, "PYTHONHASHSEED": "0"}
-    report = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stderr
+    report = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    ).stderr
     found = re.search(r"I\s+refs:\s+([\d,]+)", report)
     assert found, report
     return int(found[1].replace(",", ""))
@@ -66,12 +70,23 @@ def each(what: str, n: int) -> float:
 
 
 def universal(what: str, n: int, rounds: int) -> tuple[int, int]:
-    """Return the calls of universal functions in a whole process, and the instructions within them."""
+    """Return the calls of universal functions in a whole process, and the
+    instructions within them.
+    """
     names, called, calls, within = dict[str, str](), "", 0, 0
     with tempfile.NamedTemporaryFile("r") as profile:
-        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile.name}", sys.executable, __file__, "work"]
+        command = [
+            "valgrind",
+            "--tool=callgrind",
+            f"--callgrind-out-file={profile.name}",
+            sys.executable,
+            __file__,
+            "work",
+        ]
         environment = {**os.environ, "PYTHONHASHSEED": "0"}
-        subprocess.run([*command, what, str(n), str(rounds)], env=environment, capture_output=True, check=True)
+        subprocess.run(
+            [*command, what, str(n), str(rounds)], env=environment, capture_output=True, check=True
+        )
         lines = iter(profile)
         for line in lines:
             if found := re.match(r"(c?)fn=\((\d+)\)(?: (.*))?", line):
@@ -79,12 +94,15 @@ def universal(what: str, n: int, rounds: int) -> tuple[int, int]:
                 called = names[found[2]] if found[1] else called
             elif line.startswith("calls=") and called == UNIVERSAL:
                 calls += int(line[6:].split()[0])
-                within += int(next(lines).split()[1])  # the cost of the calls is on the line after them
+                # the cost of the calls is on the line after them
+                within += int(next(lines).split()[1])
     return calls, within
 
 
 def each_universal(what: str, n: int) -> str:
-    """Return the calls in one solution or one attitude, and the millions of instructions within them."""
+    """Return the calls in one solution or one attitude, and the millions of instructions within
+    them.
+    """
     some, none = universal(what, n, ROUNDS), universal(what, n, 0)
     calls, within = ((x - y) / (ROUNDS * PROBLEMS) for x, y in zip(some, none, strict=True))
     return f"{calls:.0f} calls, {within / 1e6:.2f} million"
@@ -93,7 +111,9 @@ def each_universal(what: str, n: int) -> str:
 def main(sizes: list[int]) -> None:
     print("| n | first attitude | attitude at t = 10⁶, set up |\n|---|---|---|")
     for n in sizes:
-        print(f"| {n} | {each('first', n):.1f} million | {each('later', n):.2f} million |", flush=True)
+        print(
+            f"| {n} | {each('first', n):.1f} million | {each('later', n):.2f} million |", flush=True
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""What integrals of motion along 10⁶ times cost, beside the motion itself, and how near the constants are to those of 40 digits.
+"""What integrals of motion along 10⁶ times cost, beside the motion itself, and how near the
+constants are to those of 40 digits.
 
 python benchmarks/integrals.py [times]
 """
@@ -25,7 +26,9 @@ RUNS, STATES = 3, 40
 
 
 def costs(n: int, count: int) -> tuple[float, float]:
-    """Return the seconds of a motion at random times in [0, 1000], and of its integrals, the least of some runs."""
+    """Return the seconds of a motion at random times in [0, 1000], and of its integrals, the least
+    of some runs.
+    """
     problem, rng = random_problem(np.random.default_rng(3), n, 5.0), np.random.default_rng(1)
     times, motion, integrals = np.unique(rng.uniform(0, 1000, count)), [], []
     for _ in range(RUNS):
@@ -40,7 +43,11 @@ def costs(n: int, count: int) -> tuple[float, float]:
 
 def error(rng: np.random.Generator, n: int, decades: float, speed: float) -> float:
     """Return the error of c_1 … c_{n−1} at a drawn state, in ε·max(I_i, |q'|²)."""
-    A, q, v = 10 ** rng.uniform(-decades, decades, n), rng.normal(size=n), speed * rng.normal(size=n)
+    A, q, v = (
+        10 ** rng.uniform(-decades, decades, n),
+        rng.normal(size=n),
+        speed * rng.normal(size=n),
+    )
     q /= np.linalg.norm(q)
     v -= (v @ q) * q
     columns = mpmath.matrix(np.column_stack([q, rng.normal(size=(n, n - 1))]).tolist())
@@ -57,12 +64,22 @@ def main(count: int) -> None:
     print(f"| n | motion at {count:.0e} times | its integrals | ratio |\n|---|---|---|---|")
     for n in (3, 4, 6):
         motion, integrals = costs(n, count)
-        print(f"| {n} | {motion:.2f} s | {integrals:.2f} s | {integrals / motion:.1f} |", flush=True)
+        print(
+            f"| {n} | {motion:.2f} s | {integrals:.2f} s | {integrals / motion:.1f} |", flush=True
+        )
     rng = np.random.default_rng(5)
     with mpmath.workdps(40):
-        kinds = [(n, decades, speed) for n in (2, 3, 4, 6) for decades in (0.3, 6.0) for speed in (1e-8, 1.0, 1e8)]
+        kinds = [
+            (n, decades, speed)
+            for n in (2, 3, 4, 6)
+            for decades in (0.3, 6.0)
+            for speed in (1e-8, 1.0, 1e8)
+        ]
         worst = max(error(rng, *kind) for kind in kinds for _ in range(STATES))
-    print(f"constants of {len(kinds) * STATES} states: off by at most {worst:.1f} ε of the largest I_i or |q'|²")
+    print(
+        f"constants of {len(kinds) * STATES} states: off by at most {worst:.1f} ε of the "
+        "largest I_i or |q'|²"
+    )
 
 
 if __name__ == "__main__":

@@ -1,14 +1,18 @@
-"""A short motion of a new body, t ≤ 10 at 50 times: closed form against integrators, full attitude, in one process.
+"""A short motion of a new body, t ≤ 10 at 50 times: closed form against integrators, full attitude,
+in one process.
 
-    python benchmarks/integrators.py [PROBLEMS]      heyoka needs the extra `fast`, diffrax is taken where it is installed
+    python benchmarks/integrators.py [PROBLEMS]      heyoka needs the extra `fast`, diffrax is taken
+    where it is installed
 
-Random problems, A within a factor of 5, unit speed; processor seconds of one call, the problem new to everybody, libraries
-loaded. "closed form" has its error; the others are one integration each, projected every ten radians, without any.
-heyoka is called as its users call it (`veselova.numeric.heyoka_peer`).
-DOP853 is SciPy's, at the least tolerance that it takes and at the one with which it comes nearest to an error of 1e-11;
-heyoka once with the compilation of the field, which it needs for every new n, and once without. "first" is the first call of
-all for that n, what is compiled then included. The error is that of the frame against the closed form with 30 digits; each
-figure is the median over the problems, the error the largest.
+Random problems, A within a factor of 5, unit speed; processor seconds of one call, the problem new
+to everybody, libraries loaded. "closed form" has its error; the others are one integration each,
+projected every ten radians, without any. heyoka is called as its users call it
+(`veselova.numeric.heyoka_peer`).
+DOP853 is SciPy's, at the least tolerance that it takes and at the one with which it comes nearest
+to an error of 1e-11; heyoka once with the compilation of the field, which it needs for every new n,
+and once without. "first" is the first call of all for that n, what is compiled then included. The
+error is that of the frame against the closed form with 30 digits; each figure is the median over
+the problems, the error the largest.
 """
 
 from __future__ import annotations
@@ -68,7 +72,9 @@ def heyoka_compiled_anew(problem: Veselova) -> np.ndarray:
 
 
 def diffrax() -> Solver | None:
-    """Return diffrax's Dopri8 on the same field, compiled at its first call; None where it is not installed."""
+    """Return diffrax's Dopri8 on the same field, compiled at its first call; None where it is not
+    installed.
+    """
     try:
         import diffrax as dx
         import jax
@@ -93,9 +99,17 @@ def diffrax() -> Solver | None:
         at = TIMES / flow.time_unit
         data = tuple(jnp.array(x) for x in (flow.A, flow.inverse, flow.twice_energy))
         found = dx.diffeqsolve(
-            dx.ODETerm(field), dx.Dopri8(), 0.0, at[-1], None, jnp.array(flow.initial), data,
-            saveat=dx.SaveAt(ts=jnp.array(at)), stepsize_controller=dx.PIDController(rtol=1e-13, atol=1e-14), max_steps=10**5,
-        )  # fmt: skip
+            dx.ODETerm(field),
+            dx.Dopri8(),
+            0.0,
+            at[-1],
+            None,
+            jnp.array(flow.initial),
+            data,
+            saveat=dx.SaveAt(ts=jnp.array(at)),
+            stepsize_controller=dx.PIDController(rtol=1e-13, atol=1e-14),
+            max_steps=10**5,
+        )
         return flow.unpack(np.array(found.ys))["frame"]
 
     return frames
@@ -133,7 +147,9 @@ def main(count: int) -> None:
             middle = float(np.median(seconds))
             ours = middle if name == "closed form" else ours
             print(
-                f"| {n} | {name} | {middle * 1e3:.3g} ms | {middle / ours:.2g} | {first:.2f} s | {max(errors):.0e} |", flush=True
+                f"| {n} | {name} | {middle * 1e3:.3g} ms | {middle / ours:.2g} | {first:.2f} "
+                f"s | {max(errors):.0e} |",
+                flush=True,
             )
 
 

@@ -1,10 +1,13 @@
-"""How much memory does a large answer take in the server and in its worker, and how long does it take in each format?
+"""How much memory does a large answer take in the server and in its worker, and how long does it
+take in each format?
 
-    python benchmarks/large_answer.py [times]      default 1000000; needs pyarrow for two of the formats
+    python benchmarks/large_answer.py [times]      default 1000000; needs pyarrow for two of the
+    formats
 
-Starts a server with one worker and no cache, and downloads so many times of a four-dimensional body, integrated, with all of its
-series: in every format, and once as JSON in each content coding. Prints seconds, bytes, and the peak resident memory of the
-server and of the worker (VmHWM, which only grows).
+Starts a server with one worker and no cache, and downloads so many times of a four-dimensional
+body, integrated, with all of its
+series: in every format, and once as JSON in each content coding. Prints seconds, bytes, and the
+peak resident memory of the server and of the worker (VmHWM, which only grows).
 """
 
 from __future__ import annotations
@@ -26,7 +29,11 @@ from veselova.service.client.download import MEDIA_TYPES
 
 
 def peak_megabytes(pid: int) -> float:
-    line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmHWM"))
+    line = next(
+        line
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines()
+        if line.startswith("VmHWM")
+    )
     return float(line.split()[1]) / 1024
 
 
@@ -34,12 +41,23 @@ def worker_of(process: subprocess.Popen[bytes]) -> int:
     return int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
 
 
-def fetch(client: httpx2.Client, count: int, media_type: str, coding: str) -> tuple[float, float, int]:
-    """Return the seconds until the answer began and until it was there, and its bytes on the wire."""
-    body = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": count}, "engine": "numeric", "budget_s": 60}
+def fetch(
+    client: httpx2.Client, count: int, media_type: str, coding: str
+) -> tuple[float, float, int]:
+    """Return the seconds until the answer began and until it was there, and its bytes
+    on the wire.
+    """
+    body = {
+        "problem": BODY4_PROBLEM,
+        "times": {"start": 0, "stop": 60, "count": count},
+        "engine": "numeric",
+        "budget_s": 60,
+    }
     headers = {"content-type": "application/json", "accept": media_type, "accept-encoding": coding}
     began, size = time.perf_counter(), 0
-    with client.stream("POST", "/v1/trajectories", content=json.dumps(body), headers=headers) as response:
+    with client.stream(
+        "POST", "/v1/trajectories", content=json.dumps(body), headers=headers
+    ) as response:
         first = time.perf_counter() - began
         if response.status_code != 200:
             raise SystemExit(response.read().decode())
@@ -53,18 +71,44 @@ def main(count: int) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
-        settings = {"VESELOVA_WORKERS": "1", "VESELOVA_DATA_DIR": folder, "VESELOVA_CACHE_BYTES": "0"}
+        settings = {
+            "VESELOVA_WORKERS": "1",
+            "VESELOVA_DATA_DIR": folder,
+            "VESELOVA_CACHE_BYTES": "0",
+        }
         command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
-        process = subprocess.Popen(command, env={**os.environ, **settings}, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            command,
+            env={**os.environ, **settings},
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+        )
         try:
             with httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=120) as client:
                 wait_ready(client)
-                print(f"idle: server {peak_megabytes(process.pid):.0f} MB, worker {peak_megabytes(worker_of(process)):.0f} MB")
-                print("format    coding     computed s   all s       bytes   server peak MB   worker peak MB")
-                for name, coding in [*((name, "identity") for name in MEDIA_TYPES), ("json", "zstd"), ("json", "gzip")]:
+                print(
+                    f"idle: server {peak_megabytes(process.pid):.0f} MB, worker "
+                    f"{peak_megabytes(worker_of(process)):.0f} MB"
+                )
+                print(
+                    "format    coding     computed s   all s       bytes   server peak MB   "
+                    "worker peak MB"
+                )
+                for name, coding in [
+                    *((name, "identity") for name in MEDIA_TYPES),
+                    ("json", "zstd"),
+                    ("json", "gzip"),
+                ]:
                     first, whole, size = fetch(client, count, MEDIA_TYPES[name], coding)
-                    memory = f"{peak_megabytes(process.pid):14.0f}   {peak_megabytes(worker_of(process)):14.0f}"
-                    print(f"{name:8}  {coding:8}   {first:10.1f}   {whole:5.1f}   {size:9d}   {memory}", flush=True)
+                    memory = (
+                        f"{peak_megabytes(process.pid):14.0f}   "
+                        f"{peak_megabytes(worker_of(process)):14.0f}"
+                    )
+                    print(
+                        f"{name:8}  {coding:8}   {first:10.1f}   {whole:5.1f}   {size:9d}   "
+                        f"{memory}",
+                        flush=True,
+                    )
         finally:
             process.send_signal(signal.SIGTERM)
             process.wait(30)

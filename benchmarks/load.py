@@ -3,13 +3,16 @@
     python benchmarks/load.py [SECONDS [CONNECTIONS]]
     python benchmarks/load.py requests [NUMBER]
 
-Starts a server with two workers. For SECONDS (60), CONNECTIONS (64) connections POST small motions, each of a body of its own,
-one after the other, while another asks for /healthz fifty times a second. Then four times as many connections as may wait are
-opened at once: those beyond get 503 and none is left without an answer. Printed: answers by status, requests per second,
-quantiles of both, and the memory of the server's process before, at half time and after.
+Starts a server with two workers. For SECONDS (60), CONNECTIONS (64) connections POST small motions,
+each of a body of its own, one after the other, while another asks for /healthz fifty times a
+second. Then four times as many connections as may wait are
+opened at once: those beyond get 503 and none is left without an answer. Printed: answers by status,
+requests per second, quantiles of both, and the memory of the server's process before, at half time
+and after.
 
-With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER (100 000) of them, each for a
-body of its own, one of four solved in closed form; printed is the memory of both processes after 10, 100, 1000 … requests.
+With ``requests`` a server of one worker is asked by two connections until it has answered NUMBER
+(100 000) of them, each for a body of its own, one of four solved in closed form; printed is the
+memory of both processes after 10, 100, 1000 … requests.
 """
 
 from __future__ import annotations
@@ -31,7 +34,9 @@ import httpx2
 
 
 class Connection:
-    """One kept-alive HTTP/1.1 connection, as thin as it can be: the load and the server share the processors."""
+    """One kept-alive HTTP/1.1 connection, as thin as it can be: the load and the server share the
+    processors.
+    """
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -49,26 +54,42 @@ class Connection:
         self._writer.write(request)
         header = await self._reader.readuntil(b"\r\n\r\n")
         lines = header.decode("latin-1").lower().split("\r\n")
-        length = next(int(line.split(":")[1]) for line in lines if line.startswith("content-length:"))
+        length = next(
+            int(line.split(":")[1]) for line in lines if line.startswith("content-length:")
+        )
         await self._reader.readexactly(length)
         return int(lines[0].split()[1]), time.perf_counter() - began
 
 
 def motion(draw: random.Random, engine: str = "analytic") -> bytes:
     """Return a request for a small motion of a body of its own."""
-    problem = {"system": "veselova", "A": [3, 2, 1 + draw.random()], "q": [1, 1, 1], "q_dot": [draw.random(), 0.2, -0.5]}
+    problem = {
+        "system": "veselova",
+        "A": [3, 2, 1 + draw.random()],
+        "q": [1, 1, 1],
+        "q_dot": [draw.random(), 0.2, -0.5],
+    }
     times = [0, 1, 2] if engine == "analytic" else [0, 0.1]
-    body = json.dumps({"problem": {**problem, "normalize": True}, "times": times, "engine": engine, "budget_s": 30}).encode()
+    body = json.dumps(
+        {
+            "problem": {**problem, "normalize": True},
+            "times": times,
+            "engine": engine,
+            "budget_s": 30,
+        }
+    ).encode()
     return (
-        b"POST /v1/trajectories HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body)
-        + body
+        b"POST /v1/trajectories HTTP/1.1\r\nHost: x\r\nContent-Type: "
+        b"application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
     )
 
 
 HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
 
 
-async def small_requests(port: int, until: float, seed: int, seen: Counter[int], taken: list[float]) -> None:
+async def small_requests(
+    port: int, until: float, seed: int, seen: Counter[int], taken: list[float]
+) -> None:
     draw = random.Random(seed)
     async with Connection(port) as connection:
         while time.perf_counter() < until:
@@ -93,18 +114,25 @@ async def burst(port: int, count: int) -> Counter[int]:
         async with Connection(port) as connection:
             return (await connection.ask(motion(random.Random(seed))))[0]
 
-    return Counter(await asyncio.wait_for(asyncio.gather(*(one(10_000 + i) for i in range(count))), 120))
+    return Counter(
+        await asyncio.wait_for(asyncio.gather(*(one(10_000 + i) for i in range(count))), 120)
+    )
 
 
 def quantiles(taken: list[float]) -> str:
     ordered = sorted(taken)
     return ", ".join(
-        f"{name} {1000 * ordered[int(q * (len(ordered) - 1))]:.1f} ms" for name, q in (("p50", 0.5), ("p99", 0.99), ("max", 1))
+        f"{name} {1000 * ordered[int(q * (len(ordered) - 1))]:.1f} ms"
+        for name, q in (("p50", 0.5), ("p99", 0.99), ("max", 1))
     )
 
 
 def megabytes(pid: int) -> float:
-    line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS"))
+    line = next(
+        line
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines()
+        if line.startswith("VmRSS")
+    )
     return int(line.split()[1]) / 1024
 
 
@@ -118,13 +146,18 @@ async def measure(port: int, pid: int, seconds: float, connections: int, waiting
     print(f"memory at half time: {megabytes(pid):.0f} MB after {sum(seen.values())} requests")
     await tasks
     print(f"memory after: {megabytes(pid):.0f} MB after {sum(seen.values())} requests")
-    print(f"small motions: {dict(seen)}, {sum(seen.values()) / seconds:.0f} per second, {quantiles(small)}")
+    print(
+        f"small motions: {dict(seen)}, {sum(seen.values()) / seconds:.0f} per second, "
+        f"{quantiles(small)}"
+    )
     print(f"/healthz meanwhile: {quantiles(healthy)}")
     print(f"{4 * waiting} at once where {waiting} may wait: {dict(await burst(port, 4 * waiting))}")
 
 
 async def count(port: int, pid: int, number: int) -> None:
-    """Print the memory of a server and its worker each time that ten times as many requests have been answered."""
+    """Print the memory of a server and its worker each time that ten times as many requests have
+    been answered.
+    """
     answered, seen, began = 0, Counter[int](), time.perf_counter()
 
     async def ask(draw: random.Random) -> None:
@@ -137,7 +170,11 @@ async def count(port: int, pid: int, number: int) -> None:
                 seen[(await connection.ask(motion(draw, engine)))[0]] += 1
                 if mark >= 10 and str(mark).strip("0") == "1":
                     worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
-                    print(f"{mark} requests: server {megabytes(pid):.0f} MB, worker {megabytes(worker):.0f} MB", flush=True)
+                    print(
+                        f"{mark} requests: server {megabytes(pid):.0f} MB, worker "
+                        f"{megabytes(worker):.0f} MB",
+                        flush=True,
+                    )
 
     await asyncio.gather(*(ask(random.Random(seed)) for seed in range(2)))
     print(f"{dict(seen)}, {number / (time.perf_counter() - began):.0f} per second")
@@ -157,7 +194,16 @@ def main() -> None:
             "VESELOVA_MAX_WAITING": str(connections),
             "VESELOVA_DATA_DIR": folder,
         }
-        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port), "--log-level", "warning"]
+        command = [
+            sys.executable,
+            "-m",
+            "veselova",
+            "serve",
+            "--port",
+            str(port),
+            "--log-level",
+            "warning",
+        ]
         process = subprocess.Popen(command, env={**os.environ, **limits})
         try:
             while True:
@@ -168,7 +214,9 @@ def main() -> None:
                     pass
                 time.sleep(0.05)
             asyncio.run(
-                count(port, process.pid, number) if counting else measure(port, process.pid, seconds, connections, connections)
+                count(port, process.pid, number)
+                if counting
+                else measure(port, process.pid, seconds, connections, connections)
             )
         finally:
             process.send_signal(signal.SIGTERM)

@@ -1,10 +1,12 @@
-"""Would a nonuniform FFT serve an orbit better? method="nufft" against what is chosen, windows of Chebyshev series.
+"""Would a nonuniform FFT serve an orbit better? method="nufft" against what is chosen, windows of
+Chebyshev series.
 
     python benchmarks/nufft.py [TIMES]      needs the extra `fast`; default 10⁶ times in [0, 1000]
 
-Along an orbit every theta function is a sum of waves e^{2πi x·(z⁰+fτ₁)} over a lattice, and those with the same ε share their
-frequencies x·f: transforms of type 3 serve all of them at arbitrary τ₁. Whole trajectories, the problem new to both; "clock" is
-the part of the former in which t becomes τ₁, time by time. Processor time, best of three each, one thread, one process.
+Along an orbit every theta function is a sum of waves e^{2πi x·(z⁰+fτ₁)} over a lattice, and those
+with the same ε share their frequencies x·f: transforms of type 3 serve all of them at arbitrary τ₁.
+Whole trajectories, the problem new to both; "clock" is the part of the former in which t becomes
+τ₁, time by time. Processor time, best of three each, one thread, one process.
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ def clock(body: vs.Veselova, times: np.ndarray) -> None:
     """Take t to τ₁ as the method does, and nothing else."""
     solution = Solution(body)
     chosen = EvaluationPlan(solution, times, "nufft").time_map()
-    OutputArray(times, times.size + 1, chosen, solution.in_tau1.rates, lambda tau1, z: (tau1, (tau1,))).complete()
+    OutputArray(
+        times, times.size + 1, chosen, solution.in_tau1.rates, lambda tau1, z: (tau1, (tau1,))
+    ).complete()
 
 
 def best(call: Callable[[], Any]) -> tuple[float, Any]:
@@ -57,10 +61,14 @@ def main(count: int) -> None:
         theirs, by_transforms = best(lambda body=body: vs.solve(body, times, method="nufft"))  # type: ignore[misc]
         ours, trajectory = best(lambda body=body: vs.solve(body, times))  # type: ignore[misc]
         of_clock = best(lambda body=body: clock(body, times))[0]  # type: ignore[misc]
-        difference, reported = np.max(np.abs(by_transforms.frame - trajectory.frame)), np.max(by_transforms.error)
+        difference, reported = (
+            np.max(np.abs(by_transforms.frame - trajectory.frame)),
+            np.max(by_transforms.error),
+        )
         ratios = f"{theirs / ours:5.1f}   {(theirs - of_clock) / ours:13.1f}"
         print(
-            f"{n}   {theirs:5.2f} s   {of_clock:5.2f} s   {ours:5.2f} s   {ratios}   {difference:18.1e}   {reported:8.1e}",
+            f"{n}   {theirs:5.2f} s   {of_clock:5.2f} s   {ours:5.2f} s   {ratios}   "
+            f"{difference:18.1e}   {reported:8.1e}",
             flush=True,
         )
 

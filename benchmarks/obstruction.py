@@ -1,8 +1,10 @@
-"""How far is the reduced flow on T*V(r,n) from Hamiltonian in Chaplygin's time? Median of the obstruction over random points.
+"""How far is the reduced flow on T*V(r,n) from Hamiltonian in Chaplygin's time? Median of the
+obstruction over random points.
 
     python benchmarks/obstruction.py
 
-Three inertia operators: special, A = (1, …, n); of a mass distribution, 𝓘(E_i∧E_j) = (J_i+J_j) E_i∧E_j, J = (1, …, n); random.
+Three inertia operators: special, A = (1, …, n); of a mass distribution, 𝓘(E_i∧E_j) = (J_i+J_j)
+E_i∧E_j, J = (1, …, n); random.
 """
 
 from __future__ import annotations
@@ -31,8 +33,13 @@ def main() -> None:
         for r in range(1, n):
             multipliers = [ChaplyginMultiplier.of(inertia, n, r) for inertia in inertias]
             points = [np.linalg.qr(rng.normal(size=(n, r)))[0] for _ in range(POINTS)]
-            found = [np.median([multiplier.obstruction(X) for X in points]) for multiplier in multipliers]
-            print(f"{n:>2} {r:>2} {multipliers[0].freedom:>3} " + " ".join(f"{value:9.2g}" for value in found))
+            found = [
+                np.median([multiplier.obstruction(X) for X in points]) for multiplier in multipliers
+            ]
+            print(
+                f"{n:>2} {r:>2} {multipliers[0].freedom:>3} "
+                + " ".join(f"{value:9.2g}" for value in found)
+            )
 
 
 if __name__ == "__main__":

@@ -2,11 +2,12 @@
 
     python benchmarks/orbit.py [times] [span]      needs the extra `fast`
 
-Random problems, A within a factor of 5, unit speed, random frame; sorted random times in [0, span]. The least processor time
-of five calls each, in turn; the problem is new in every call, the field already compiled by heyoka. Both yield τ₁, a velocity
-and the frame; the closed form yields its error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users
-write it, with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the frames, "reported"
-the closed form's error.
+Random problems, A within a factor of 5, unit speed, random frame; sorted random times in [0, span].
+The least processor time of five calls each, in turn; the problem is new in every call, the field
+already compiled by heyoka. Both yield τ₁, a velocity and the frame; the closed form yields its
+error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
+with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
+frames, "reported" the closed form's error.
 """
 
 from __future__ import annotations
@@ -48,19 +49,25 @@ def row(make: Callable[[], Veselova], times: np.ndarray, label: str) -> str:
     difference = np.max(np.abs(integrated[-1] - closed.frame))
     details = closed.provenance.details
     return (
-        f"| {problem.n} | {label} | {ours * 1e3:.3g} ms | {theirs * 1e3:.3g} ms | {theirs / ours:.2f} | {details['time_map']} | "
+        f"| {problem.n} | {label} | {ours * 1e3:.3g} ms | {theirs * 1e3:.3g} ms | "
+        f"{theirs / ours:.2f} | {details['time_map']} | "
         f"{details['evaluations']} | {difference:.1e} | {np.max(closed.error):.1e} |"
     )
 
 
 def main(count: int, span: float) -> None:
-    print("| n | times | closed form | heyoka | ratio | clock | evaluations | difference | reported |")
+    print(
+        "| n | times | closed form | heyoka | ratio | clock | evaluations | difference | reported |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     for n in range(2, 7):
         make = partial(_problem, n)
         solve(make(), [span])  # what a process loads and compiles once
         HeyokaPeer(make())
-        print(row(make, np.unique(np.random.default_rng(1).uniform(0, span, count)), "random"), flush=True)
+        print(
+            row(make, np.unique(np.random.default_rng(1).uniform(0, span, count)), "random"),
+            flush=True,
+        )
         print(row(make, np.linspace(0, span, count), "uniform"), flush=True)
 
 
@@ -69,4 +76,7 @@ def _problem(n: int) -> Veselova:
 
 
 if __name__ == "__main__":
-    main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000, float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0)
+    main(
+        int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000,
+        float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0,
+    )

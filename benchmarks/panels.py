@@ -1,10 +1,12 @@
-"""What a clock by panels costs for a cycle of the fastest phase, dt/dτ₁ by theta functions and in angles, and how both agree.
+"""What a clock by panels costs for a cycle of the fastest phase, dt/dτ₁ by theta functions and in
+angles, and how both agree.
 
     python benchmarks/panels.py [problems per n]
 
-Random problems, A within a factor of 5, unit speed, 60 cycles; microseconds are the median over the problems of the least of
-three runs in turn. "apart" is the largest relative difference of both rates at 200 drawn phases, "shared" the mean difference, of
-which an orbit makes a drift of t; both are roots of the mean square over the problems, in ε.
+Random problems, A within a factor of 5, unit speed, 60 cycles; microseconds are the median over the
+problems of the least of three runs in turn. "apart" is the largest relative difference of both
+rates at 200 drawn phases, "shared" the mean difference, of which an orbit makes a drift of t; both
+are roots of the mean square over the problems, in ε.
 """
 
 from __future__ import annotations
@@ -45,18 +47,28 @@ def costs(solution: Solution) -> list[float]:
 def agreement(solution: Solution, rng: np.random.Generator) -> list[float]:
     """Return by how much the rates differ at most, and on average, in ε."""
     z = rng.uniform(0, 2, (PHASES, solution.curve.genus))
-    off = (solution.rate_at(z, in_angles=False) / solution.rate_at(z, in_angles=True) - 1) / np.finfo(float).eps
+    off = (
+        solution.rate_at(z, in_angles=False) / solution.rate_at(z, in_angles=True) - 1
+    ) / np.finfo(float).eps
     return [float(np.max(np.abs(off))), float(np.mean(off))]
 
 
 def main(count: int) -> None:
-    print("| n | by theta functions | in angles | ratio | apart | shared |\n|---|---|---|---|---|---|")
+    print(
+        "| n | by theta functions | in angles | ratio | apart | shared |\n|---|---|---|---|---|---|"
+    )
     for n in range(2, 9):
         rng = np.random.default_rng(n)
         solutions = [Solution(random_problem(rng, n, 5.0)) for _ in range(count)]
         theta, angles = np.median([costs(solution) for solution in solutions], axis=0)
-        apart, shared = np.sqrt(np.mean(np.square([agreement(solution, rng) for solution in solutions]), axis=0))
-        print(f"| {n} | {theta:.0f} µs | {angles:.0f} µs | {angles / theta:.1f} | {apart:.1f} ε | {shared:.1f} ε |", flush=True)
+        apart, shared = np.sqrt(
+            np.mean(np.square([agreement(solution, rng) for solution in solutions]), axis=0)
+        )
+        print(
+            f"| {n} | {theta:.0f} µs | {angles:.0f} µs | {angles / theta:.1f} | {apart:.1f} "
+            f"ε | {shared:.1f} ε |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
-"""All periods and the Riemann matrix of a curve: ours against integrals by python-flint (Arb) at 53 bits.
+"""All periods and the Riemann matrix of a curve: ours against integrals by python-flint (Arb) at 53
+bits.
 
     python benchmarks/periods.py [PROBLEMS]      needs python-flint (extra `test`)
 
-Random bodies, A within a factor of 5, the branch points known to both: the median time of a⁻¹B from them, processor seconds.
-FLINT integrates λ^(k−1)/√|R| dλ, k = 1…g, over g cuts and g gaps after λ = mid − r cos φ, the functions written in Python.
-"together" is a stack of 500 curves, where their numbers of nodes agree, by the same code. The difference is the largest of
-the entries of T, over the largest, to FLINT at 128 bits. The last lines have A's that nearly coincide.
+Random bodies, A within a factor of 5, the branch points known to both: the median time of a⁻¹B from
+them, processor seconds. FLINT integrates λ^(k−1)/√|R| dλ, k = 1…g, over g cuts and g gaps after λ =
+mid − r cos φ, the functions written in Python. "together" is a stack of 500 curves, where their
+numbers of nodes agree, by the same code. The difference is the largest of the entries of T, over
+the largest, to FLINT at 128 bits. The last lines have A's that nearly coincide.
 """
 
 from __future__ import annotations
@@ -35,7 +37,12 @@ def by_flint(points: list[arb]) -> tuple[np.ndarray, float]:
     genus = (len(points) - 1) // 2
     began = time.process_time()
     columns = [[_integral(points, j, k) for k in range(genus)] for j in range(2 * genus)]
-    a = arb_mat([[(-1) ** (genus - s) * columns[2 * s - 1][k] for s in range(1, genus + 1)] for k in range(genus)])
+    a = arb_mat(
+        [
+            [(-1) ** (genus - s) * columns[2 * s - 1][k] for s in range(1, genus + 1)]
+            for k in range(genus)
+        ]
+    )
     B = [[arb(0)] * genus for _ in range(genus)]
     for k in range(genus):
         total = arb(0)
@@ -44,11 +51,15 @@ def by_flint(points: list[arb]) -> tuple[np.ndarray, float]:
             B[k][s] = total
     T = a.inv() * arb_mat(B)
     seconds = time.process_time() - began
-    return np.array([[abs(float(T[i, j].mid())) for j in range(genus)] for i in range(genus)]), seconds
+    return np.array(
+        [[abs(float(T[i, j].mid())) for j in range(genus)] for i in range(genus)]
+    ), seconds
 
 
 def _integral(points: list[arb], j: int, k: int) -> arb:
-    """Return ∮ λ^k dλ/(2√|R|) over the interval [b_j, b_{j+1}]: the integral over half a turn, times two, over two."""
+    """Return ∮ λ^k dλ/(2√|R|) over the interval [b_j, b_{j+1}]: the integral over half a turn,
+    times two, over two.
+    """
     middle, radius = (points[j] + points[j + 1]) / 2, (points[j + 1] - points[j]) / 2
     others = points[:j] + points[j + 2 :]
 
@@ -75,7 +86,12 @@ def ours(curve: Curve) -> tuple[np.ndarray, float]:
 
 def together(curve: Curve) -> float:
     """Return the seconds for one of 500 curves."""
-    stack = Curve(DOUBLE, np.tile(curve.branch_points, (500, 1)), np.tile(curve.differences, (500, 1, 1)), curve.origins)
+    stack = Curve(
+        DOUBLE,
+        np.tile(curve.branch_points, (500, 1)),
+        np.tile(curve.differences, (500, 1, 1)),
+        curve.origins,
+    )
     periods = Periods(curve)
     nodes = max(periods.node_count(interval) for interval in (*periods.cuts, *periods.gaps))
     began = time.process_time()
@@ -98,21 +114,30 @@ def row(problems: list[Veselova], label: str) -> str:
         errors = [np.max(np.abs(x - exact)) / size for x in (T, theirs)]
         found.append((seconds, their_seconds, together(solution.curve), *errors))
     seconds, their_seconds, stacked, error, their_error = np.array(found).T
-    times = np.median([seconds, stacked, their_seconds, their_seconds / seconds, their_seconds / stacked], axis=1)
+    times = np.median(
+        [seconds, stacked, their_seconds, their_seconds / seconds, their_seconds / stacked], axis=1
+    )
     return (
-        f"| {label} | {times[0] * 1e3:.2f} ms | {times[1] * 1e3:.3f} ms | {times[2] * 1e3:.1f} ms | {times[3]:.0f} | "
+        f"| {label} | {times[0] * 1e3:.2f} ms | {times[1] * 1e3:.3f} ms | "
+        f"{times[2] * 1e3:.1f} ms | {times[3]:.0f} | "
         f"{times[4]:.0f} | {np.max(error):.0e} | {np.max(their_error):.0e} |"
     )
 
 
 def main(count: int) -> None:
-    print("| n | ours | together | FLINT | ratio | together | error | FLINT's |\n|---|---|---|---|---|---|---|---|")
+    print(
+        "| n | ours | together | FLINT | ratio | together | error | FLINT's "
+        "|\n|---|---|---|---|---|---|---|---|"
+    )
     for n in range(2, 6):
         rng = np.random.default_rng(n)
         print(row([random_problem(rng, n, 5.0) for _ in range(count)], str(n)), flush=True)
     for digits in (2, 4, 8):
         A = [3, 2, 2 - 10.0**-digits, 1]
-        print(row([Veselova(A, [0.5] * 4, [0.5, -0.5, 0.3, -0.3])], f"4, A₂ − A₃ = 1e-{digits}"), flush=True)
+        print(
+            row([Veselova(A, [0.5] * 4, [0.5, -0.5, 0.3, -0.3])], f"4, A₂ − A₃ = 1e-{digits}"),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

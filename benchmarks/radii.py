@@ -1,11 +1,14 @@
-"""Are the radii of many digits honest? Drawn problems, digits and times, against twelve digits more.
+"""Are the radii of many digits honest? Drawn problems, digits and times, against twelve digits
+more.
 
     python benchmarks/radii.py [SECONDS] [SEED]        default 300 seconds
 
-Problems of n = 2, 3, 4: random, with A's far apart, nearly equal or equal, with a direction at rest, next to a separatrix; 16 to
-104 digits, 3 to 900 times, some of them far out, both routes for n = 3. Prints every difference above the sum of both radii, what
-was refused, and at the end the problems and the largest difference over that sum for each series: at most one, and near it, since
-radii are those of the rounding to decimals where nothing else is in them.
+Problems of n = 2, 3, 4: random, with A's far apart, nearly equal or equal, with a direction at
+rest, next to a separatrix; 16 to 104 digits, 3 to 900 times, some of them far out, both routes for
+n = 3. Prints every difference above the sum of both radii, what
+was refused, and at the end the problems and the largest difference over that sum for each series:
+at most one, and near it, since radii are those of the rounding to decimals where nothing else is in
+them.
 """
 
 from __future__ import annotations
@@ -43,11 +46,24 @@ def drawn(rng: np.random.Generator, kind: str, n: int) -> Veselova:
 
 
 def ratios(rng: np.random.Generator, kind: str) -> dict[str, float]:
-    """Return the largest difference over the radii for each series of a problem; raises VeselovaError where it is refused."""
-    n, digits, count = int(rng.choice([2, 3, 3, 3, 4])), int(rng.integers(16, 105)), int(rng.choice([3, 40, 320, 900]))
+    """Return the largest difference over the radii for each series of a problem; raises
+    VeselovaError where it is refused.
+    """
+    n, digits, count = (
+        int(rng.choice([2, 3, 3, 3, 4])),
+        int(rng.integers(16, 105)),
+        int(rng.choice([3, 40, 320, 900])),
+    )
     # Far out, clocks near a separatrix, and those of many modes, take minutes.
-    far = rng.uniform() < 0.3 and kind not in ("separatrix", "wide") and digits < (70 if n < 4 else 30)
-    body, reach = drawn(rng, kind, n), 10 ** (rng.uniform(1.3, 12) if far else rng.uniform(-2, 1.3 if n < 4 else 0.5))
+    far = (
+        rng.uniform() < 0.3
+        and kind not in ("separatrix", "wide")
+        and digits < (70 if n < 4 else 30)
+    )
+    body, reach = (
+        drawn(rng, kind, n),
+        10 ** (rng.uniform(1.3, 12) if far else rng.uniform(-2, 1.3 if n < 4 else 0.5)),
+    )
     times = np.sort(rng.uniform(-reach * rng.integers(0, 2), reach, count))
     method = [None, "theta", "angles"][rng.integers(3)] if n == 3 else None
     chosen = np.unique(rng.integers(0, count, 3))
@@ -61,9 +77,15 @@ def ratios(rng: np.random.Generator, kind: str) -> dict[str, float]:
     for name in SERIES:
         off = np.abs(found.midpoints[name][chosen] - finer.midpoints[name]).ravel()
         radii = (found.radii[name][chosen] + finer.radii[name]).ravel()
-        result[name] = max(float(a / b) if b else np.inf if a else 0.0 for a, b in zip(off, radii, strict=True))
+        result[name] = max(
+            float(a / b) if b else np.inf if a else 0.0 for a, b in zip(off, radii, strict=True)
+        )
     if max(result.values()) > 1:
-        print(f"above: {kind}, n = {n}, {digits} digits, {count} times to {reach:.3g}, {method}: {result}", flush=True)
+        print(
+            f"above: {kind}, n = {n}, {digits} digits, {count} times to {reach:.3g}, "
+            f"{method}: {result}",
+            flush=True,
+        )
     return result
 
 
@@ -77,8 +99,14 @@ def main(seconds: float, seed: int) -> None:
             print(f"refused: {kind}: {error}", flush=True)
         except VeselovaError:
             pass  # the draw is no problem: q and q_dot nearly parallel, say
-    print(f"{len(found)} problems:", {name: round(max(of[name] for of in found), 3) for name in SERIES})
+    print(
+        f"{len(found)} problems:",
+        {name: round(max(of[name] for of in found), 3) for name in SERIES},
+    )
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 300.0, int(sys.argv[2]) if len(sys.argv) > 2 else 0)
+    main(
+        float(sys.argv[1]) if len(sys.argv) > 1 else 300.0,
+        int(sys.argv[2]) if len(sys.argv) > 2 else 0,
+    )

@@ -1,10 +1,12 @@
-"""Do true errors stay below reported ones near a resonance, where a combination m·f of the frequencies nearly vanishes?
+"""Do true errors stay below reported ones near a resonance, where a combination m·f of the
+frequencies nearly vanishes?
 
     python benchmarks/resonances.py [problems per n] [farthest time]      default 12 and 1000
 
-Random problems, n = 3 and 4, tuned to a relative distance of 1e-9 to 1e-2 from a resonance with |m_k| ≤ 4; truth by balls of 25
-digits, which takes seconds for each. Prints per n and clock the largest true error of the frame, the largest reported one, and
-the largest true error over the reported one at the same time, at most 1.
+Random problems, n = 3 and 4, tuned to a relative distance of 1e-9 to 1e-2 from a resonance with
+|m_k| ≤ 4; truth by balls of 25 digits, which takes seconds for each. Prints per n and clock the
+largest true error of the frame, the largest reported one, and the largest true error over the
+reported one at the same time, at most 1.
 """
 
 from __future__ import annotations
@@ -41,11 +43,24 @@ def main(count: int, farthest: float) -> None:
                     print(f"{n}   {clock}: {refused}")
                     continue
                 error = np.max(np.abs(closed.frame - truth.frame), axis=(1, 2))
-                found.append((float(np.max(error)), float(np.max(closed.error)), float(np.max(error / closed.error))))
+                found.append(
+                    (
+                        float(np.max(error)),
+                        float(np.max(closed.error)),
+                        float(np.max(error / closed.error)),
+                    )
+                )
         for clock, found in rows.items():
             largest, reported, ratio = np.max(found, axis=0)
-            print(f"{n}   {clock:7s}   {len(found):8d}   {largest:13.1e}   {reported:16.1e}   {ratio:13.2f}", flush=True)
+            print(
+                f"{n}   {clock:7s}   {len(found):8d}   {largest:13.1e}   {reported:16.1e}   "
+                f"{ratio:13.2f}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 12, float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0)
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 12,
+        float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0,
+    )

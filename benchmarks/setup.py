@@ -1,12 +1,14 @@
-"""Processor time from a problem to its first attitude, to its torus, and to one more attitude at t = 10⁶ once that is set up.
+"""Processor time from a problem to its first attitude, to its torus, and to one more attitude at t
+= 10⁶ once that is set up.
 
     python benchmarks/setup.py [problems per n]
 
-Random problems, A within a factor of 5, unit speed; "first" is ``solve`` at one time of order one with nothing kept from before.
-Each figure is the median over the problems of the least of five runs; a run at t = 10⁶ is fifty calls, each at another time.
+Random problems, A within a factor of 5, unit speed; "first" is ``solve`` at one time of order one
+with nothing kept from before. Each figure is the median over the problems of the least of five
+runs; a run at t = 10⁶ is fifty calls, each at another time.
 
-What is measured is mostly the interpreter: one built with profile-guided optimisation, as those of Debian and of the container
-are, takes a tenth less than one built without.
+What is measured is mostly the interpreter: one built with profile-guided optimisation, as those of
+Debian and of the container are, takes a tenth less than one built without.
 """
 
 from __future__ import annotations
@@ -62,8 +64,14 @@ def main(count: int) -> None:
     print("| n | first attitude | torus | attitude at t = 10⁶, set up |\n|---|---|---|---|")
     for n in range(2, 7):
         rng = np.random.default_rng(n)
-        first, summary, later = np.median([figures(random_problem(rng, n, 5.0)) for _ in range(count)], axis=0)
-        print(f"| {n} | {first:.1f} ms | {summary:.1f} ms | {f'{later:.2f} ms' if later < np.inf else ''} |", flush=True)
+        first, summary, later = np.median(
+            [figures(random_problem(rng, n, 5.0)) for _ in range(count)], axis=0
+        )
+        print(
+            f"| {n} | {first:.1f} ms | {summary:.1f} ms | "
+            f"{f'{later:.2f} ms' if later < np.inf else ''} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

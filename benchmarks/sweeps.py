@@ -2,12 +2,15 @@
 
     python benchmarks/sweeps.py [PROBLEMS [ROUNDS]]
 
-Torus summaries of PROBLEMS (40 000, no fewer than 20 000) bodies with n = 3 and random A, q and q_dot, by one worker process and
-by two, in turn, ROUNDS (5) times over. The rate is that of chunks of 2000 that are done, without the start of the processes.
+Torus summaries of PROBLEMS (40 000, no fewer than 20 000) bodies with n = 3 and random A, q and
+q_dot, by one worker process and by two, in turn, ROUNDS (5) times over. The rate is that of chunks
+of 2000 that are done, without the start of the processes.
 
-The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that neither keep a chunk nor know
-of another job: two processors may give less than twice one, or more where somebody else takes part of them at times, and the pool
-says what they give. Two loops of Python that do nothing are asked, too.
+The peer is a multiprocessing pool of one process and of two that compute the same chunks, and that
+neither keep a chunk nor know
+of another job: two processors may give less than twice one, or more where somebody else takes part
+of them at times, and the pool says what they give. Two loops of Python that do nothing are asked,
+too.
 """
 
 from __future__ import annotations
@@ -93,7 +96,9 @@ def looped(processes: int) -> float:
 def rounds(problems: int, count: int) -> Iterator[dict[tuple[str, int], float]]:
     """Yield what each round gave: (who, how many processes) → problems or loops per second."""
     for k in range(count):
-        sweep = read_request(SweepRequest, {"problem": BASE, "vary": VARY, "samples": problems, "seed": k})
+        sweep = read_request(
+            SweepRequest, {"problem": BASE, "vary": VARY, "samples": problems, "seed": k}
+        )
         found: dict[tuple[str, int], float] = {}
         for processes in (1, 2) if k % 2 else (2, 1):
             found["sweep", processes] = swept(sweep, processes)
@@ -109,12 +114,17 @@ def main() -> None:
     for found in rounds(problems, count):
         for who, ratio in ratios.items():
             ratio.append(found[who, 2] / found[who, 1])
-        rates = ", ".join(f"{who} {found[who, 1]:.0f} and {found[who, 2]:.0f}" for who in ("sweep", "pool"))
+        rates = ", ".join(
+            f"{who} {found[who, 1]:.0f} and {found[who, 2]:.0f}" for who in ("sweep", "pool")
+        )
         print(
             f"problems per second by one and by two: {rates}; two over one: "
             + ", ".join(f"{w} {r[-1]:.2f}" for w, r in ratios.items())
         )
-    print("two over one, medians: " + ", ".join(f"{who} {statistics.median(ratio):.2f}" for who, ratio in ratios.items()))
+    print(
+        "two over one, medians: "
+        + ", ".join(f"{who} {statistics.median(ratio):.2f}" for who, ratio in ratios.items())
+    )
 
 
 if __name__ == "__main__":

@@ -1,13 +1,15 @@
-"""One theta function at one point: ours against python-flint (Arb) at 53 bits, scattered and along an orbit.
+"""One theta function at one point: ours against python-flint (Arb) at 53 bits, scattered and along
+an orbit.
 
     python benchmarks/theta.py [TIMES]      needs python-flint (extra `test`); default 10⁶ times
 
-Scattered: random phases of random Riemann matrices, one characteristic. Along an orbit: the Riemann matrix, phases and
-frequencies of a random body with n = g+1, random times in [0, 1000], in the windows in which the closed form takes many
-times. FLINT's binding gives all 4^g characteristics at once: "of all" is such a call, which is what one value costs there,
-and "per value" that over 4^g. Both ratios are printed. The error is the largest difference to FLINT at 128 bits, over the
-largest value of the function; "of the orbit" is what one rounding of the frequencies makes of it at t = 1000, which no
-evaluation can better.
+Scattered: random phases of random Riemann matrices, one characteristic. Along an orbit: the Riemann
+matrix, phases and frequencies of a random body with n = g+1, random times in [0, 1000], in the
+windows in which the closed form takes many times. FLINT's binding gives all 4^g characteristics at
+once: "of all" is such a call, which is what one value costs there, and "per value" that over 4^g.
+Both ratios are printed. The error is the largest difference to FLINT at 128 bits, over the largest
+value of the function; "of the orbit" is what one rounding of the frequencies makes of it at t =
+1000, which no evaluation can better.
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ SCATTERED = 2000
 SPAN = 1000.0
 
 
-def flint_values(T: np.ndarray, points: list[list[arb]], characteristic: Characteristic, bits: int) -> tuple[np.ndarray, float]:
+def flint_values(
+    T: np.ndarray, points: list[list[arb]], characteristic: Characteristic, bits: int
+) -> tuple[np.ndarray, float]:
     """Return the values of one characteristic at points, and the processor seconds of one call."""
     ctx.prec = bits
     tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
@@ -50,7 +54,9 @@ def flint_values(T: np.ndarray, points: list[list[arb]], characteristic: Charact
     return np.array([complex(table[0, index]).real for table in tables]), each
 
 
-def row(genus: int, T: np.ndarray, z: list[list[arb]], ours: np.ndarray, each: float, size: float) -> str:
+def row(
+    genus: int, T: np.ndarray, z: list[list[arb]], ours: np.ndarray, each: float, size: float
+) -> str:
     """Return one line of a table."""
     characteristic = Characteristic.of_branch_point(2, genus)
     _, theirs = flint_values(T, z, characteristic, 53)
@@ -76,7 +82,11 @@ def scattered(genus: int) -> str:
 def along_orbit(genus: int, count: int) -> str:
     """Return the line of an orbit."""
     solution = Solution(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
-    T, start, rates = np.array(solution.periods.riemann_matrix), solution.in_time.start, solution.in_time.rates
+    T, start, rates = (
+        np.array(solution.periods.riemann_matrix),
+        solution.in_time.start,
+        solution.in_time.rates,
+    )
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     clock = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
@@ -86,21 +96,40 @@ def along_orbit(genus: int, count: int) -> str:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
 
     began = time.process_time()
-    ours = Windows(times, float(np.max(np.abs(rates))), fewest).interpolate(clock, rates, evaluation).series[0][:, 0]
+    ours = (
+        Windows(times, float(np.max(np.abs(rates))), fewest)
+        .interpolate(clock, rates, evaluation)
+        .series[0][:, 0]
+    )
     each = (time.process_time() - began) / times.size
     chosen = np.linspace(0, times.size - 1, 40 if genus < 4 else 5).astype(int)
     ctx.prec = 128
-    points = [[arb(float(z)) + arb(float(f)) * arb(float(times[i])) for z, f in zip(start, rates, strict=True)] for i in chosen]
+    points = [
+        [
+            arb(float(z)) + arb(float(f)) * arb(float(times[i]))
+            for z, f in zip(start, rates, strict=True)
+        ]
+        for i in chosen
+    ]
     size = float(np.max(np.abs(ours)))
     slope = np.max(np.abs(np.gradient(ours[:2000], times[:2000]))) / size
-    return row(genus, T, points, ours[chosen], each, size) + f" {slope * SPAN * np.finfo(float).eps:.1e} |"
+    return (
+        row(genus, T, points, ours[chosen], each, size)
+        + f" {slope * SPAN * np.finfo(float).eps:.1e} |"
+    )
 
 
 def main(count: int) -> None:
-    print("Scattered\n\n| g | ours | FLINT, of all | ratio | ratio per value | error |\n|---|---|---|---|---|---|")
+    print(
+        "Scattered\n\n| g | ours | FLINT, of all | ratio | ratio per value | error "
+        "|\n|---|---|---|---|---|---|"
+    )
     for genus in range(1, 5):
         print(scattered(genus), flush=True)
-    print(f"\nAlong an orbit, {count} times\n\n| g | ours | FLINT, of all | ratio | ratio per value | error | of the orbit |")
+    print(
+        f"\nAlong an orbit, {count} times\n\n| g | ours | FLINT, of all | ratio | ratio per "
+        "value | error | of the orbit |"
+    )
     print("|---|---|---|---|---|---|---|")
     for genus in range(1, 5):
         print(along_orbit(genus, count), flush=True)

@@ -1,11 +1,13 @@
-"""The toolkit against its peers, in one run: theta values and period matrices, ours and python-flint's and mpmath's.
+"""The toolkit against its peers, in one run: theta values and period matrices, ours and
+python-flint's and mpmath's.
 
     python benchmarks/toolkit.py [ROUNDS]      default 5; medians of ROUNDS
 
-Theta: one function at 10⁴ scattered points, ours, and python-flint's ``acb_mat.theta`` at 53 bits, which gives all 4^g
-functions of one point at once; the first ratio is for one function, the second for all of them.
-Periods: a new curve with random branch points to its Riemann matrix, warm; python-flint integrates the same 2g² monomial forms by
-``acb.integral``.
+Theta: one function at 10⁴ scattered points, ours, and python-flint's ``acb_mat.theta`` at 53 bits,
+which gives all 4^g functions of one point at once; the first ratio is for one function, the second
+for all of them.
+Periods: a new curve with random branch points to its Riemann matrix, warm; python-flint integrates
+the same 2g² monomial forms by ``acb.integral``.
 """
 
 from __future__ import annotations
@@ -49,8 +51,13 @@ def theta_row(rounds: int, genus: int, random: np.random.Generator) -> str:
     ours = median_seconds(rounds, lambda: theta.riemann_theta(z, tau)) / POINTS
     ctx.prec = 53
     matrix = acb_mat([[acb(x.real, x.imag) for x in row] for row in tau.tolist()])
-    columns = [acb_mat([[acb(x.real, x.imag)] for x in point]) for point in z[: 200 // 4**genus + 2].tolist()]
-    theirs = median_seconds(rounds, lambda: [matrix.theta(column) for column in columns]) / len(columns)
+    columns = [
+        acb_mat([[acb(x.real, x.imag)] for x in point])
+        for point in z[: 200 // 4**genus + 2].tolist()
+    ]
+    theirs = median_seconds(rounds, lambda: [matrix.theta(column) for column in columns]) / len(
+        columns
+    )
     rows = list(itertools.product((0, 0.5), repeat=genus))
     halves = [[list(e), list(d)] for e in rows for d in rows]
     every = median_seconds(rounds, lambda: theta.riemann_theta(z[:200], tau, halves)) / 200
@@ -95,8 +102,14 @@ def main() -> None:
     """Print both tables."""
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     random = np.random.default_rng(1)
-    print("Theta functions, microseconds a point: one function; python-flint's call, which gives 4^g; and 4^g of ours")
-    print(f"{'genus':>5} {'ours':>10} {'python-flint':>12} {'ratio':>9} {'4^g of ours':>12} {'ratio':>9}   difference")
+    print(
+        "Theta functions, microseconds a point: one function; python-flint's call, which "
+        "gives 4^g; and 4^g of ours"
+    )
+    print(
+        f"{'genus':>5} {'ours':>10} {'python-flint':>12} {'ratio':>9} {'4^g of ours':>12} "
+        f"{'ratio':>9}   difference"
+    )
     for genus in (1, 2, 3, 4):
         print(theta_row(rounds, genus, random))
     print("\nRiemann matrices of new curves, milliseconds of processor time")

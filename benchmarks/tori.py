@@ -1,10 +1,12 @@
-"""How many tori a second and core, computed together, and by how much is that faster than one by one?
+"""How many tori a second and core, computed together, and by how much is that faster than one by
+one?
 
     python benchmarks/tori.py [PROBLEMS]
 
-Random A within a factor of 5, random q and q_dot, all new; processor seconds. "together" is analytic.tori on arrays, in parts of
-2000 problems as a sweep takes them; "one by one" is the problem and ``torus``, for the first 50. The difference is the largest of
-any number relative to itself (for phases: of a cycle).
+Random A within a factor of 5, random q and q_dot, all new; processor seconds. "together" is
+analytic.tori on arrays, in parts of 2000 problems as a sweep takes them; "one by one" is the
+problem and ``torus``, for the first 50. The difference is the largest of any number relative to
+itself (for phases: of a cycle).
 """
 
 from __future__ import annotations
@@ -25,8 +27,14 @@ PART, SINGLE = 2000, 50
 NAMES = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]
 
 
-def starts(rng: np.random.Generator, count: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return np.exp(rng.uniform(0, np.log(5), (count, n))), rng.normal(size=(count, n)), rng.normal(size=(count, n))
+def starts(
+    rng: np.random.Generator, count: int, n: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return (
+        np.exp(rng.uniform(0, np.log(5), (count, n))),
+        rng.normal(size=(count, n)),
+        rng.normal(size=(count, n)),
+    )
 
 
 def deviation(found: Tori, i: int, single: Torus) -> float:
@@ -34,14 +42,21 @@ def deviation(found: Tori, i: int, single: Torus) -> float:
     worst = 0.0
     for name in NAMES:
         there, here = np.atleast_1d(getattr(single, name)), np.atleast_1d(getattr(found, name)[i])
-        apart = np.abs(np.mod(here - there + 0.5, 1) - 0.5) if name == "phases" else np.abs(here - there)
+        apart = (
+            np.abs(np.mod(here - there + 0.5, 1) - 0.5)
+            if name == "phases"
+            else np.abs(here - there)
+        )
         size = np.where((there == 0) | (name == "phases"), 1, np.abs(there))
         worst = max(worst, float(np.max(apart / size, initial=0)))
     return worst
 
 
 def main(count: int) -> None:
-    print("| n | together, a second | one by one | ratio | computed together | largest difference |\n|---|---|---|---|---|---|")
+    print(
+        "| n | together, a second | one by one | ratio | computed together | largest "
+        "difference |\n|---|---|---|---|---|---|"
+    )
     for n in range(2, 8):
         rng = np.random.default_rng(n)
         tori(*starts(rng, PART, n))
@@ -53,9 +68,15 @@ def main(count: int) -> None:
         began = time.process_time()
         singles = [torus(Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in range(SINGLE)]
         one = SINGLE / (time.process_time() - began)
-        worst = max(deviation(parts[0], i, single) for i, single in enumerate(singles) if parts[0].known[i])
+        worst = max(
+            deviation(parts[0], i, single) for i, single in enumerate(singles) if parts[0].known[i]
+        )
         known = np.mean(np.concatenate([part.known for part in parts]))
-        print(f"| {n} | {together:.0f} | {one:.0f} | {together / one:.0f} | {known:.2%} | {worst:.0e} |", flush=True)
+        print(
+            f"| {n} | {together:.0f} | {one:.0f} | {together / one:.0f} | {known:.2%} | "
+            f"{worst:.0e} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

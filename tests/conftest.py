@@ -24,7 +24,8 @@ os.environ.setdefault("MPLBACKEND", "agg")
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.load_profile("default")
 
-#: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the machine is.
+#: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the
+#: machine is.
 PATIENCE = 300.0
 
 
@@ -49,11 +50,15 @@ class Server:
 
     def workers(self) -> list[int]:
         """Return the process ids of the worker processes."""
-        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        children = (
+            Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        )
         return [int(child) for child in children]
 
     def interrupt(self) -> None:
-        """Send the interrupt of a terminal, which goes to the server and all processes that it has started."""
+        """Send the interrupt of a terminal, which goes to the server and all processes that it has
+        started.
+        """
         os.killpg(self.process.pid, signal.SIGINT)
 
     def ask(self, method: str, path: str, **options: Any) -> httpx2.Response:
@@ -88,7 +93,9 @@ class Server:
 
 
 def samples(text: str) -> dict[tuple[str, ...], float]:
-    """Return the numbers in the text of /metrics: (name, value of every label in the order of label names) → number."""
+    """Return the numbers in the text of /metrics: (name, value of every label in the order of label
+    names) → number.
+    """
     families = text_string_to_metric_families(text)
     return {
         (sample.name, *(sample.labels[label] for label in sorted(sample.labels))): sample.value
@@ -113,15 +120,28 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_server(folder: Path, *arguments: str, awaited: str = "/readyz", **limits: str) -> Iterator[Server]:
-    """Run a server with arguments of its command and settings from the environment, once it answers at a path, and end it."""
+def running_server(
+    folder: Path, *arguments: str, awaited: str = "/readyz", **limits: str
+) -> Iterator[Server]:
+    """Run a server with arguments of its command and settings from the environment, once it answers
+    at a path, and end it.
+    """
     port = free_port()
     limits.setdefault("data_dir", str(folder / "data"))
-    environment = {**os.environ, **{f"VESELOVA_{name.upper()}": value for name, value in limits.items()}}
+    environment = {
+        **os.environ,
+        **{f"VESELOVA_{name.upper()}": value for name, value in limits.items()},
+    }
     log = folder / "server.log"
     with log.open("wb") as stream:
         command = [sys.executable, "-m", "veselova", "serve", "--port", str(port), *arguments]
-        process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+        process = subprocess.Popen(
+            command,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            start_new_session=True,
+        )
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
             server.wait_ready(awaited)

@@ -13,12 +13,18 @@ from veselova.analytic.motion.torus_solution import Solution
 
 
 def near_unstable_circle(q_2: str, q_dot_2: str) -> Veselova:
-    """Return a motion of n = 3 next to the great circle across the middle axis, a separatrix, by q_2 and q̇_2."""
+    """Return a motion of n = 3 next to the great circle across the middle axis, a separatrix, by
+    q_2 and q̇_2.
+    """
     return Veselova(["3", "2", "1"], ["0.6", q_2, "0.8"], ["1", q_dot_2, "-0.7"], normalize=True)
 
 
-def random_problem(rng: np.random.Generator, n: int, ratio: float = 100.0, *, framed: bool = True) -> Veselova:
-    """Return a problem with A log-uniform up to the ratio, a uniform start of unit speed and a random frame."""
+def random_problem(
+    rng: np.random.Generator, n: int, ratio: float = 100.0, *, framed: bool = True
+) -> Veselova:
+    """Return a problem with A log-uniform up to the ratio, a uniform start of unit speed and a
+    random frame.
+    """
     A = np.exp(rng.uniform(0, np.log(ratio), n))
     q, q_dot = rng.normal(size=n), rng.normal(size=n)
     q /= np.linalg.norm(q)
@@ -32,12 +38,17 @@ def random_problem(rng: np.random.Generator, n: int, ratio: float = 100.0, *, fr
 
 
 def near_resonance(rng: np.random.Generator, n: int, distance: float) -> tuple[Any, Veselova]:
-    """Return (m, problem): m·f is about ``distance`` times the fastest frequency for integers |m_k| ≤ 4, two of them not zero.
+    """Return (m, problem): m·f is about ``distance`` times the fastest frequency for integers |m_k|
+    ≤ 4, two of them not zero.
 
     A_1 is tuned until the combination vanishes, and moved on by a relative ``distance``.
     """
     while True:
-        A, start, m = np.exp(rng.uniform(0, np.log(30), n)), rng.normal(size=(2, n)), rng.integers(-4, 5, n - 1)
+        A, start, m = (
+            np.exp(rng.uniform(0, np.log(30), n)),
+            rng.normal(size=(2, n)),
+            rng.integers(-4, 5, n - 1),
+        )
 
         def moved(by: float, A: Any = A, start: Any = start) -> Veselova:
             return Veselova([A[0] * (1 + by), *A[1:]], *start, normalize=True)
@@ -62,7 +73,9 @@ def random_riemann_matrix(rng: np.random.Generator, genus: int, smallest: float 
 
 
 def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
-    """Return the name of a class of starts at which closed forms usually fail, and one of it, in exact rationals."""
+    """Return the name of a class of starts at which closed forms usually fail, and one of it, in
+    exact rationals.
+    """
     name, A, q, v = adversarial_data(rng, n, CLASSES)
     return name, Veselova(A, q, v, normalize=True)
 
@@ -70,7 +83,9 @@ def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
 def adversarial_data(
     rng: np.random.Generator, n: int, classes: tuple[str, ...]
 ) -> tuple[str, list[Fraction], list[Fraction], list[Fraction]]:
-    """Return the name of one of the classes, A, q of any length and v not along q, in exact rationals."""
+    """Return the name of one of the classes, A, q of any length and v not along q, in exact
+    rationals.
+    """
     name = str(rng.choice(classes))
     A, q, v = (_fractions(rng, n, low) for low in (0.3, -1.0, -1.0))
     A = [a + Fraction(1, 5) for a in A]
@@ -93,10 +108,14 @@ def adversarial_data(
     if name == "near a plane q_i = 0":
         q[0] *= power
     if name == "wide A's":
-        A = [Fraction(round(10 ** rng.uniform(0, 6), 3)) * Fraction(10) ** int(rng.integers(-3, 4)) for _ in range(n)]
+        A = [
+            Fraction(round(10 ** rng.uniform(0, 6), 3)) * Fraction(10) ** int(rng.integers(-3, 4))
+            for _ in range(n)
+        ]
     if name == "scaled":
         speed, unit = (int(rng.integers(-most, most + 1)) for most in (150, 2))
-        unit = unit if abs(speed) < 130 else 0  # energies have det A below them, and are to be floats
+        # energies have det A below them, and are to be floats
+        unit = unit if abs(speed) < 130 else 0
         v, A = [x * Fraction(10) ** speed for x in v], [a * Fraction(10) ** unit for a in A]
     if name in ("separatrix", "near a separatrix") and n > 2:
         A, q = _umbilic(rng, n, q)
@@ -138,8 +157,12 @@ def _wedge(q: list[Fraction], v: list[Fraction]) -> list[Fraction]:
     return [q[i] * v[j] - q[j] * v[i] for i in range(len(q)) for j in range(i)]
 
 
-def _umbilic(rng: np.random.Generator, n: int, q: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Return A and q with Σ_{j≥1} q_j²/(I_0−I_j) = 0: where q_0 = 0 and q̇_0 ≠ 0 then F_0 = 0, so some c_k = I_0 exactly."""
+def _umbilic(
+    rng: np.random.Generator, n: int, q: list[Fraction]
+) -> tuple[list[Fraction], list[Fraction]]:
+    """Return A and q with Σ_{j≥1} q_j²/(I_0−I_j) = 0: where q_0 = 0 and q̇_0 ≠ 0 then F_0 = 0, so
+    some c_k = I_0 exactly.
+    """
     attempts = 0
     while True:
         attempts += 1

@@ -1,13 +1,21 @@
-"""Hostile requests: what no honest client sends, and every one must be answered with a 4xx problem document."""
+"""Hostile requests: what no honest client sends, and every one must be answered with a 4xx problem
+document.
+"""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
-GOOD_PROBLEM: dict[str, Any] = {"system": "veselova", "A": [3, 2, 1], "q": [0.6, 0.0, 0.8], "q_dot": [0.8, 1.0, -0.6]}
+GOOD_PROBLEM: dict[str, Any] = {
+    "system": "veselova",
+    "A": [3, 2, 1],
+    "q": [0.6, 0.0, 0.8],
+    "q_dot": [0.8, 1.0, -0.6],
+}
 
-#: The longest budget that a server gives unless told otherwise: what is not about budgets shall not depend on the machine.
+#: The longest budget that a server gives unless told otherwise: what is not about budgets shall not
+#: depend on the machine.
 BUDGET_S = 60.0
 
 GOOD: dict[str, Any] = {"problem": GOOD_PROBLEM, "times": [0, 1], "budget_s": BUDGET_S}
@@ -72,7 +80,11 @@ INVALID: list[tuple[str, str, str]] = [
     ("times are missing", json.dumps({"problem": GOOD_PROBLEM}), "/times"),
     ("times are empty", changed(times=[]), "/times"),
     ("times are a number", changed(times=1), "/times"),
-    ("times of an unknown field", changed(times={"start": 0, "stop": 1, "count": 3, "step": 1}), "/times"),
+    (
+        "times of an unknown field",
+        changed(times={"start": 0, "stop": 1, "count": 3, "step": 1}),
+        "/times",
+    ),
     ("times without a count", changed(times={"start": 0, "stop": 1}), "/times"),
     ("fractional count", changed(times={"start": 0, "stop": 1, "count": 2.5}), "/times/count"),
     ("boolean count", changed(times={"start": 0, "stop": 1, "count": True}), "/times/count"),
@@ -80,7 +92,11 @@ INVALID: list[tuple[str, str, str]] = [
     ("astronomical count", changed(times={"start": 0, "stop": 1, "count": 10**15}), "/times"),
     ("stop before start", changed(times={"start": 1, "stop": 0, "count": 3}), "/times/stop"),
     ("too many times", changed(times={"start": 0, "stop": 1, "count": 1_000_001}), "/times"),
-    ("too large a dimension", problem(A=[1] * 1000, q=[1] + [0] * 999, q_dot=[0, 1] + [0] * 998), "/problem/A"),
+    (
+        "too large a dimension",
+        problem(A=[1] * 1000, q=[1] + [0] * 999, q_dot=[0, 1] + [0] * 998),
+        "/problem/A",
+    ),
     ("unknown engine", changed(engine="magic"), "/engine"),
     ("unknown method", changed(method="euler"), "/method"),
     ("method is a number", changed(method=3), "/method"),

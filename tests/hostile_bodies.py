@@ -1,4 +1,6 @@
-"""Bodies as large as a server takes them, each the costliest of its kind to decode, to validate or to hash."""
+"""Bodies as large as a server takes them, each the costliest of its kind to decode, to validate or
+to hash.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,10 @@ def hostile_bodies() -> Iterator[tuple[str, bytes]]:
     yield "every name twice", _filled("{", lambda k: f'"{k // 2}":1', "}")
     yield "surrogates twice", _filled("{", lambda k: f'"\\ud800{k // 2}":1', "}")
     yield "objects with two names alike", _filled("[", lambda k: '{"a":1,"a":2}', "]")
-    yield "names twice, deep inside", ("[" * 900 + _filled("[", lambda k: '{"a":1,"a":2}', "]").decode() + "]" * 900).encode()
+    yield (
+        "names twice, deep inside",
+        ("[" * 900 + _filled("[", lambda k: '{"a":1,"a":2}', "]").decode() + "]" * 900).encode(),
+    )
     yield "many names", _filled("{", lambda k: f'"{k}":1', "}")
     yield "one long name", ('{"' + "x" * SIZE + '":1}').encode()
     yield "one long text", (start + '"' + "9" * SIZE + '"' + end).encode()
@@ -55,12 +60,27 @@ def hostile_bodies() -> Iterator[tuple[str, bytes]]:
     yield "empty objects", _filled(start + "[", lambda k: "{}", "]" + end)
     yield "nested lists", _filled(start + "[", lambda k: "[[[[1]]]]", "]" + end)
     yield "brackets", b"[" * SIZE
-    yield "unknown outputs", _filled(_request("outputs")[0] + "[", lambda k: f'"{k}"', "]" + _request("outputs")[1])
-    yield "outputs that are numbers", _filled(_request("outputs")[0] + "[", lambda k: "1", "]" + _request("outputs")[1])
-    yield "a long system", _filled(_inside("system")[0] + '"', lambda k: "x" * 99, '"' + _inside("system")[1])
+    yield (
+        "unknown outputs",
+        _filled(_request("outputs")[0] + "[", lambda k: f'"{k}"', "]" + _request("outputs")[1]),
+    )
+    yield (
+        "outputs that are numbers",
+        _filled(_request("outputs")[0] + "[", lambda k: "1", "]" + _request("outputs")[1]),
+    )
+    yield (
+        "a long system",
+        _filled(_inside("system")[0] + '"', lambda k: "x" * 99, '"' + _inside("system")[1]),
+    )
     for field in ("A", "q", "frame", "normalize"):
-        yield f"{field} without end", _filled(_inside(field)[0] + "[", lambda k: "1", "]" + _inside(field)[1])
-        yield f"{field} of texts", _filled(_inside(field)[0] + "[[", lambda k: '"1/3"', "]]" + _inside(field)[1])
+        yield (
+            f"{field} without end",
+            _filled(_inside(field)[0] + "[", lambda k: "1", "]" + _inside(field)[1]),
+        )
+        yield (
+            f"{field} of texts",
+            _filled(_inside(field)[0] + "[[", lambda k: '"1/3"', "]]" + _inside(field)[1]),
+        )
     yield "a list of requests", _filled("[", lambda k: json.dumps(GOOD), "]")
     yield "white space", b" " * SIZE
     yield "escapes", (start + '"' + "\\u0041" * (SIZE // 6) + '"' + end).encode()

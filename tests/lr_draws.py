@@ -27,20 +27,37 @@ def random_inertia(rng: np.random.Generator, size: int) -> Inertia:
     return Inertia.of_matrix(random_operator(rng, size), size)
 
 
-def random_potential(rng: np.random.Generator, n: int, rows: int, size: float = 0.1) -> list[dict[str, Any]]:
+def random_potential(
+    rng: np.random.Generator, n: int, rows: int, size: float = 0.1
+) -> list[dict[str, Any]]:
     """Return three quadratic monomials in the first rows of g, that is in e_1, e_2, …"""
     entries = rng.integers(1, n + 1, (3, 2, 2)), rng.integers(1, rows + 1, (3, 2))
     return [
-        {"coefficient": float(c), "powers": [[int(i), int(j), 1] for i, (_, j) in zip(first, pairs, strict=True)]}
+        {
+            "coefficient": float(c),
+            "powers": [[int(i), int(j), 1] for i, (_, j) in zip(first, pairs, strict=True)],
+        }
         for c, first, pairs in zip(rng.uniform(-size, size, 3), entries[1], entries[0], strict=True)
     ]
 
 
 def random_lr(
-    rng: np.random.Generator, n: int, rank: int, *, homogeneous: bool = True, special: bool = False, potential: Any = None
+    rng: np.random.Generator,
+    n: int,
+    rank: int,
+    *,
+    homogeneous: bool = True,
+    special: bool = False,
+    potential: Any = None,
 ) -> LRSystem:
-    """Return a system on SO(n) that turns with unit speed from a random attitude, reflected ones included."""
-    inertia = {"special": np.exp(rng.uniform(0, 1.5, n))} if special else {"matrix": random_operator(rng, n * (n - 1) // 2)}
+    """Return a system on SO(n) that turns with unit speed from a random attitude, reflected ones
+    included.
+    """
+    inertia = (
+        {"special": np.exp(rng.uniform(0, 1.5, n))}
+        if special
+        else {"matrix": random_operator(rng, n * (n - 1) // 2)}
+    )
     g = np.linalg.qr(rng.normal(size=(n, n)))[0]
     spatial = rng.normal(size=(n, n))
     spatial = spatial - spatial.T
@@ -51,21 +68,38 @@ def random_lr(
     return LRSystem(n, rank, inertia, g, omega, potential, homogeneous=homogeneous)
 
 
-def random_lr_on(rng: np.random.Generator, group: MatrixGroup, constraints: int, potential: Any = None) -> LRSystem:
-    """Return a system on a group with a random 𝔥, no subalgebra, and random constants of its constraints."""
+def random_lr_on(
+    rng: np.random.Generator, group: MatrixGroup, constraints: int, potential: Any = None
+) -> LRSystem:
+    """Return a system on a group with a random 𝔥, no subalgebra, and random constants of its
+    constraints.
+    """
     D = group.dimension
     h = group.element(rng.normal(size=(constraints, D)))
     omega = rng.normal(size=D)
     g = group.project(group.exponential(rng.normal(size=D)))
-    return LRSystem.on(group, random_operator(rng, D), list(h), g, group.element(omega / np.linalg.norm(omega)), potential)
+    return LRSystem.on(
+        group,
+        random_operator(rng, D),
+        list(h),
+        g,
+        group.element(omega / np.linalg.norm(omega)),
+        potential,
+    )
 
 
 def _irreducible_so3() -> Sequence[Any]:
     """Return so(3) on the traceless symmetric 3 × 3 matrices, five-dimensional."""
     e = np.eye(3)
-    symmetric = [(np.outer(e[a], e[b]) + np.outer(e[b], e[a])) / np.sqrt(2) for a, b in ((0, 1), (0, 2), (1, 2))]
+    symmetric = [
+        (np.outer(e[a], e[b]) + np.outer(e[b], e[a])) / np.sqrt(2)
+        for a, b in ((0, 1), (0, 2), (1, 2))
+    ]
     symmetric += [np.diag([1, -1, 0]) / np.sqrt(2), np.diag([1, 1, -2]) / np.sqrt(6)]
-    return [[[float(np.sum(S * (X @ T - T @ X))) for T in symmetric] for S in symmetric] for X in MatrixGroup.so(3).basis]
+    return [
+        [[float(np.sum(S * (X @ T - T @ X))) for T in symmetric] for S in symmetric]
+        for X in MatrixGroup.so(3).basis
+    ]
 
 
 def _g2() -> Sequence[Any]:
@@ -94,7 +128,9 @@ def group_named(name: str) -> MatrixGroup:
         case ["so3xsu2"]:
             return MatrixGroup.product(MatrixGroup.so(3), MatrixGroup.su(2))
         case ["u2"]:
-            return MatrixGroup([[[1j, 0], [0, 0]], [[0, 0], [0, 1j]], [[0, 1], [-1, 0]], [[0, 1j], [1j, 0]]])
+            return MatrixGroup(
+                [[[1j, 0], [0, 0]], [[0, 0], [0, 1j]], [[0, 1], [-1, 0]], [[0, 1j], [1j, 0]]]
+            )
         case ["irreducible"]:
             return MatrixGroup(_irreducible_so3())
         case _:

@@ -1,4 +1,6 @@
-"""A PostgreSQL server of the tests: of this machine's own programs, in a temporary folder, reached by a socket in it."""
+"""A PostgreSQL server of the tests: of this machine's own programs, in a temporary folder, reached
+by a socket in it.
+"""
 
 from __future__ import annotations
 
@@ -26,31 +28,52 @@ _ACCOUNTS = ("postgres", "nobody")
 
 
 def programs() -> Path | None:
-    """Return the folder of initdb and pg_ctl, of the newest version where there are several, or None."""
-    of_versions = sorted(_DEBIAN.glob("*/bin"), key=lambda path: int(path.parent.name.partition(".")[0]), reverse=True)
+    """Return the folder of initdb and pg_ctl, of the newest version where there are several, or
+    None.
+    """
+    of_versions = sorted(
+        _DEBIAN.glob("*/bin"),
+        key=lambda path: int(path.parent.name.partition(".")[0]),
+        reverse=True,
+    )
     named = shutil.which("initdb")
     folders = [*of_versions, *([Path(named).resolve().parent] if named else [])]
-    return next((path for path in folders if (path / "initdb").exists() and (path / "pg_ctl").exists()), None)
+    return next(
+        (path for path in folders if (path / "initdb").exists() and (path / "pg_ctl").exists()),
+        None,
+    )
 
 
 @contextmanager
 def postgresql_server() -> Iterator[str]:
-    """Give the address of a server without its database, ``postgresql://…?host=…``; skips the test where none can be started."""
+    """Give the address of a server without its database, ``postgresql://…?host=…``; skips the test
+    where none can be started.
+    """
     found = programs()
     if found is None:
         pytest.skip("initdb and pg_ctl of PostgreSQL are not on this machine")
     account = _account()
     if os.getuid() == 0 and (account is None or shutil.which("setpriv") is None):
-        pytest.skip("PostgreSQL does not run as root, and there is no other account, or no setpriv, to run it")
+        pytest.skip(
+            "PostgreSQL does not run as root, and there is no other account, or no setpriv, "
+            "to run it"
+        )
     with tempfile.TemporaryDirectory(prefix="veselova-pg-") as name:
         folder, become = Path(name), list[str]()
         if account is not None:
             os.chown(folder, account.pw_uid, account.pw_gid)
-            become = ["setpriv", f"--reuid={account.pw_uid}", f"--regid={account.pw_gid}", "--clear-groups"]
+            become = [
+                "setpriv",
+                f"--reuid={account.pw_uid}",
+                f"--regid={account.pw_gid}",
+                "--clear-groups",
+            ]
 
         def run(program: str, *arguments: str) -> None:
             command = [*become, str(found / program), "-D", str(folder / "data"), *arguments]
-            answer = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder, check=False)
+            answer = subprocess.run(
+                command, capture_output=True, text=True, timeout=120, cwd=folder, check=False
+            )
             assert answer.returncode == 0, answer.stdout + answer.stderr
 
         run("initdb", "-U", "veselova", "--auth=trust", "-E", "UTF8", "--locale=C", "--no-sync")
@@ -78,7 +101,9 @@ def _account() -> pwd.struct_passwd | None:
 
 
 def settings_in(folder: Path, request: pytest.FixtureRequest) -> Settings:
-    """Return settings with a folder and a database, SQLite or PostgreSQL as the fixture's parameter says."""
+    """Return settings with a folder and a database, SQLite or PostgreSQL as the fixture's parameter
+    says.
+    """
     if request.param == "sqlite":
         return Settings(data_dir=folder)
     address = new_database(request.getfixturevalue("postgresql"), uuid.uuid4().hex)

@@ -1,8 +1,10 @@
 """The problem table: motions with tags, through which every engine runs.
 
-Tags: ``generic`` (all branch points distinct), ``special-start`` (generic torus, start on a coordinate axis or at a turning
-point), ``near-degenerate`` (a gap or cut nearly closed), ``closed-cut`` (equal A's, or directions that do not move),
-``separatrix`` (some c_k = I_i), ``at-rest``, ``wide`` (A's over many orders of magnitude), ``matrix`` (A given as a matrix),
+Tags: ``generic`` (all branch points distinct), ``special-start`` (generic torus, start on a
+coordinate axis or at a turning point), ``near-degenerate`` (a gap or cut nearly closed),
+``closed-cut`` (equal A's, or directions that do not move),
+``separatrix`` (some c_k = I_i), ``at-rest``, ``wide`` (A's over many orders of magnitude),
+``matrix`` (A given as a matrix),
 ``scaled`` (units far from one), ``reference`` (45-digit motion).
 """
 
@@ -24,7 +26,9 @@ REFERENCE = Path(__file__).parent / "reference" / "rank1.json"
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One row of the table: the problem, the times of interest, and the reference points where there are any."""
+    """One row of the table: the problem, the times of interest, and the reference points where
+    there are any.
+    """
 
     name: str
     A: Sequence[Any]
@@ -62,21 +66,36 @@ def _reference_cases() -> list[Case]:
     for item in json.loads(REFERENCE.read_text())["problems"]:
         tags = special.get(item["name"], _tags("generic")) | {"reference"}
         horizon = max(float(point["t"]) for point in item["points"])
-        cases.append(Case(item["name"], item["A"], item["q"], item["q_dot"], tags, item["frame"], horizon, tuple(item["points"])))
+        cases.append(
+            Case(
+                item["name"],
+                item["A"],
+                item["q"],
+                item["q_dot"],
+                tags,
+                item["frame"],
+                horizon,
+                tuple(item["points"]),
+            )
+        )
     return cases
 
 
 def near_separatrix(gap: float) -> Case:
-    """Return an n = 3 motion with c_2 above I_2 by about ``gap``: the unstable great circle's neighbourhood.
+    """Return an n = 3 motion with c_2 above I_2 by about ``gap``: the unstable great circle's
+    neighbourhood.
 
-    q' is turned in the tangent plane until F_2 = q_2² + Σ P_2j²/(I_2−I_j), which vanishes where c_2 = I_2, is as wanted.
+    q' is turned in the tangent plane until F_2 = q_2² + Σ P_2j²/(I_2−I_j), which vanishes where c_2
+    = I_2, is as wanted.
     """
     A = np.array([3.0, 2.0, 1.0])
     q = np.array([0.6, 0.48, 0.64])
     tangent = np.array([0.8, -0.36, -0.48]), np.array([0.0, 0.8, -0.6])
 
     def excess(angle: float) -> float:
-        problem = Veselova(A, q, np.cos(angle) * tangent[0] + np.sin(angle) * tangent[1], normalize=True)
+        problem = Veselova(
+            A, q, np.cos(angle) * tangent[0] + np.sin(angle) * tangent[1], normalize=True
+        )
         return float(problem.constants[0]) - 0.5 - gap
 
     low, high = _bracket(excess)
@@ -85,7 +104,12 @@ def near_separatrix(gap: float) -> Case:
         low, high = (middle, high) if excess(low) * excess(middle) > 0 else (low, middle)
     q_dot = np.cos(low) * tangent[0] + np.sin(low) * tangent[1]
     return Case(
-        f"near-separatrix-{gap:g}", A.tolist(), q.tolist(), q_dot.tolist(), _tags("generic", "near-degenerate"), horizon=30.0
+        f"near-separatrix-{gap:g}",
+        A.tolist(),
+        q.tolist(),
+        q_dot.tolist(),
+        _tags("generic", "near-degenerate"),
+        horizon=30.0,
     )
 
 
@@ -102,7 +126,11 @@ def _matrix_case() -> Case:
     rotation = np.linalg.qr(np.random.default_rng(7).normal(size=(4, 4)))[0]
     A = rotation @ np.diag([3.0, 2.0, 1.5, 1.0]) @ rotation.T
     return Case(
-        "matrix-inertia", ((A + A.T) / 2).tolist(), [0.5, 0.5, 0.5, 0.5], [1.1, -0.7, 0.3, -0.7], _tags("generic", "matrix")
+        "matrix-inertia",
+        ((A + A.T) / 2).tolist(),
+        [0.5, 0.5, 0.5, 0.5],
+        [1.1, -0.7, 0.3, -0.7],
+        _tags("generic", "matrix"),
     )
 
 
@@ -110,15 +138,46 @@ TABLE: tuple[Case, ...] = (
     *_reference_cases(),
     Case("body4", [3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"], _tags("generic")),
     Case("pendulum-like", [5, 1], [0.6, 0.8], [-0.8, 0.6], _tags("generic")),
-    Case("rising-A", [0.3, 0.5, 0.8, 1.3, 2.1], [1, -1, 2, -2, 1], [0.1, 0.3, -0.2, 0.5, 1], _tags("generic")),
     Case(
-        "eight", [1, 2, 3, 4, 5, 6, 7, 8], [1, 1, -1, 1, 1, -1, 1, 1], [1, -2, 3, -4, 3, 2, -1, 0.5], _tags("generic"), horizon=20
+        "rising-A",
+        [0.3, 0.5, 0.8, 1.3, 2.1],
+        [1, -1, 2, -2, 1],
+        [0.1, 0.3, -0.2, 0.5, 1],
+        _tags("generic"),
+    ),
+    Case(
+        "eight",
+        [1, 2, 3, 4, 5, 6, 7, 8],
+        [1, 1, -1, 1, 1, -1, 1, 1],
+        [1, -2, 3, -4, 3, 2, -1, 0.5],
+        _tags("generic"),
+        horizon=20,
     ),
     Case("ratio-100", [100, 10, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("generic")),
     Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-cut")),
-    Case("two-axes-vanish", [4, 3, 2, 1], [0, 0.6, 0.8, 0], [0.5, 0.8, -0.6, 0.3], _tags("generic", "special-start")),
-    Case("large-units", [3e8, 2e8, 1.1e8], [0.3, 0.5, 0.8], [1e-6, -4e-7, 2e-7], _tags("generic", "scaled"), horizon=5e7),
-    Case("fast", [3, 2, 1], [0.3, 0.5, 0.8], [1e9, -4e8, 2e8], _tags("generic", "scaled"), horizon=5e-8),
+    Case(
+        "two-axes-vanish",
+        [4, 3, 2, 1],
+        [0, 0.6, 0.8, 0],
+        [0.5, 0.8, -0.6, 0.3],
+        _tags("generic", "special-start"),
+    ),
+    Case(
+        "large-units",
+        [3e8, 2e8, 1.1e8],
+        [0.3, 0.5, 0.8],
+        [1e-6, -4e-7, 2e-7],
+        _tags("generic", "scaled"),
+        horizon=5e7,
+    ),
+    Case(
+        "fast",
+        [3, 2, 1],
+        [0.3, 0.5, 0.8],
+        [1e9, -4e8, 2e8],
+        _tags("generic", "scaled"),
+        horizon=5e-8,
+    ),
     near_separatrix(1e-3),
     near_separatrix(1e-6),
     near_separatrix(1e-10),
@@ -132,12 +191,32 @@ TABLE: tuple[Case, ...] = (
     _matrix_case(),
     Case("isotropic", [1, 1, 1], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("closed-cut")),
     Case("unstable-circle", [3, 2, 1], [1, 0, 0], [0, 0, 1], _tags("closed-cut")),
-    Case("two-pairs", [2, 1, 2, 1], [0.3, 0.5, -0.4, 0.7], [1, -0.4, 0.2, 0.1], _tags("closed-cut")),
-    Case("five-equal", [1, 1, 2, 1, 1, 1], [0.3, 0.5, 0.4, 0.7, -0.2, 0.1], [1, -0.4, 0.2, 0.1, 0.3, 0.6], _tags("closed-cut")),
-    Case("equal-and-frozen", [3, 2, 2, 2, 1], [0.6, 0, 0.5, 0, 0.4], [0.3, 0, 0.2, 0.7, 0], _tags("closed-cut")),
+    Case(
+        "two-pairs", [2, 1, 2, 1], [0.3, 0.5, -0.4, 0.7], [1, -0.4, 0.2, 0.1], _tags("closed-cut")
+    ),
+    Case(
+        "five-equal",
+        [1, 1, 2, 1, 1, 1],
+        [0.3, 0.5, 0.4, 0.7, -0.2, 0.1],
+        [1, -0.4, 0.2, 0.1, 0.3, 0.6],
+        _tags("closed-cut"),
+    ),
+    Case(
+        "equal-and-frozen",
+        [3, 2, 2, 2, 1],
+        [0.6, 0, 0.5, 0, 0.4],
+        [0.3, 0, 0.2, 0.7, 0],
+        _tags("closed-cut"),
+    ),
     Case("equal-at-the-start-on-one", [2, 2, 1], [1, 0, 0], [0, 1, 0.3], _tags("closed-cut")),
     Case("along-one-of-two-equal", [2, 2, 1], [1, 0, 0], [0, 0, 0.3], _tags("closed-cut")),
-    Case("hardly-moving-axis", [3, 2, 1], [0.6, "1e-170", 0.8], [0.8, "3e-170", -0.6], _tags("closed-cut")),
+    Case(
+        "hardly-moving-axis",
+        [3, 2, 1],
+        [0.6, "1e-170", 0.8],
+        [0.8, "3e-170", -0.6],
+        _tags("closed-cut"),
+    ),
     Case(
         "narrow-frozen-cut",
         [3, 2, 1.5, 1],
@@ -161,10 +240,29 @@ TABLE: tuple[Case, ...] = (
         horizon=20,
     ),
     Case("wide-ratio", [1e8, 1e4, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("wide"), horizon=5),
-    Case("huge-units", [3e150, 2e150, 1e150], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("generic", "scaled")),
-    Case("tiny-units", [3e-150, 2e-150, 1e-150], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("generic", "scaled")),
+    Case(
+        "huge-units",
+        [3e150, 2e150, 1e150],
+        [0.3, 0.5, 0.8],
+        [1, -0.4, 0.2],
+        _tags("generic", "scaled"),
+    ),
+    Case(
+        "tiny-units",
+        [3e-150, 2e-150, 1e-150],
+        [0.3, 0.5, 0.8],
+        [1, -0.4, 0.2],
+        _tags("generic", "scaled"),
+    ),
     # c_2 = I_2 exactly: an umbilic of the ellipsoid has q_2 = 0 and λ_1 = λ_2 = I_2.
-    Case("umbilic", ["1", "1/10", "1/26"], ["3/5", 0, "4/5"], ["4/5", 1, "-3/5"], _tags("separatrix"), horizon=8),
+    Case(
+        "umbilic",
+        ["1", "1/10", "1/26"],
+        ["3/5", 0, "4/5"],
+        ["4/5", 1, "-3/5"],
+        _tags("separatrix"),
+        horizon=8,
+    ),
     Case(
         "near-umbilic",
         ["1", "1/10", "1/26"],

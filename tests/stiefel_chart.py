@@ -1,7 +1,9 @@
-"""Canonical coordinates (u, p) on T*V(r,n) near a point, and the reduced flow in them: for volumes and symplectic forms.
+"""Canonical coordinates (u, p) on T*V(r,n) near a point, and the reduced flow in them: for volumes
+and symplectic forms.
 
-X(u) = (1−ξ/2)⁻¹(1+ξ/2)X₀ with ξ = Σ u_a w_a, w a basis of 𝓓_r at X₀ (Cayley), and p_a = tr Pᵀ∂X/∂u_a. Nothing is taken from the
-paper's Hamiltonian form: Ẋ and Ṗ are those of (dot_P), plus the force of a potential.
+X(u) = (1−ξ/2)⁻¹(1+ξ/2)X₀ with ξ = Σ u_a w_a, w a basis of 𝓓_r at X₀ (Cayley), and p_a = tr
+Pᵀ∂X/∂u_a. Nothing is taken from the paper's Hamiltonian form: Ẋ and Ṗ are those of (dot_P), plus
+the force of a potential.
 """
 
 from __future__ import annotations
@@ -20,9 +22,13 @@ STEP = 2e-5
 
 
 class Chart:
-    """Coordinates around one X₀ for one inertia operator, with a potential V(X) and its gradient, both or neither."""
+    """Coordinates around one X₀ for one inertia operator, with a potential V(X) and its gradient,
+    both or neither.
+    """
 
-    def __init__(self, inertia: BodyInertia, X0: Any, potential: Any = None, gradient: Any = None) -> None:
+    def __init__(
+        self, inertia: BodyInertia, X0: Any, potential: Any = None, gradient: Any = None
+    ) -> None:
         self.inertia, self.X0, self.potential, self.gradient = inertia, X0, potential, gradient
         self.basis = admissible_basis(X0)
         self.N = len(self.basis)
@@ -43,13 +49,17 @@ class Chart:
 
     def omega(self, u: Any, p: Any) -> Any:
         """Return ω(X,P)."""
-        return self.inertia.angular_velocity(self.point(u)[0], self.momentum(u, p), self.inertia.parameters, FLOATS)
+        return self.inertia.angular_velocity(
+            self.point(u)[0], self.momentum(u, p), self.inertia.parameters, FLOATS
+        )
 
     def hamiltonian(self, u: Any, p: Any) -> float:
         """Return ½⟨𝓘ω,ω⟩ + V."""
         X = self.point(u)[0]
         potential = 0.0 if self.potential is None else self.potential(X)
-        return float(product(momentum_map(X, self.momentum(u, p)), self.omega(u, p)) / 2) + potential
+        return (
+            float(product(momentum_map(X, self.momentum(u, p)), self.omega(u, p)) / 2) + potential
+        )
 
     def field(self, z: Any) -> Any:
         """Return (u̇, ṗ) at z = (u, p)."""
@@ -58,7 +68,10 @@ class Chart:
         P, omega = self.momentum(u, p), self.omega(u, p)
         gram = np.einsum("aij,bij->ab", tangents, tangents)
         u_dot = np.linalg.solve(gram, np.einsum("aij,ij->a", tangents, -omega @ X))
-        X_dot, xi_dot = np.tensordot(u_dot, tangents, axes=1), np.tensordot(u_dot, self.basis, axes=1)
+        X_dot, xi_dot = (
+            np.tensordot(u_dot, tangents, axes=1),
+            np.tensordot(u_dot, self.basis, axes=1),
+        )
         tangents_dot = inverse @ (self.basis @ X_dot + xi_dot @ tangents) / 2
         P_dot = -omega @ P - (0 if self.gradient is None else self.gradient(X))
         p_dot = np.einsum("aij,ij->a", tangents, P_dot) + np.einsum("aij,ij->a", tangents_dot, P)
@@ -66,7 +79,9 @@ class Chart:
 
 
 def slopes(function: Callable[[Any], Any], z: Any) -> Any:
-    """Return the derivatives of a function by central differences, first axis the components of z."""
+    """Return the derivatives of a function by central differences, first axis the
+    components of z.
+    """
     steps = STEP * np.eye(z.size)
     return np.array([(function(z + step) - function(z - step)) / (2 * STEP) for step in steps])
 

@@ -11,8 +11,12 @@ from veselova import StiefelFlow
 KINDS = ("special", "matrix")
 
 
-def random_inertia(rng: np.random.Generator, n: int, kind: str, ratio: float = 4.5) -> dict[str, Any]:
-    """Return an inertia operator of so(n): A's, or eigenvalues along random axes, log-uniform up to the ratio."""
+def random_inertia(
+    rng: np.random.Generator, n: int, kind: str, ratio: float = 4.5
+) -> dict[str, Any]:
+    """Return an inertia operator of so(n): A's, or eigenvalues along random axes, log-uniform up to
+    the ratio.
+    """
     size = n if kind == "special" else n * (n - 1) // 2
     values = np.exp(rng.uniform(0, np.log(ratio), size))
     if kind == "special":

@@ -29,18 +29,43 @@ CLASSES_OF: dict[str, tuple[str, ...]] = {
         "near a saddle",
     ),
     "ellipsoid-geodesic": (*CLASSES, *_SLOW, "flat", "needle", "nearly round"),
-    "veselova-so3": (*CLASSES, *_SLOW, "rest", "matrix", "clebsch", "family", "tiny potential", "huge potential", "walls"),
-    "separable": (*CLASSES, *_SLOW, "rest", "degenerate", "tiny potential", "huge potential", "walls", "near walls"),
+    "veselova-so3": (
+        *CLASSES,
+        *_SLOW,
+        "rest",
+        "matrix",
+        "clebsch",
+        "family",
+        "tiny potential",
+        "huge potential",
+        "walls",
+    ),
+    "separable": (
+        *CLASSES,
+        *_SLOW,
+        "rest",
+        "degenerate",
+        "tiny potential",
+        "huge potential",
+        "walls",
+        "near walls",
+    ),
 }
 
 
-def adversarial_system(rng: np.random.Generator, system: str, n: int) -> tuple[str, Callable[[], Problem]]:
-    """Return the name of a class of starts at which closed forms usually fail, and what makes one of it, in exact rationals.
+def adversarial_system(
+    rng: np.random.Generator, system: str, n: int
+) -> tuple[str, Callable[[], Problem]]:
+    """Return the name of a class of starts at which closed forms usually fail, and what makes one
+    of it, in exact rationals.
 
     Making it may refuse by name: entries go to 1e±300. n is 3 for ``veselova-so3``.
     """
     name, A, q, v = adversarial_data(rng, 3 if system == "veselova-so3" else n, CLASSES_OF[system])
-    power, wild = Fraction(1, 10 ** int(rng.integers(1, 301))), Fraction(10) ** int(rng.integers(-300, 301))
+    power, wild = (
+        Fraction(1, 10 ** int(rng.integers(1, 301))),
+        Fraction(10) ** int(rng.integers(-300, 301)),
+    )
     if name == "tiny velocity":
         v = [x * power for x in v]
     if name == "huge velocity":
@@ -54,25 +79,36 @@ def adversarial_system(rng: np.random.Generator, system: str, n: int) -> tuple[s
 Row = list[Fraction]
 
 
-def _neumann(rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction) -> Problem:
+def _neumann(
+    rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction
+) -> Problem:
     if name == "scaled":  # of times: τ₁ is √A
         unit = Fraction(10) ** int(rng.integers(-100, 101))
         A, v = [a * unit * unit for a in A], [x / unit / max(map(abs, v)) for x in v]
     if name in ("rest", "no velocity"):
         v = [Fraction()] * len(A)
     order = sorted(range(len(A)), key=lambda i: A[i])
-    axes = {"near a stable equilibrium": order[-1], "near an unstable equilibrium": order[0], "near a saddle": order[len(A) // 2]}
+    axes = {
+        "near a stable equilibrium": order[-1],
+        "near an unstable equilibrium": order[0],
+        "near a saddle": order[len(A) // 2],
+    }
     axes["rest"] = order[int(rng.integers(len(A)))]
     if name in axes:
         i, small = axes[name], power if name != "rest" else Fraction()
-        q, v = [x * small if k != i else Fraction(1) for k, x in enumerate(q)], [x * small for x in v]
+        q, v = (
+            [x * small if k != i else Fraction(1) for k, x in enumerate(q)],
+            [x * small for x in v],
+        )
         if name != "rest" and rng.random() < 0.5:
             k = (i + 1) % len(A)
             q[k] = v[k] = Fraction()
     return NeumannSystem(A, q, v, normalize=True)
 
 
-def _geodesic(rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction) -> Problem:
+def _geodesic(
+    rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction
+) -> Problem:
     thin = Fraction(1, 10 ** int(rng.integers(1, 13)))
     if name == "flat":
         A[int(rng.integers(len(A)))] *= thin
@@ -104,21 +140,38 @@ def _alphas(rng: np.random.Generator, name: str, moves: list[bool], power: Fract
     clebsch, *alphas = (Fraction(int(x), 1000) for x in rng.integers(-999, 1000, 6))
     if name == "clebsch":
         return {"clebsch": clebsch}
-    sizes = {"tiny potential": power, "huge potential": 1 / power, "family": Fraction(1), "walls": Fraction(1)}
+    sizes = {
+        "tiny potential": power,
+        "huge potential": 1 / power,
+        "family": Fraction(1),
+        "walls": Fraction(1),
+    }
     if name not in sizes:
         return None
-    walls = [abs(x) if m else Fraction() for x, m in zip(alphas[2:], moves, strict=True)] if name == "walls" else [Fraction()] * 3
+    walls = (
+        [abs(x) if m else Fraction() for x, m in zip(alphas[2:], moves, strict=True)]
+        if name == "walls"
+        else [Fraction()] * 3
+    )
     return {"family": _text([x * sizes[name] for x in (*alphas[:2], *walls)])}
 
 
-def _separable(rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction) -> Problem:
-    quartic, quadratic, *betas = (Fraction(int(x), 1000) for x in rng.integers(-999, 1000, 2 + len(A)))
+def _separable(
+    rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fraction
+) -> Problem:
+    quartic, quadratic, *betas = (
+        Fraction(int(x), 1000) for x in rng.integers(-999, 1000, 2 + len(A))
+    )
     size = {"tiny potential": power, "huge potential": 1 / power}.get(name, Fraction(1))
     if name == "rest":
         v = [Fraction()] * len(A)
     A = [a if a not in A[:i] else a * (1 + (i + 1) * power) for i, a in enumerate(A)]
     if name == "degenerate":  # a parabola's vertex, a double zero, a constant
-        quartic, quadratic = ((quartic, Fraction()), (Fraction(), quadratic), (Fraction(), Fraction()))[int(rng.integers(3))]
+        quartic, quadratic = (
+            (quartic, Fraction()),
+            (Fraction(), quadratic),
+            (Fraction(), Fraction()),
+        )[int(rng.integers(3))]
     if name in ("walls", "near walls"):
         strength = power if name == "near walls" else Fraction(1)
         betas = [abs(b) * strength if x else Fraction() for b, x in zip(betas, q, strict=True)]

@@ -1,4 +1,6 @@
-"""Motions to many digits by Taylor series, independent of the package: Neumann's point and geodesics on an ellipsoid."""
+"""Motions to many digits by Taylor series, independent of the package: Neumann's point and
+geodesics on an ellipsoid.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ __all__ = ["geodesic_at", "neumann_at"]
 
 #: Coefficients of one component.
 _Series: TypeAlias = list[Any]
-#: From the coefficients of position and velocity up to order k, twice the k-th of the acceleration over 2.
+#: From the coefficients of position and velocity up to order k, twice the k-th of the acceleration
+#: over 2.
 _Acceleration: TypeAlias = Callable[[list[_Series], list[_Series], int], list[Any]]
 
 #: Length of a step, and terms for so many digits: series of these motions reach beyond 0.3.
@@ -27,23 +30,34 @@ def _rows(values: Sequence[Any]) -> list[Any]:
     return [mpmath.mpf(Fraction(x).numerator) / Fraction(x).denominator for x in values]
 
 
-def neumann_at(A: Sequence[Any], q: Sequence[Any], v: Sequence[Any], t: Any, digits: int) -> tuple[list[Any], list[Any]]:
-    """Return q and q' at t of q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q from a start that is exactly on the manifold."""
+def neumann_at(
+    A: Sequence[Any], q: Sequence[Any], v: Sequence[Any], t: Any, digits: int
+) -> tuple[list[Any], list[Any]]:
+    """Return q and q' at t of q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q from a start that is exactly on
+    the manifold.
+    """
     with mpmath.workdps(digits + 15):
         inverse = [1 / a for a in _rows(A)]
         multiplier: _Series = []
 
         def acceleration(q: list[_Series], v: list[_Series], k: int) -> list[Any]:
             del multiplier[k:]
-            terms = (i * _product(x, x, k) - _product(y, y, k) for i, x, y in zip(inverse, q, v, strict=True))
+            terms = (
+                i * _product(x, x, k) - _product(y, y, k)
+                for i, x, y in zip(inverse, q, v, strict=True)
+            )
             multiplier.append(sum(terms))
             return [_product(multiplier, x, k) - i * x[k] for i, x in zip(inverse, q, strict=True)]
 
         return _integrated(acceleration, _rows(q), _rows(v), t, digits)
 
 
-def geodesic_at(A: Sequence[Any], X: Sequence[Any], V: Sequence[Any], s: Any, digits: int) -> tuple[list[Any], list[Any]]:
-    """Return X and dX/ds at s of X'' = −μ A⁻¹X, μ = (X',A⁻¹X')/(A⁻¹X,A⁻¹X); X and V may be numbers of mpmath."""
+def geodesic_at(
+    A: Sequence[Any], X: Sequence[Any], V: Sequence[Any], s: Any, digits: int
+) -> tuple[list[Any], list[Any]]:
+    """Return X and dX/ds at s of X'' = −μ A⁻¹X, μ = (X',A⁻¹X')/(A⁻¹X,A⁻¹X); X and V may be numbers
+    of mpmath.
+    """
     with mpmath.workdps(digits + 15):
         inverse = [1 / a for a in _rows(A)]
         multiplier: _Series = []
@@ -60,7 +74,9 @@ def geodesic_at(A: Sequence[Any], X: Sequence[Any], V: Sequence[Any], s: Any, di
         return _integrated(acceleration, list(X), list(V), s, digits)
 
 
-def _integrated(acceleration: _Acceleration, q: list[Any], v: list[Any], t: Any, digits: int) -> tuple[list[Any], list[Any]]:
+def _integrated(
+    acceleration: _Acceleration, q: list[Any], v: list[Any], t: Any, digits: int
+) -> tuple[list[Any], list[Any]]:
     end = mpmath.mpf(Fraction(t).numerator) / Fraction(t).denominator
     steps, order = max(1, int(abs(end) / _STEP) + 1), int(_TERMS_PER_DIGIT * digits) + 10
     for _ in range(steps):

@@ -60,7 +60,9 @@ def test_the_map_is_quasi_periodic_and_odd(rng: np.random.Generator) -> None:
     inversion = inversion_of(random_problem(rng, 4))
     psi = rng.uniform(0, 6, (20, 3))
     assert np.allclose(
-        inversion.map(psi + 2 * np.pi * np.array([1, 0, -2])), inversion.map(psi) + np.array([1, 0, -2]), atol=1e-13
+        inversion.map(psi + 2 * np.pi * np.array([1, 0, -2])),
+        inversion.map(psi) + np.array([1, 0, -2]),
+        atol=1e-13,
     )
     assert np.allclose(inversion.map(-psi), -inversion.map(psi), atol=1e-14)
 
@@ -73,7 +75,8 @@ def test_an_inversion_in_balls_starts_from_the_double_one(rng: np.random.Generat
         z = xp.array(rng.uniform(-1, 1, (3, 2)))
         rest = precise.map(precise.invert(z)) - z
     assert all(x.contains(0) for x in rest.ravel())
-    assert max(float(abs(x).upper()) for x in rest.ravel()) < 1e-22  # boxes shrink from those of half the digits
+    # boxes shrink from those of half the digits
+    assert max(float(abs(x).upper()) for x in rest.ravel()) < 1e-22
 
 
 @pytest.mark.parametrize("case", tagged("generic"), ids=lambda case: case.name)
@@ -101,10 +104,14 @@ def test_a_start_on_an_axis_takes_its_signs_from_the_velocity(signs: Any, q_dot:
 
 
 def test_continuation_leads_where_newtons_method_loses_its_way() -> None:
-    """A closed cut beside a gap of 2e-6: at some phases the damped iteration from 2πz used to stop short."""
+    """A closed cut beside a gap of 2e-6: at some phases the damped iteration from 2πz used to stop
+    short.
+    """
     _, problem = adversarial_start(np.random.default_rng([204, 177]), 4)
     inversion = Solution(problem).inversion
     z = np.random.default_rng(1).uniform(0, 1, (2000, 3))
     assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 1e-12
     for point in z[:20]:
-        assert np.allclose(inversion._continue_angles(point), inversion.invert(point[None])[0], atol=1e-6)
+        assert np.allclose(
+            inversion._continue_angles(point), inversion.invert(point[None])[0], atol=1e-6
+        )

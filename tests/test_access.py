@@ -1,4 +1,6 @@
-"""Who may ask, and how often: API keys, rate limits, origins and security headers, through real requests."""
+"""Who may ask, and how often: API keys, rate limits, origins and security headers, through real
+requests.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["
 def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder / "data")}
     command = [sys.executable, "-m", "veselova", "keys", *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    return subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
 
 
 def new_key(folder: Path, name: str) -> dict[str, str]:
@@ -42,7 +46,9 @@ def new_key(folder: Path, name: str) -> dict[str, str]:
     return key
 
 
-def get(server: Server, path: str = "/v1/systems", key: str | None = None, **headers: str) -> httpx2.Response:
+def get(
+    server: Server, path: str = "/v1/systems", key: str | None = None, **headers: str
+) -> httpx2.Response:
     shown = {} if key is None else {"authorization": f"Bearer {key}"}
     return server.get(path, headers={**shown, **headers})
 
@@ -61,7 +67,10 @@ def key(folder: Path) -> str:
 def guarded(folder: Path, key: str) -> Iterator[Server]:
     """A server that requires keys, and counts no failures."""
     with running_server(
-        folder, "--require-keys", failed_key_limit="none", cors_origins="https://a.example, https://b.example"
+        folder,
+        "--require-keys",
+        failed_key_limit="none",
+        cors_origins="https://a.example, https://b.example",
     ) as own:
         yield own
 
@@ -81,7 +90,9 @@ def test_a_key_is_shown_once_and_stored_as_a_hash(tmp_path: Path) -> None:
     assert hashlib.sha256(text.encode()).hexdigest().encode() in stored
 
 
-def test_a_request_with_a_key_is_answered_and_one_without_is_refused(guarded: Server, key: str) -> None:
+def test_a_request_with_a_key_is_answered_and_one_without_is_refused(
+    guarded: Server, key: str
+) -> None:
     assert get(guarded, key=key).status_code == 200
     assert get(guarded, authorization=f"bearer  {key}").status_code == 200
     for path in ("/v1/systems", "/metrics", "/no-such-path"):
@@ -109,7 +120,9 @@ def test_a_request_with_a_key_is_answered_and_one_without_is_refused(guarded: Se
 )
 def test_what_is_no_key_of_the_server_is_refused(guarded: Server, key: str, shown: str) -> None:
     other = key[:17] + "A" * 43
-    headers = {"authorization": shown.format(key=key, short=key[:-1], other=other).encode("latin-1")}
+    headers = {
+        "authorization": shown.format(key=key, short=key[:-1], other=other).encode("latin-1")
+    }
     response = guarded.get("/v1/systems", headers=headers)
     document = is_problem(response, 401, "unauthorized")
     assert response.headers["www-authenticate"] == 'Bearer realm="veselova", error="invalid_token"'
@@ -134,11 +147,15 @@ def test_probes_and_the_contract_need_no_key(guarded: Server) -> None:
     for path in ("/healthz", "/readyz", "/docs", "/openapi.json"):
         assert get(guarded, path).status_code == 200
     document = get(guarded, "/openapi.json").json()
-    assert document["components"]["securitySchemes"] == {"key": {"type": "http", "scheme": "bearer"}}
+    assert document["components"]["securitySchemes"] == {
+        "key": {"type": "http", "scheme": "bearer"}
+    }
     assert "401" in document["paths"]["/v1/tori"]["post"]["responses"]
 
 
-def test_the_client_shows_its_key(guarded: Server, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_client_shows_its_key(
+    guarded: Server, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("VESELOVA_API_KEY", raising=False)
     with Client(guarded.url, api_key=key) as client:
         assert client.torus(PROBLEM).n == 3
@@ -174,7 +191,13 @@ def test_whoever_wants_no_keys_beyond_loopback_says_so(tmp_path: Path) -> None:
 def test_an_address_that_shows_wrong_keys_is_refused_for_a_while(tmp_path: Path) -> None:
     right = new_key(tmp_path, "Ada")["key"]
     with running_server(tmp_path, "--require-keys", failed_key_limit="3/hour") as own:
-        assert [get(own, key=f"guess{i}").status_code for i in range(5)] == [401, 401, 401, 429, 429]
+        assert [get(own, key=f"guess{i}").status_code for i in range(5)] == [
+            401,
+            401,
+            401,
+            429,
+            429,
+        ]
         response = get(own, key=right)
         is_problem(response, 429, "rate-limited")
         assert 3500 < int(response.headers["retry-after"]) <= 3600
@@ -187,7 +210,12 @@ def test_every_key_has_a_limit_of_its_own(tmp_path: Path) -> None:
     with running_server(tmp_path, "--require-keys", rate_limit="3/hour") as own:
         answers = [get(own, key=first) for _ in range(4)]
         assert [answer.status_code for answer in answers] == [200, 200, 200, 429]
-        assert [answer.headers["ratelimit"].split(";")[1] for answer in answers] == ["r=2", "r=1", "r=0", "r=0"]
+        assert [answer.headers["ratelimit"].split(";")[1] for answer in answers] == [
+            "r=2",
+            "r=1",
+            "r=0",
+            "r=0",
+        ]
         is_problem(answers[-1], 429, "rate-limited")
         assert answers[-1].headers["ratelimit-policy"] == '"default";q=3;w=3600'
         assert 3500 < int(answers[-1].headers["retry-after"]) <= 3600
@@ -207,8 +235,14 @@ def test_without_keys_addresses_are_counted_and_forwarded_ones_are_not_believed(
 
 @pytest.mark.slow
 def test_a_trusted_proxy_tells_the_address(tmp_path: Path) -> None:
-    with running_server(tmp_path, "--forwarded-allow-ips", "127.0.0.1", rate_limit="1/hour", log_level="debug") as own:
-        assert [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in (1, 1, 2)] == [200, 429, 200]
+    with running_server(
+        tmp_path, "--forwarded-allow-ips", "127.0.0.1", rate_limit="1/hour", log_level="debug"
+    ) as own:
+        assert [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in (1, 1, 2)] == [
+            200,
+            429,
+            200,
+        ]
     assert '"client": "192.0.2.2"' in own.log.read_text()
 
 
@@ -223,16 +257,27 @@ def test_windows_end(monkeypatch: pytest.MonkeyPatch) -> None:
             seen.append((allowance.granted, allowance.left, allowance.reset_s))
         return seen
 
-    assert asyncio.run(ask()) == [(True, 1, 60), (True, 0, 50), (False, 0, 40), (False, 0, 1), (True, 1, 60)]
+    assert asyncio.run(ask()) == [
+        (True, 1, 60),
+        (True, 0, 50),
+        (False, 0, 40),
+        (False, 0, 1),
+        (True, 1, 60),
+    ]
 
 
-def test_callers_beyond_those_that_can_be_counted_share_one_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_callers_beyond_those_that_can_be_counted_share_one_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(rates, "_MOST_CALLERS", 3)
 
     async def ask() -> list[bool]:
         rate = rate_of("2/hour")
         assert rate
-        return [(await rate.spend(caller)).granted for caller in ("a", "b", "c", "d", "e", "f", "a", "a")]
+        return [
+            (await rate.spend(caller)).granted
+            for caller in ("a", "b", "c", "d", "e", "f", "a", "a")
+        ]
 
     assert asyncio.run(ask()) == [True, True, True, True, True, False, True, False]
 
@@ -248,7 +293,9 @@ def test_callers_beyond_those_that_can_be_counted_share_one_count(monkeypatch: p
         ("testclient", "unknown"),
     ],
 )
-def test_an_address_is_counted_with_what_its_owner_can_change(host: str | None, network: str) -> None:
+def test_an_address_is_counted_with_what_its_owner_can_change(
+    host: str | None, network: str
+) -> None:
     assert network_of(host) == network
 
 
@@ -297,7 +344,14 @@ def test_pages_of_stated_origins_are(guarded: Server, key: str) -> None:
 
 @pytest.mark.parametrize(
     ("path", "status"),
-    [("/healthz", 200), ("/v1/systems", 200), ("/v2", 404), ("/v1/tori", 405), ("/docs", 200), ("/metrics", 200)],
+    [
+        ("/healthz", 200),
+        ("/v1/systems", 200),
+        ("/v2", 404),
+        ("/v1/tori", 405),
+        ("/docs", 200),
+        ("/metrics", 200),
+    ],
 )
 def test_every_answer_tells_browsers_to_stay_away(server: Server, path: str, status: int) -> None:
     response = get(server, path)
@@ -314,13 +368,23 @@ def test_every_answer_tells_browsers_to_stay_away(server: Server, path: str, sta
 def test_the_documentation_may_run_its_own_script_and_no_other(server: Server) -> None:
     page = get(server, "/docs")
     inline = re.findall(r"<script>(.*?)</script>", page.text, re.DOTALL)
-    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in inline]
-    policy = dict(rule.strip().split(" ", 1) for rule in page.headers["content-security-policy"].split(";"))
-    assert policy["script-src"].split() == ["https://cdn.jsdelivr.net", *(f"'sha256-{digest}'" for digest in digests)]
+    digests = [
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in inline
+    ]
+    policy = dict(
+        rule.strip().split(" ", 1) for rule in page.headers["content-security-policy"].split(";")
+    )
+    assert policy["script-src"].split() == [
+        "https://cdn.jsdelivr.net",
+        *(f"'sha256-{digest}'" for digest in digests),
+    ]
     loaded = re.findall(r'(?:src|href)="([^"]+)"', page.text)
     allowed = " ".join(policy.values())
     assert loaded
-    assert all(address.startswith("https://") and "/".join(address.split("/")[:3]) in allowed for address in loaded)
+    assert all(
+        address.startswith("https://") and "/".join(address.split("/")[:3]) in allowed
+        for address in loaded
+    )
 
 
 def test_inventions_are_no_methods(server: Server) -> None:
@@ -343,11 +407,23 @@ def test_inventions_are_no_methods(server: Server) -> None:
         ("database_url", "mysql://host/name"),
     ],
 )
-def test_a_setting_that_says_nothing_is_refused_at_the_start(name: str, value: str, tmp_path: Path) -> None:
+def test_a_setting_that_says_nothing_is_refused_at_the_start(
+    name: str, value: str, tmp_path: Path
+) -> None:
     variable = f"VESELOVA_{name.upper()}"
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), variable: value}
-    command = [sys.executable, "-m", "veselova", "serve", "--port", "0", *(["--require-keys"] if name == "database_url" else [])]
-    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    command = [
+        sys.executable,
+        "-m",
+        "veselova",
+        "serve",
+        "--port",
+        "0",
+        *(["--require-keys"] if name == "database_url" else []),
+    ]
+    answer = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
     assert answer.returncode == 2
     assert answer.stderr.startswith(f"veselova: {variable}: required ")
     assert answer.stderr.count("\n") == 1
@@ -362,7 +438,9 @@ def test_a_setting_that_says_nothing_is_refused_at_the_start(name: str, value: s
         (("list", "--json"), 0, ""),
     ],
 )
-def test_mistakes_with_keys_are_one_sentence(arguments: tuple[str, ...], status: int, words: str, tmp_path: Path) -> None:
+def test_mistakes_with_keys_are_one_sentence(
+    arguments: tuple[str, ...], status: int, words: str, tmp_path: Path
+) -> None:
     answer = keys(tmp_path, *arguments)
     assert answer.returncode == status
     assert words in answer.stderr
@@ -375,7 +453,8 @@ def test_a_database_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> Non
     answer = keys(tmp_path, "list")
     assert answer.returncode == 2
     assert answer.stderr.startswith(
-        f"veselova: The database {tmp_path / 'data' / 'veselova.db'} is damaged: file is not a database."
+        f"veselova: The database {tmp_path / 'data' / 'veselova.db'} is damaged: file is not "
+        "a database."
     )
     assert answer.stderr.count("\n") == 1
 

@@ -29,15 +29,21 @@ def trajectory(**fields: Any) -> TrajectoryRequest:
     return read_request(TrajectoryRequest, {**GOOD, **fields})
 
 
-def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on(tmp_path: Path) -> None:
+def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on(
+    tmp_path: Path,
+) -> None:
     with running_server(tmp_path, workers="1", worker_memory_mb="256") as own:
         workers = own.workers()
-        document = is_problem(post(own, "/v1/trajectories", {**BODY4, "times": many(400_000)}), 507, "worker-memory")
+        document = is_problem(
+            post(own, "/v1/trajectories", {**BODY4, "times": many(400_000)}), 507, "worker-memory"
+        )
         assert "256 MB" in document["detail"]
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
         assert own.workers() == workers
         assert "Traceback" not in own.log.read_text()
-        refused = is_problem(post(own, "/v1/trajectories", {**BODY4, "times": many(900_000)}), 422, "invalid-input")
+        refused = is_problem(
+            post(own, "/v1/trajectories", {**BODY4, "times": many(900_000)}), 422, "invalid-input"
+        )
         assert refused["errors"][0]["pointer"] == "/times"
         assert "256 MB" in refused["detail"]
 
@@ -55,7 +61,10 @@ def test_costs_grow_with_points_dimension_and_digits() -> None:
     one = cost(trajectory(times=many(1000)))
     assert cost(trajectory(times=many(2000))).seconds == pytest.approx(2 * one.seconds)
     assert cost(trajectory(times=many(1000), digits=30)).seconds > 10 * one.seconds
-    assert cost(trajectory(times=many(1000), digits=60)).seconds > cost(trajectory(times=many(1000), certified=True)).seconds
+    assert (
+        cost(trajectory(times=many(1000), digits=60)).seconds
+        > cost(trajectory(times=many(1000), certified=True)).seconds
+    )
     assert cost(trajectory(times=many(1000), engine="numeric")).seconds < one.seconds
     both = cost(read_request(ComparisonRequest, {**GOOD, "times": many(1000)}))
     assert both.seconds > one.seconds
@@ -91,7 +100,8 @@ def test_every_limit_is_a_setting(
     ((name, value),) = limit.items()
     monkeypatch.setenv(f"VESELOVA_{name.upper()}", value)
     monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path))
-    # Without its lifespan the application has no worker: what is refused is refused before one is needed.
+    # Without its lifespan the application has no worker: what is refused is refused before one is
+    # needed.
     response = TestClient(create_app(loopback=True)).post("/v1/trajectories", json=body)
     document = is_problem(response, 422, "invalid-input")  # type: ignore[arg-type]
     assert document["errors"][0]["pointer"] == pointer
@@ -113,7 +123,10 @@ def spooled(server: Server) -> list[str]:
 def test_an_answer_is_let_go_when_its_client_leaves_in_the_middle(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
         body = {**BODY4, "times": many(100_000), "budget_s": 60}
-        with httpx2.Client(timeout=60) as client, client.stream("POST", f"{own.url}/v1/trajectories", json=body) as response:
+        with (
+            httpx2.Client(timeout=60) as client,
+            client.stream("POST", f"{own.url}/v1/trajectories", json=body) as response,
+        ):
             assert response.status_code == 200
             chunks = response.iter_raw()  # let go, it would close the connection
             assert next(chunks)
@@ -130,5 +143,9 @@ def test_work_that_was_stopped_leaves_no_file(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
         endless = {**BODY4, "times": {"start": 0, "stop": 1e7, "count": 100_000}, "budget_s": 0.5}
         is_problem(post(own, "/v1/trajectories", endless), 504, "over-budget")
-        assert [path for path in (tmp_path / "data").rglob("*") if path.is_file() and "spool" in str(path)] == []
+        assert [
+            path
+            for path in (tmp_path / "data").rglob("*")
+            if path.is_file() and "spool" in str(path)
+        ] == []
         assert not list((tmp_path / "data").glob("cache/*"))

@@ -1,4 +1,6 @@
-"""Adversarial starts of every system with a closed form: an answer within its error, or a refusal by name."""
+"""Adversarial starts of every system with a closed form: an answer within its error, or a refusal
+by name.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 #: Starts of each system in every check, and in the slow one.
 FEW, MANY = 15, 150
 
-#: What the median of reported over true errors may be; true errors count as half a unit in the last place of one at least.
+#: What the median of reported over true errors may be; true errors count as half a unit in the last
+#: place of one at least.
 USEFUL, LEAST = 150.0, float(np.finfo(float).eps) / 2
 
 #: Seconds for one truth by integration.
@@ -26,7 +29,8 @@ PATIENCE_S = 5
 
 
 def held(system: str, i: int) -> float | None:
-    """Return the median of reported over true errors of one start, None where it was refused or is without truth.
+    """Return the median of reported over true errors of one start, None where it was refused or is
+    without truth.
 
     An error that does not hold, a warning and an exception without a name are failures.
     """
@@ -48,7 +52,9 @@ def held(system: str, i: int) -> float | None:
 
 
 def are_held(system: str, starts: range) -> None:
-    """Half of the starts or more are answered, and half of those with errors at most USEFUL times the true ones."""
+    """Half of the starts or more are answered, and half of those with errors at most USEFUL times
+    the true ones.
+    """
     ratios = [ratio for ratio in (held(system, i) for i in starts) if ratio is not None]
     assert len(ratios) >= len(starts) // 2
     assert np.median(ratios) <= USEFUL
@@ -74,14 +80,17 @@ USEFULLY_BOUNDED = [
 
 
 @pytest.mark.parametrize(("A", "s", "most"), USEFULLY_BOUNDED)
-def test_errors_of_flat_needle_like_and_nearly_round_ellipsoids_are_useful(A: list[Any], s: float, most: float) -> None:
+def test_errors_of_flat_needle_like_and_nearly_round_ellipsoids_are_useful(
+    A: list[Any], s: float, most: float
+) -> None:
     X = np.array([0.6, 0.5, 0.3]) * np.sqrt([float(a) for a in A])
     problem = EllipsoidGeodesic(A, X, [0.3, -0.7, 0.2], normalize=True)
     found = solve(problem, [s])
     assert found.error[0] < most * np.sqrt(float(np.max(problem.A)))
 
 
-#: Starts of Neumann's system nearer to an equilibrium than squares of floats tell: A, q, q'; whether it is stable.
+#: Starts of Neumann's system nearer to an equilibrium than squares of floats tell: A, q, q';
+#: whether it is stable.
 BESIDE_EQUILIBRIA: list[tuple[list[str], list[Any], list[Any], bool]] = [
     (A, q, v, stable)
     for small in ("1e-145", "1e-150", "1e-200", "1e-300")
@@ -98,8 +107,12 @@ BESIDE_EQUILIBRIA: list[tuple[list[str], list[Any], list[Any], bool]] = [
 
 
 @pytest.mark.parametrize(("A", "q", "v", "stable"), BESIDE_EQUILIBRIA)
-def test_beside_an_equilibrium_the_point_stays(A: list[str], q: list[Any], v: list[Any], stable: bool) -> None:
-    """At q_i of 1e-145 and below there is nothing to see of the motion, by either engine, for as long as e^t·1e-145 is small."""
+def test_beside_an_equilibrium_the_point_stays(
+    A: list[str], q: list[Any], v: list[Any], stable: bool
+) -> None:
+    """At q_i of 1e-145 and below there is nothing to see of the motion, by either engine, for as
+    long as e^t·1e-145 is small.
+    """
     problem = NeumannSystem(A, q, v)
     found = solve(problem, [-1, 0, 2])
     assert np.max(np.abs(found.q - problem.q)) <= np.max(found.error)
@@ -128,7 +141,8 @@ def test_torus_and_comparison_answer_or_refuse_by_name(system: str) -> None:
 
 def test_the_server_answers_them_below_500(server: Server) -> None:
     problems: list[Any] = [
-        {"system": "neumann", "A": A, "q": q, "q_prime": v, "normalize": True} for A, q, v, _ in BESIDE_EQUILIBRIA[:7]
+        {"system": "neumann", "A": A, "q": q, "q_prime": v, "normalize": True}
+        for A, q, v, _ in BESIDE_EQUILIBRIA[:7]
     ]
     for system in CLASSES_OF:
         for i in range(6):
@@ -138,7 +152,12 @@ def test_the_server_answers_them_below_500(server: Server) -> None:
             except InvalidInput:
                 continue
     for problem in problems:
-        for path, more in (("/v1/trajectories", {"engine": "analytic", "times": [0, 0.1]}), ("/v1/tori", {})):
+        for path, more in (
+            ("/v1/trajectories", {"engine": "analytic", "times": [0, 0.1]}),
+            ("/v1/tori", {}),
+        ):
             body = json.dumps({"problem": problem, **more})
-            response = server.ask("POST", path, content=body, headers={"content-type": "application/json"})
+            response = server.ask(
+                "POST", path, content=body, headers={"content-type": "application/json"}
+            )
             assert response.status_code < 500, (path, problem, response.text[:300])

@@ -52,14 +52,20 @@ def columns(kind: str, content: bytes) -> dict[str, Any]:
     if kind == "csv":
         table = np.genfromtxt(io.BytesIO(content), delimiter=",", names=True)
         return {name: table[name] for name in table.dtype.names}
-    table = ipc.open_stream(content).read_all() if kind == "arrow" else parquet.read_table(io.BytesIO(content))
+    table = (
+        ipc.open_stream(content).read_all()
+        if kind == "arrow"
+        else parquet.read_table(io.BytesIO(content))
+    )
     assert json.loads(table.schema.metadata[b"provenance"])["version"]
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
 @pytest.mark.parametrize("body", [{**GOOD, "engine": "numeric"}, LARGE], ids=["small", "large"])
 @pytest.mark.parametrize("kind", list(FORMATS))
-def test_every_format_has_series_error_integrals_and_provenance(own: Server, kind: str, body: dict[str, Any]) -> None:
+def test_every_format_has_series_error_integrals_and_provenance(
+    own: Server, kind: str, body: dict[str, Any]
+) -> None:
     response = post(own, "/v1/trajectories", {**body, "outputs": ["q", "tau1"]}, accept=TYPES[kind])
     assert response.status_code == 200
     assert response.headers["content-type"] == TYPES[kind]
@@ -105,18 +111,33 @@ def test_the_best_of_what_a_client_accepts_is_served(own: Server, accept: str, k
 
 
 def test_what_is_on_offer_is_named_where_nothing_is_acceptable(own: Server) -> None:
-    document = is_problem(post(own, "/v1/trajectories", GOOD, accept="text/html"), 406, "not-acceptable")
+    document = is_problem(
+        post(own, "/v1/trajectories", GOOD, accept="text/html"), 406, "not-acceptable"
+    )
     assert all(media_type in document["detail"] for media_type in TYPES.values())
     with pytest.raises(Refused, match="application/json"):
         negotiate_type("text/csv", ["application/json"])
 
 
 @pytest.mark.parametrize("coding", ["zstd", "gzip", "identity"])
-@pytest.mark.parametrize("body", [{**GOOD, "times": {"start": 0, "stop": 2, "count": 100}}, LARGE], ids=["small", "large"])
-def test_a_coding_changes_the_way_and_not_the_answer(own: Server, coding: str, body: dict[str, Any]) -> None:
-    kept, plain = (post(own, "/v1/trajectories", body, **{"accept-encoding": name}) for name in (coding, "identity"))
+@pytest.mark.parametrize(
+    "body",
+    [{**GOOD, "times": {"start": 0, "stop": 2, "count": 100}}, LARGE],
+    ids=["small", "large"],
+)
+def test_a_coding_changes_the_way_and_not_the_answer(
+    own: Server, coding: str, body: dict[str, Any]
+) -> None:
+    kept, plain = (
+        post(own, "/v1/trajectories", body, **{"accept-encoding": name})
+        for name in (coding, "identity")
+    )
     assert kept.headers.get("content-encoding", "identity") == coding
-    content = zstandard.ZstdDecompressor().decompressobj().decompress(kept.content) if coding == "zstd" else kept.content
+    content = (
+        zstandard.ZstdDecompressor().decompressobj().decompress(kept.content)
+        if coding == "zstd"
+        else kept.content
+    )
     assert content == plain.content
     assert "Accept-Encoding" in kept.headers["vary"]
     if coding != "identity":
@@ -124,7 +145,9 @@ def test_a_coding_changes_the_way_and_not_the_answer(own: Server, coding: str, b
 
 
 def test_what_is_compressed_already_is_not_compressed_again(own: Server) -> None:
-    response = post(own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "zstd"})
+    response = post(
+        own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "zstd"}
+    )
     assert "content-encoding" not in response.headers
 
 
@@ -160,9 +183,15 @@ def test_a_request_spelt_out_has_the_tag_of_the_short_one(own: Server) -> None:
         "budget_s": 50,
         "outputs": list(PROBLEM.outputs),
     }
-    floats = {"problem": {**GOOD["problem"], "A": [3.0, 2.0, 1.0], "normalize": False}, "times": [0.0, 1.0]}
+    floats = {
+        "problem": {**GOOD["problem"], "A": [3.0, 2.0, 1.0], "normalize": False},
+        "times": [0.0, 1.0],
+    }
     assert tag(GOOD) == tag({**GOOD, **spelt}) == tag(floats)
-    others = [tag({**GOOD, **change}) for change in ({"times": [0, 2]}, {"outputs": ["q"]}, {"engine": "numeric"})]
+    others = [
+        tag({**GOOD, **change})
+        for change in ({"times": [0, 2]}, {"outputs": ["q"]}, {"engine": "numeric"})
+    ]
     assert len({tag(GOOD), tag(GOOD, "csv"), *others}) == 5
 
 
@@ -180,12 +209,19 @@ def test_a_trajectory_is_kept_at_its_own_address_in_every_format(own: Server) ->
         assert kept.headers["cache-status"] == "veselova; hit"
         assert kept.headers["veselova-provenance"] == made.headers["veselova-provenance"]
         found = columns(kind, kept.content)
-        assert np.array_equal(found["frame" if kind in ("json", "npz") else "frame_1_1"].__getitem__(-1), _last(expected, kind))
+        assert np.array_equal(
+            found["frame" if kind in ("json", "npz") else "frame_1_1"].__getitem__(-1),
+            _last(expected, kind),
+        )
         unchanged = get(address, **{"accept": media_type, "if-none-match": kept.headers["etag"]})
         assert (unchanged.status_code, unchanged.content) == (304, b"")
         assert unchanged.headers["etag"] == kept.headers["etag"]
         head = httpx2.head(address, headers={"accept": media_type}, timeout=PATIENCE)
-        assert (head.status_code, head.content, head.headers["etag"]) == (200, b"", kept.headers["etag"])
+        assert (head.status_code, head.content, head.headers["etag"]) == (
+            200,
+            b"",
+            kept.headers["etag"],
+        )
     assert get(address).json() == made.json()
     again = post(own, "/v1/trajectories", body)
     assert again.headers["cache-status"] == "veselova; hit"
@@ -199,7 +235,11 @@ def _last(expected: Trajectory, kind: str) -> Any:
 def test_a_post_of_what_the_client_has_is_answered_with_412(own: Server) -> None:
     """RFC 9110, 13.1.2: 304 answers GET and HEAD alone."""
     tag = post(own, "/v1/trajectories", GOOD).headers["etag"]
-    document = is_problem(post(own, "/v1/trajectories", GOOD, **{"if-none-match": f'"x", {tag}'}), 412, "precondition-failed")
+    document = is_problem(
+        post(own, "/v1/trajectories", GOOD, **{"if-none-match": f'"x", {tag}'}),
+        412,
+        "precondition-failed",
+    )
     assert tag in document["detail"]
     assert post(own, "/v1/trajectories", GOOD, **{"if-none-match": '"x"'}).status_code == 200
 
@@ -221,7 +261,9 @@ def test_a_damaged_entry_is_removed_and_computed_again(tmp_path: Path, damage: s
         (path,) = kept_files(tmp_path)
         content = bytearray(path.read_bytes())
         content[len(content) // 3] ^= 0xFF
-        path.write_bytes({"flipped": bytes(content), "truncated": bytes(content[:-100]), "emptied": b""}[damage])
+        path.write_bytes(
+            {"flipped": bytes(content), "truncated": bytes(content[:-100]), "emptied": b""}[damage]
+        )
         is_problem(get(f"{own.url}{made.headers['content-location']}"), 404, "no-such-answer")
         assert not kept_files(tmp_path)
         assert "is damaged and was removed" in own.log.read_text()
@@ -231,8 +273,13 @@ def test_a_damaged_entry_is_removed_and_computed_again(tmp_path: Path, damage: s
         wait_until(lambda: kept_files(tmp_path) == [path])
 
 
-def test_an_answer_can_be_had_again_at_once_and_is_on_the_disk_when_the_server_has_ended(tmp_path: Path) -> None:
-    with running_server(tmp_path, workers="1") as own, httpx2.Client(base_url=own.url, timeout=PATIENCE) as client:
+def test_an_answer_can_be_had_again_at_once_and_is_on_the_disk_when_the_server_has_ended(
+    tmp_path: Path,
+) -> None:
+    with (
+        running_server(tmp_path, workers="1") as own,
+        httpx2.Client(base_url=own.url, timeout=PATIENCE) as client,
+    ):
         for k in range(1, 20):
             made = client.post("/v1/trajectories", json={**GOOD, "times": [0, k]})
             again = client.get(made.headers["content-location"])
@@ -258,7 +305,9 @@ def test_servers_share_what_they_keep(tmp_path: Path) -> None:
             assert get(f"{two.url}{made.headers['content-location']}").content == made.content
 
 
-@pytest.mark.parametrize("obstacle", ["a file in its place", slow("a folder that is too small"), slow("no size at all")])
+@pytest.mark.parametrize(
+    "obstacle", ["a file in its place", slow("a folder that is too small"), slow("no size at all")]
+)
 def test_without_a_cache_answers_are_the_same(tmp_path: Path, obstacle: str) -> None:
     (tmp_path / "data").mkdir()
     if obstacle == "a file in its place":

@@ -1,4 +1,6 @@
-"""Axes given as a matrix, in any order or reflected: no motion depends on the orientation that an eigensolver or a sort picks."""
+"""Axes given as a matrix, in any order or reflected: no motion depends on the orientation that an
+eigensolver or a sort picks.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def orthogonal(rng: np.random.Generator, n: int) -> Any:
 
 
 def tensors(rng: np.random.Generator, *sizes: int) -> Iterator[tuple[Any, Any, Any]]:
-    """Yield orthogonal matrices Q, diagonals D within a factor of 5, and Q D Qᵀ, symmetric, of the sizes in turn."""
+    """Yield orthogonal matrices Q, diagonals D within a factor of 5, and Q D Qᵀ, symmetric, of the
+    sizes in turn.
+    """
     for k in range(DRAWS):
         n = sizes[k % len(sizes)]
         turn, values = orthogonal(rng, n), np.exp(rng.uniform(0, np.log(5), n))
@@ -63,7 +67,9 @@ def test_a_body_whose_eigenvectors_are_a_reflection_runs_forwards() -> None:
 
 
 @pytest.mark.parametrize("potential", [None, {"clebsch": 0.4}, {"family": [0.1, 0.2, 0, 0, 0]}])
-def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(potential: Any, rng: np.random.Generator) -> None:
+def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(
+    potential: Any, rng: np.random.Generator
+) -> None:
     for _, _, tensor in tensors(rng, 3):
         gamma, v = start(rng, 3)
         problem = VeselovaSO3(tensor, gamma, np.cross(v, gamma), potential, normalize=True)
@@ -80,7 +86,9 @@ def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_h
         Omega = np.cross(v, gamma)
         problem = VeselovaSO3(tensor, gamma, Omega, normalize=True)
         q_dot = np.cross(problem.gamma, problem.Omega)
-        assert np.allclose(problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14)
+        assert np.allclose(
+            problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14
+        )
         neumann = problem.neumann()
         assert np.allclose(problem.axes @ neumann.q, problem.gamma, atol=1e-14)
         assert np.cross(problem.axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
@@ -92,7 +100,10 @@ def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_h
 def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Generator) -> None:
     for turn, values, matrix in tensors(rng, 2, 3, 4):
         q, v = start(rng, len(turn))
-        given, along = Veselova(matrix, q, v, normalize=True), Veselova(values, turn.T @ q, turn.T @ v, normalize=True)
+        given, along = (
+            Veselova(matrix, q, v, normalize=True),
+            Veselova(values, turn.T @ q, turn.T @ v, normalize=True),
+        )
         assert np.isclose(np.linalg.det(given.axes), 1.0)
         assert np.isclose(np.linalg.det(given.to_body_axes(given.frame)), 1.0)
         closed, there = solve(given, TIMES), solve(along, TIMES)
@@ -106,7 +117,14 @@ def test_a_free_body_in_reflected_axes_moves_as_its_image(rng: np.random.Generat
         frame = np.column_stack([gamma, np.linalg.svd(gamma[None])[2][1:].T])
         handed = np.linalg.det(turn)  # Ω is no vector: a reflection turns it round
         along = EulerPoisson(values, gamma, Omega, {"clebsch": 0.3}, frame, normalize=True)
-        given = EulerPoisson(tensor, turn @ gamma, handed * turn @ Omega, {"clebsch": 0.3}, turn @ frame, normalize=True)
+        given = EulerPoisson(
+            tensor,
+            turn @ gamma,
+            handed * turn @ Omega,
+            {"clebsch": 0.3},
+            turn @ frame,
+            normalize=True,
+        )
         one, other = solve(along, TIMES), solve(given, TIMES)
         assert np.max(np.abs(other.frame - turn @ one.frame)) < 1e-10
         assert np.max(np.abs(other.Omega - handed * one.Omega @ turn.T)) < 1e-9
@@ -118,22 +136,30 @@ def reflected_operator(turn: Any, matrix: Any) -> Any:
     """Return 𝓘 of so(n) in turned axes, on the coefficients of E_i∧E_j: Ad_Q 𝓘 Ad_Qᵀ."""
     n = len(turn)
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
-    adjoint = np.array([[turn[i, k] * turn[j, m] - turn[j, k] * turn[i, m] for k, m in pairs] for i, j in pairs])
+    adjoint = np.array(
+        [[turn[i, k] * turn[j, m] - turn[j, k] * turn[i, m] for k, m in pairs] for i, j in pairs]
+    )
     turned = adjoint @ matrix @ adjoint.T
     return {"matrix": (turned + turned.T) / 2}
 
 
-def test_an_lr_system_and_its_reduction_in_reflected_axes_move_as_their_images(rng: np.random.Generator) -> None:
+def test_an_lr_system_and_its_reduction_in_reflected_axes_move_as_their_images(
+    rng: np.random.Generator,
+) -> None:
     for _, _, operator in tensors(rng, 3, 6):
         n = {3: 3, 6: 4}[len(operator)]
         turn, X, raw = orthogonal(rng, n), random_columns(rng, n, 2), rng.normal(size=(n, 2)) / n
         plain = StiefelFlow({"matrix": operator}, X, X_dot=raw, normalize=True)
-        image = StiefelFlow(reflected_operator(turn, operator), turn @ plain.X, turn @ plain.P, normalize=True)
+        image = StiefelFlow(
+            reflected_operator(turn, operator), turn @ plain.X, turn @ plain.P, normalize=True
+        )
         assert np.max(np.abs(solve(image, TIMES).X - turn @ solve(plain, TIMES).X)) < 1e-10
         g, skew = orthogonal(rng, n), rng.normal(size=(n, n)) / n
         omega = skew - skew.T
         body = LRSystem(n, 1, {"matrix": operator}, g, omega)
-        turned = LRSystem(n, 1, reflected_operator(turn, operator), g @ turn.T, turn @ omega @ turn.T)
+        turned = LRSystem(
+            n, 1, reflected_operator(turn, operator), g @ turn.T, turn @ omega @ turn.T
+        )
         assert np.max(np.abs(solve(turned, TIMES).frame - turn @ solve(body, TIMES).frame)) < 1e-10
 
 
@@ -147,5 +173,7 @@ def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Ge
             portrait = "X" if system is EllipsoidGeodesic else "q"
             more = ({"quadratic": 0.3, "quartic": 0.1},) if system is SeparableVeselova else ()
             one = solve(system(A, x, w, *more, normalize=True), TIMES).series(portrait)
-            other = solve(system(A[order], turn @ x, turn @ w, *more, normalize=True), TIMES).series(portrait)
+            other = solve(
+                system(A[order], turn @ x, turn @ w, *more, normalize=True), TIMES
+            ).series(portrait)
             assert np.max(np.abs(other - one @ turn.T)) < 1e-10, system

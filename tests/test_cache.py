@@ -47,7 +47,8 @@ def test_the_entry_used_longest_ago_goes_first(tmp_path: Path, motion: Trajector
     cache = Cache(tmp_path / "cache", 3 * size - 1)
     for name in "ab":
         assert put(cache, name, motion) == size
-    for path in (tmp_path / "cache").iterdir():  # a moment ago: clocks of files go by some milliseconds
+    # a moment ago: clocks of files go by some milliseconds
+    for path in (tmp_path / "cache").iterdir():
         os.utime(path, ns=(path.stat().st_atime_ns, path.stat().st_mtime_ns - 10**9))
     assert cache.find("a")
     assert put(cache, "c", motion)
@@ -85,7 +86,9 @@ def test_many_writers_keep_the_folder_within_its_size(tmp_path: Path, motion: Tr
     assert sum(path.stat().st_size for path in (tmp_path / "cache").iterdir()) <= 12 * size
 
 
-def test_why_nothing_is_kept_is_said_once_until_something_is_again(tmp_path: Path, motion: Trajectory, caplog: Any) -> None:
+def test_why_nothing_is_kept_is_said_once_until_something_is_again(
+    tmp_path: Path, motion: Trajectory, caplog: Any
+) -> None:
     cache = Cache(tmp_path / "cache", 10**6)
     for _ in range(2):
         cache.report("No space left on device")
@@ -105,7 +108,9 @@ def full_disk(tmp_path: Path) -> str:
 def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk: str) -> None:
     answer = tmp_path / "answer"
     delivery = render_solution(
-        pickle.dumps(GOOD), Representation("json", "identity", str(answer)), Entry(str(tmp_path / "entry"), full_disk, 10**6)
+        pickle.dumps(GOOD),
+        Representation("json", "identity", str(answer)),
+        Entry(str(tmp_path / "entry"), full_disk, 10**6),
     )
     assert delivery.not_stored == "No space left on device"
     assert (delivery.stored, delivery.entry) == (0, None)
@@ -134,7 +139,10 @@ def test_a_disk_too_full_for_the_answer_itself_is_a_refusal(full_disk: str) -> N
 def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
     tmp_path: Path, changes: dict[str, Any], form: str
 ) -> None:
-    entry, wanted = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6), Representation(form, "identity")
+    entry, wanted = (
+        Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6),
+        Representation(form, "identity"),
+    )
     made = render_solution(pickle.dumps({**GOOD, **changes}), wanted, entry)
     assert made.entry
     assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
@@ -149,7 +157,9 @@ def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
         render_kept(str(tmp_path / "none"), IN_MEMORY)
 
 
-@pytest.mark.parametrize("content", [b"", b"1234", b"{}\n" + bytes(4), b"something else altogether"])
+@pytest.mark.parametrize(
+    "content", [b"", b"1234", b"{}\n" + bytes(4), b"something else altogether"]
+)
 def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "other").write_bytes(content)
     with pytest.raises(DamagedEntry):
@@ -163,29 +173,47 @@ def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) 
 
 
 def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Path) -> None:
-    """Spheroconic coordinates are kept where the engine found them; where it did not, they follow from the frame."""
+    """Spheroconic coordinates are kept where the engine found them; where it did not, they follow
+    from the frame.
+    """
     for method in ("theta", "angles"):
         request = {**GOOD, "method": method}
         made = render_solution(
-            pickle.dumps({**request, "outputs": ["q"]}), IN_MEMORY, Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
+            pickle.dumps({**request, "outputs": ["q"]}),
+            IN_MEMORY,
+            Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6),
         )
         assert made.entry
-        kept, expected = unpack(made.entry)[1], solve_request(read_request(TrajectoryRequest, request))
+        kept, expected = (
+            unpack(made.entry)[1],
+            solve_request(read_request(TrajectoryRequest, request)),
+        )
         for name in expected.problem.outputs:
             assert np.array_equal(kept.series(name), expected.series(name)), name
 
 
-def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(tmp_path: Path, monkeypatch: Any) -> None:
+def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
     monkeypatch.setattr("veselova.service.answers.rendering._MOST_SENT", 100)
     entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
     made = render_solution(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert made.entry is None
     assert made.stored == (tmp_path / "kept").stat().st_size
-    assert render_solution(pickle.dumps(GOOD), IN_MEMORY, Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)).stored == 0
+    assert (
+        render_solution(
+            pickle.dumps(GOOD),
+            IN_MEMORY,
+            Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200),
+        ).stored
+        == 0
+    )
     assert list(tmp_path.iterdir()) == [tmp_path / "kept"]
 
 
-def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(tmp_path: Path, monkeypatch: Any) -> None:
+def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(
+    tmp_path: Path, monkeypatch: Any
+) -> None:
     first, orphan = Spool(tmp_path), tmp_path / "veselova-spool-orphan"
     first.open()
     place = first.place()

@@ -27,9 +27,15 @@ from veselova.service.cli.main import main
 BODY4_FILE = Path(__file__).parent.parent / "examples" / "body4.json"
 
 
-def run(*arguments: str, stdin: bytes | None = None, cwd: Path | None = None) -> subprocess.CompletedProcess[bytes]:
+def run(
+    *arguments: str, stdin: bytes | None = None, cwd: Path | None = None
+) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(
-        [sys.executable, "-m", "veselova", *arguments], input=stdin, capture_output=True, cwd=cwd, timeout=PATIENCE
+        [sys.executable, "-m", "veselova", *arguments],
+        input=stdin,
+        capture_output=True,
+        cwd=cwd,
+        timeout=PATIENCE,
     )
 
 
@@ -45,10 +51,19 @@ def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
     answer = run("demo", "--plot", "motion.png", cwd=tmp_path)
     text = answer.stdout.decode()
     assert answer.returncode == 0, answer.stderr
-    for word in ("frame", "omega", "conditioning floor", "error bound, analytic", "error bound, numeric", "agree within"):
+    for word in (
+        "frame",
+        "omega",
+        "conditioning floor",
+        "error bound, analytic",
+        "error bound, numeric",
+        "agree within",
+    ):
         assert word in text
     deviations = {
-        line.split()[0]: float(line.split()[1]) for line in text.splitlines() if line[:5] in ("q    ", "frame", "omega")
+        line.split()[0]: float(line.split()[1])
+        for line in text.splitlines()
+        if line[:5] in ("q    ", "frame", "omega")
     }
     assert deviations
     assert max(deviations.values()) <= 1e-9
@@ -86,7 +101,10 @@ def test_tables_tell_times_apart() -> None:
 @pytest.mark.parametrize("command", ["solve", "compare", "torus"])
 def test_files_and_standard_input_are_the_same(command: str, tmp_path: Path) -> None:
     (tmp_path / "body.json").write_bytes(request())
-    from_file, from_pipe = run(command, "body.json", cwd=tmp_path), run(command, "-", stdin=request())
+    from_file, from_pipe = (
+        run(command, "body.json", cwd=tmp_path),
+        run(command, "-", stdin=request()),
+    )
     assert from_file.returncode == from_pipe.returncode == 0, from_file.stderr
     assert from_file.stdout.splitlines()[-1] == from_pipe.stdout.splitlines()[-1]
 
@@ -97,13 +115,20 @@ def test_json_is_the_answer_of_the_http_api() -> None:
     expected = solve_good()
     assert list(document["series"]) == ["q", "tau1"]
     assert np.array_equal(document["series"]["q"], expected.q)
-    assert set(json.loads(run("torus", "-", "--json", stdin=request()).stdout)) >= {"periods", "riemann_matrix", "phases"}
+    assert set(json.loads(run("torus", "-", "--json", stdin=request()).stdout)) >= {
+        "periods",
+        "riemann_matrix",
+        "phases",
+    }
 
 
 def solve_good() -> Any:
     from veselova import Veselova
 
-    return solve(Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"]), GOOD["times"])
+    return solve(
+        Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"]),
+        GOOD["times"],
+    )
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".arrow", ".json"])
@@ -114,29 +139,55 @@ def test_motions_are_written_to_files(suffix: str, tmp_path: Path) -> None:
 
 
 def test_a_motion_is_plotted_beside_its_file(tmp_path: Path) -> None:
-    answer = run("solve", "-", "--output", "motion.npz", "--plot", "motion.svg", stdin=request(), cwd=tmp_path)
+    answer = run(
+        "solve",
+        "-",
+        "--output",
+        "motion.npz",
+        "--plot",
+        "motion.svg",
+        stdin=request(),
+        cwd=tmp_path,
+    )
     assert answer.returncode == 0, answer.stderr
     assert (tmp_path / "motion.npz").exists()
     assert (tmp_path / "motion.svg").stat().st_size > 1000
 
 
 #: Limits of a server; the command line has none.
-SERVER_LIMITS = {"astronomical count", "too many times", "too large a dimension", "too long a budget"}
+SERVER_LIMITS = {
+    "astronomical count",
+    "too many times",
+    "too large a dimension",
+    "too long a budget",
+}
 REFUSED = [row for row in INVALID if row[0] not in SERVER_LIMITS]
 
 
-@pytest.mark.parametrize("body", [row[1].encode() for row in REFUSED], ids=[row[0] for row in REFUSED])
-def test_bad_input_exits_2_with_one_sentence(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+@pytest.mark.parametrize(
+    "body", [row[1].encode() for row in REFUSED], ids=[row[0] for row in REFUSED]
+)
+def test_bad_input_exits_2_with_one_sentence(
+    body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     assert_refused(body, monkeypatch, capsys, "; given ")
 
 
 @pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])
-def test_what_is_not_json_exits_2(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_what_is_not_json_exits_2(
+    body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     assert_refused(body, monkeypatch, capsys, "required one JSON document")
 
 
-def test_what_a_file_says_does_not_steer_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=BytesIO(b'{"problem": {"system": "x\\u001b[31m\\u0000"}}')))
+def test_what_a_file_says_does_not_steer_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setattr(
+        sys,
+        "stdin",
+        SimpleNamespace(buffer=BytesIO(b'{"problem": {"system": "x\\u001b[31m\\u0000"}}')),
+    )
     monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])
     with pytest.raises(SystemExit):
         main()
@@ -171,7 +222,9 @@ def assert_refused(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any, pa
         ("compare", str(BODY4_FILE), "--method", "euler"),
     ],
 )
-def test_bad_arguments_exit_2_without_a_traceback(arguments: tuple[str, ...], tmp_path: Path) -> None:
+def test_bad_arguments_exit_2_without_a_traceback(
+    arguments: tuple[str, ...], tmp_path: Path
+) -> None:
     answer = run(*arguments, cwd=tmp_path)
     assert answer.returncode == 2
     assert answer.stderr
@@ -188,15 +241,29 @@ def test_what_cannot_be_solved_exits_1() -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        (("solve", str(BODY4_FILE), "--output", "{folder}"), 2, b"--output: required a file name ending"),
-        (("solve", str(BODY4_FILE), "--output", "{folder}/folder.csv"), 2, b"--output: required a file that can be written"),
+        (
+            ("solve", str(BODY4_FILE), "--output", "{folder}"),
+            2,
+            b"--output: required a file name ending",
+        ),
+        (
+            ("solve", str(BODY4_FILE), "--output", "{folder}/folder.csv"),
+            2,
+            b"--output: required a file that can be written",
+        ),
         (("solve", str(BODY4_FILE), "--output", "/proc/x.csv"), 1, b"writing /proc/x.csv failed"),
         (("demo", "--plot", "{folder}/full.png"), 1, b"writing the answer failed"),
-        (("serve", "--host", "nonsense.invalid"), 2, b"--host: required an address of this machine"),
+        (
+            ("serve", "--host", "nonsense.invalid"),
+            2,
+            b"--host: required an address of this machine",
+        ),
         (("solve", "{folder}"), 2, b"FILE: required a readable file"),
     ],
 )
-def test_files_and_addresses_that_fail_are_named(arguments: tuple[str, ...], status: int, words: bytes, tmp_path: Path) -> None:
+def test_files_and_addresses_that_fail_are_named(
+    arguments: tuple[str, ...], status: int, words: bytes, tmp_path: Path
+) -> None:
     (tmp_path / "folder.csv").mkdir()
     (tmp_path / "full.png").symlink_to("/dev/full")
     answer = run(*(argument.format(folder=tmp_path) for argument in arguments))
@@ -232,7 +299,8 @@ def test_a_stated_budget_is_kept() -> None:
     answer = run("solve", "-", stdin=request(times=[0, 1e7], engine="numeric", budget_s=1))
     assert answer.returncode == 1
     assert b"stopped after its budget of 1 s" in answer.stderr
-    assert time.monotonic() - began < BUDGET_S  # of one second, not of that which every other test states
+    # of one second, not of that which every other test states
+    assert time.monotonic() - began < BUDGET_S
 
 
 def test_more_times_than_memory_holds_are_refused() -> None:
@@ -272,13 +340,23 @@ def test_bench_prints_a_table_that_can_be_pasted() -> None:
     answer = run("bench")
     assert answer.returncode == 0
     heading, *lines = answer.stdout.decode().splitlines()
-    assert f"veselova {__version__}, python {platform.python_version()}, numpy {np.__version__}" in heading
+    assert (
+        f"veselova {__version__}, python {platform.python_version()}, numpy {np.__version__}"
+        in heading
+    )
     assert f"processors {os.cpu_count()}" in heading
-    table = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    table = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in lines
+        if line.startswith("|")
+    ]
     assert table[0] == ["question", "closed form", "peer", "takes", "ratio", "difference"]
     assert len(table) == 10
     for question, ours, peer, theirs, ratio, difference in table[2:]:
-        assert _seconds(theirs) / _seconds(ours) == pytest.approx(float(ratio), rel=0.02), (question, peer)
+        assert _seconds(theirs) / _seconds(ours) == pytest.approx(float(ratio), rel=0.02), (
+            question,
+            peer,
+        )
         assert 0 < float(difference) < 1e-9, (question, peer)
 
 

@@ -71,7 +71,9 @@ def test_problems_travel_exactly(server: Server) -> None:
 
 def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
     with Client(server.url) as client:
-        found = client.trajectory(GOOD["problem"], {"start": 0, "stop": 1, "count": 3}, budget_s=BUDGET_S)
+        found = client.trajectory(
+            GOOD["problem"], {"start": 0, "stop": 1, "count": 3}, budget_s=BUDGET_S
+        )
         assert found.times.tolist() == [0, 0.5, 1]
         with pytest.raises(InvalidRequest):
             client.trajectory({**GOOD["problem"], "mass": 1}, [0, 1])
@@ -81,7 +83,10 @@ def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
 
 def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
     with Client(server.url) as client:
-        comparison, found = client.compare(PROBLEM, TIMES, "taylor", budget_s=BUDGET_S), client.torus(PROBLEM, budget_s=BUDGET_S)
+        comparison, found = (
+            client.compare(PROBLEM, TIMES, "taylor", budget_s=BUDGET_S),
+            client.torus(PROBLEM, budget_s=BUDGET_S),
+        )
     assert comparison.agrees
     assert comparison.deviation["frame"] == compare(PROBLEM, TIMES, "taylor").deviation["frame"]
     expected = torus(PROBLEM)
@@ -92,8 +97,13 @@ def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
 def test_the_asynchronous_client_has_the_same_methods(server: Server) -> None:
     async def ask() -> Any:
         async with AsyncClient(server.url) as client:
-            motions = [client.trajectory(PROBLEM, times, budget_s=BUDGET_S) for times in (TIMES, [5.0])]
-            others = client.compare(PROBLEM, TIMES, budget_s=BUDGET_S), client.torus(PROBLEM, budget_s=BUDGET_S)
+            motions = [
+                client.trajectory(PROBLEM, times, budget_s=BUDGET_S) for times in (TIMES, [5.0])
+            ]
+            others = (
+                client.compare(PROBLEM, TIMES, budget_s=BUDGET_S),
+                client.torus(PROBLEM, budget_s=BUDGET_S),
+            )
             return await asyncio.gather(*others, *motions)
 
     comparison, found, trajectory, later = asyncio.run(ask())
@@ -161,13 +171,23 @@ def test_retries_are_logged_and_print_nothing(
 ) -> None:
     with caplog.at_level("INFO", "veselova.client"), pytest.raises(ServiceUnreachable):
         ask(Script(*[httpx2.ConnectError] * 3), asynchronous, attempts=3)
-    assert [record.name for record in caplog.records if "is asked again" in record.message] == ["veselova.client"] * 2
+    assert [record.name for record in caplog.records if "is asked again" in record.message] == [
+        "veselova.client"
+    ] * 2
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
-    "failure", [429, 503, httpx2.ConnectError, httpx2.ReadError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout]
+    "failure",
+    [
+        429,
+        503,
+        httpx2.ConnectError,
+        httpx2.ReadError,
+        httpx2.RemoteProtocolError,
+        httpx2.ConnectTimeout,
+    ],
 )
 def test_what_may_pass_is_tried_again(failure: Any, asynchronous: bool) -> None:
     script = Script(failure, failure, 200)
@@ -234,7 +254,10 @@ def test_the_end_of_a_job_is_waited_for_as_long_as_the_server_may_take() -> None
 @pytest.mark.parametrize("body", [b"<html>busy</html>", b"[]", b"\xff"])
 def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: bytes) -> None:
     transport = httpx2.MockTransport(lambda request: httpx2.Response(502, content=body))
-    with Client("http://proxy", transport=transport) as client, pytest.raises(ProblemResponse) as raised:
+    with (
+        Client("http://proxy", transport=transport) as client,
+        pytest.raises(ProblemResponse) as raised,
+    ):
         client.torus(PROBLEM)
     assert raised.value.status == 502
     assert raised.value.document["status"] == 502
@@ -243,7 +266,8 @@ def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: by
 def test_an_answer_of_another_service_is_a_service_error() -> None:
     for body in (b"<html>", b"{}", b"[1]"):
         client = Client(
-            "http://elsewhere", transport=httpx2.MockTransport(lambda _, body=body: httpx2.Response(200, content=body))
+            "http://elsewhere",
+            transport=httpx2.MockTransport(lambda _, body=body: httpx2.Response(200, content=body)),
         )
         with pytest.raises(ServiceError, match="something else than a result"):
             client.trajectory(PROBLEM, [1.0])
@@ -284,27 +308,40 @@ def test_requests_are_what_the_openapi_document_says() -> None:
         bodies.append(json.loads(request.content))
         return httpx2.Response(500, json={"detail": "seen"})
 
-    with Client("http://server", transport=httpx2.MockTransport(keep)) as client, pytest.raises(ProblemResponse):
+    with (
+        Client("http://server", transport=httpx2.MockTransport(keep)) as client,
+        pytest.raises(ProblemResponse),
+    ):
         client.trajectory(PROBLEM, range(3), "numeric", "taylor", budget_s=3)
     assert bodies[0]["problem"] == GOOD["problem"] | {"normalize": False}
     assert bodies[0]["times"] == [0, 1, 2]
-    assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == ("numeric", "taylor", 3)
+    assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == (
+        "numeric",
+        "taylor",
+        3,
+    )
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize("kind", ["json", "csv", "npz", "arrow", "parquet"])
-def test_downloads_are_the_files_of_the_library(server: Server, kind: str, asynchronous: bool, tmp_path: Path) -> None:
+def test_downloads_are_the_files_of_the_library(
+    server: Server, kind: str, asynchronous: bool, tmp_path: Path
+) -> None:
     path, options = tmp_path / f"motion.{kind}", {"outputs": ["q", "tau1"], "engine": "numeric"}
     if asynchronous:
 
         async def fetch() -> Any:
             async with AsyncClient(server.url) as client:
-                return await client.download(PROBLEM, TIMES, path, kind, budget_s=BUDGET_S, **options)
+                return await client.download(
+                    PROBLEM, TIMES, path, kind, budget_s=BUDGET_S, **options
+                )
 
         provenance = asyncio.run(fetch())
     else:
         with Client(server.url) as client:
-            provenance = client.download(PROBLEM, TIMES, str(path), kind, budget_s=BUDGET_S, **options)
+            provenance = client.download(
+                PROBLEM, TIMES, str(path), kind, budget_s=BUDGET_S, **options
+            )
     expected = solve(PROBLEM, TIMES, "numeric")
     assert provenance.details == expected.provenance.details
     assert np.array_equal(read_table(path)["tau1"], expected.tau1)
@@ -329,11 +366,15 @@ def test_a_download_goes_to_an_open_stream_too(server: Server) -> None:
     stream = io.BytesIO()
     with Client(server.url) as client:
         client.download(PROBLEM, TIMES, stream, budget_s=BUDGET_S)
-    assert np.array_equal(np.load(io.BytesIO(stream.getvalue()))["frame"], solve(PROBLEM, TIMES).frame)
+    assert np.array_equal(
+        np.load(io.BytesIO(stream.getvalue()))["frame"], solve(PROBLEM, TIMES).frame
+    )
 
 
 def broken(*chunks: bytes) -> Any:
-    """Return a transport whose first answer breaks off after the chunks, and whose second is whole."""
+    """Return a transport whose first answer breaks off after the chunks, and whose
+    second is whole.
+    """
     header = {"veselova-provenance": json.dumps(solve(PROBLEM, TIMES).provenance.as_dict())}
     answers = iter([True, False])
 
@@ -342,23 +383,33 @@ def broken(*chunks: bytes) -> Any:
         if breaks:
             raise httpx2.ReadError("cut off")
 
-    return httpx2.MockTransport(lambda _: httpx2.Response(200, headers=header, content=body(next(answers))))
+    return httpx2.MockTransport(
+        lambda _: httpx2.Response(200, headers=header, content=body(next(answers)))
+    )
 
 
 def test_a_download_that_breaks_off_begins_again_or_leaves_no_file(tmp_path: Path) -> None:
     with Client("http://server", transport=broken(b"one", b"two")) as client:
         client.download(PROBLEM, TIMES, tmp_path / "whole.npz")
     assert (tmp_path / "whole.npz").read_bytes() == b"onetwo"
-    with Client("http://server", attempts=1, transport=broken(b"one")) as client, pytest.raises(ServiceUnreachable):
+    with (
+        Client("http://server", attempts=1, transport=broken(b"one")) as client,
+        pytest.raises(ServiceUnreachable),
+    ):
         client.download(PROBLEM, TIMES, tmp_path / "part.npz")
     assert [entry.name for entry in tmp_path.iterdir()] == ["whole.npz"]
     stream = io.BytesIO()
-    with Client("http://server", transport=broken(b"one")) as client, pytest.raises(ServiceUnreachable):
+    with (
+        Client("http://server", transport=broken(b"one")) as client,
+        pytest.raises(ServiceUnreachable),
+    ):
         client.download(PROBLEM, TIMES, stream)
     assert stream.getvalue() == b"one"
 
 
-def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(server: Server, tmp_path: Path) -> None:
+def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(
+    server: Server, tmp_path: Path
+) -> None:
     client = Client("http://nowhere.invalid")
     for target, kind, field in (
         (tmp_path / "no" / "x.npz", "npz", "target"),

@@ -28,17 +28,45 @@ def problems() -> list[tuple[str, vs.Problem]]:
     found: list[tuple[str, Any]] = []
     for n in (2, 3, 4, 5):
         random = np.random.default_rng([34, n])
-        A, q, v = np.linspace(3, 1, n).tolist(), random.normal(size=n).tolist(), random.normal(size=n).tolist()
+        A, q, v = (
+            np.linspace(3, 1, n).tolist(),
+            random.normal(size=n).tolist(),
+            random.normal(size=n).tolist(),
+        )
         found.append((f"veselova-{n}", vs.Veselova(A, q, v, normalize=True)))
         found.append((f"neumann-{n}", vs.NeumannSystem(A, q, v, normalize=True)))
         found.append((f"geodesic-{n}", vs.EllipsoidGeodesic(A, q, v, normalize=True)))
     found.append(("symmetric body", vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0.3, 1, -0.225])))
-    found.append(("two equal of four", vs.Veselova([3, 2, 1, 1], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4])))
-    found.append(("body in SO(3)", vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])))
-    found.append(("its tensor", vs.VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], [0.6, 0, 0.8], [0.8, 1, -0.6])))
-    found.append(("frozen direction", vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0])))
-    found.append(("matrix A", vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6])))
-    found.append(("beside a separatrix", vs.Veselova([3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True)))
+    found.append(
+        ("two equal of four", vs.Veselova([3, 2, 1, 1], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4]))
+    )
+    found.append(
+        (
+            "body in SO(3)",
+            vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
+        )
+    )
+    found.append(
+        (
+            "its tensor",
+            vs.VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], [0.6, 0, 0.8], [0.8, 1, -0.6]),
+        )
+    )
+    found.append(
+        ("frozen direction", vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0]))
+    )
+    found.append(
+        (
+            "matrix A",
+            vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6]),
+        )
+    )
+    found.append(
+        (
+            "beside a separatrix",
+            vs.Veselova([3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True),
+        )
+    )
     return found
 
 
@@ -60,7 +88,14 @@ def test_documents_are_small(n: int, most: int) -> None:
     random = np.random.default_rng([35, n])
     for _ in range(3):
         q, v = random.normal(size=n).tolist(), random.normal(size=n).tolist()
-        assert len(vs.closed_form(vs.Veselova(np.linspace(3, 1, n).tolist(), q, v, normalize=True)).to_json()) < most
+        assert (
+            len(
+                vs.closed_form(
+                    vs.Veselova(np.linspace(3, 1, n).tolist(), q, v, normalize=True)
+                ).to_json()
+            )
+            < most
+        )
 
 
 def test_a_coarser_document_is_smaller_and_says_how_far_it_is_off() -> None:
@@ -84,7 +119,9 @@ def test_the_explicit_formulas_are_the_motion() -> None:
     solution = vs.closed_form(BODY3)
     states, formulas = solution.at([2.0]), solution.to_sympy()
     tau = {sympy.Symbol("tau_1", real=True): float(states.tau1[0])}
-    phases = {sympy.Symbol(f"z_{s}", real=True): float(formulas[f"z_{s}"].subs(tau)) for s in (1, 2)}
+    phases = {
+        sympy.Symbol(f"z_{s}", real=True): float(formulas[f"z_{s}"].subs(tau)) for s in (1, 2)
+    }
     assert float(formulas["time"].subs(tau)) == pytest.approx(2.0, abs=1e-12)
     q = [float(formulas[f"q_{i}"].subs(phases)) for i in (1, 2, 3)]
     assert q == pytest.approx(states.q[0].tolist(), abs=1e-13)
@@ -102,14 +139,21 @@ def test_latex_has_every_entry_of_the_frame() -> None:
 @pytest.mark.parametrize("language", ["python", "node", "cc"])
 def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path: Path) -> None:
     files = [str(EXAMPLES / f"{name}.json"), str(EXAMPLES / f"{name}.values.json")]
-    command = {"python": [sys.executable, str(EXAMPLES / "evaluate.py")], "node": ["node", str(EXAMPLES / "evaluate.mjs")]}
+    command = {
+        "python": [sys.executable, str(EXAMPLES / "evaluate.py")],
+        "node": ["node", str(EXAMPLES / "evaluate.mjs")],
+    }
     if language != "python" and shutil.which(language) is None:
         pytest.skip(f"{language} is not installed")
     if language == "cc":
         program = tmp_path / "evaluate"
-        subprocess.run(["cc", "-O2", "-o", str(program), str(EXAMPLES / "evaluate.c"), "-lm"], check=True)
+        subprocess.run(
+            ["cc", "-O2", "-o", str(program), str(EXAMPLES / "evaluate.c"), "-lm"], check=True
+        )
         command["cc"] = [str(program)]
-    answer = subprocess.run([*command[language], *files], capture_output=True, text=True, check=True).stdout
+    answer = subprocess.run(
+        [*command[language], *files], capture_output=True, text=True, check=True
+    ).stdout
     assert answer.startswith("largest deviation ")
     assert float(answer.split()[-1]) < 5e-12
 

@@ -1,4 +1,6 @@
-"""A Dask cluster behind TLS: scheduler, workers and server show certificates of one authority, and nobody else gets in."""
+"""A Dask cluster behind TLS: scheduler, workers and server show certificates of one authority, and
+nobody else gets in.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,13 @@ from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.sweeps.cluster import open_cluster
 
-BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+BASE = {
+    "system": "veselova",
+    "A": [3, "1.5", 1],
+    "q": [0.6, 0, 0.8],
+    "q_dot": [0, 0.5, 0],
+    "normalize": True,
+}
 
 
 def certificates(folder: Path) -> dict[str, Path]:
@@ -38,7 +46,11 @@ def certificates(folder: Path) -> dict[str, Path]:
 
 @contextmanager
 def dask(*arguments: str) -> Iterator[None]:
-    process = subprocess.Popen([sys.executable, "-m", "dask", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dask", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         yield
     finally:
@@ -51,13 +63,30 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
     """The settings with which a scheduler and two workers behind TLS are reached."""
     folder = tmp_path_factory.mktemp("cluster")
     files = certificates(folder / "tls")
-    options = ["--tls-ca-file", str(files["dask_ca_file"]), "--tls-cert", str(files["dask_cert_file"])]
+    options = [
+        "--tls-ca-file",
+        str(files["dask_ca_file"]),
+        "--tls-cert",
+        str(files["dask_cert_file"]),
+    ]
     options += ["--tls-key", str(files["dask_key_file"]), "--no-dashboard"]
     port = str(free_port())
     address = f"tls://127.0.0.1:{port}"
-    worker = ["worker", address, "--nthreads", "1", "--host", "127.0.0.1", "--local-directory", str(folder), *options]
+    worker = [
+        "worker",
+        address,
+        "--nthreads",
+        "1",
+        "--host",
+        "127.0.0.1",
+        "--local-directory",
+        str(folder),
+        *options,
+    ]
     with ExitStack() as stack:
-        stack.enter_context(dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options))
+        stack.enter_context(
+            dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
+        )
         for _ in range(2):
             stack.enter_context(dask(*worker))
         yield {"dask_scheduler": address, **files}
@@ -68,13 +97,19 @@ def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
 ) -> None:
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
-    sweep = read_request(SweepRequest, {"problem": BASE, "vary": vary, "samples": 10, "times": [0, 1]})
+    sweep = read_request(
+        SweepRequest, {"problem": BASE, "vary": vary, "samples": 10, "times": [0, 1]}
+    )
     job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
-    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None)
+    _, there = run_sweep(
+        sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None
+    )
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
 
 
-def test_every_connection_of_the_cluster_is_encrypted(cluster: dict[str, Any], tmp_path: Path) -> None:
+def test_every_connection_of_the_cluster_is_encrypted(
+    cluster: dict[str, Any], tmp_path: Path
+) -> None:
     async def addresses() -> list[str]:
         async with open_cluster(Settings(data_dir=tmp_path, **cluster)) as client:
             await client.wait_for_workers(2, timeout=PATIENCE)
@@ -109,5 +144,7 @@ def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Pat
         async with open_cluster(Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")):
             pass
 
-    with pytest.raises(InvalidInput, match="required tls://, for whoever reaches a Dask cluster can run code on it"):
+    with pytest.raises(
+        InvalidInput, match="required tls://, for whoever reaches a Dask cluster can run code on it"
+    ):
         asyncio.run(connect())

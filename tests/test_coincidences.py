@@ -1,4 +1,6 @@
-"""Starts at which branch points coincide, with many digits and with certified errors: they are moved, by how much is bounded."""
+"""Starts at which branch points coincide, with many digits and with certified errors: they are
+moved, by how much is bounded.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,19 @@ from veselova.analytic.spectrum.moving_part import moving_part
 
 SYMMETRIC = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
 FRAMED = vs.Veselova(
-    [3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]], normalize=True
+    [3, 3, 1],
+    ["0.6", 0, "0.8"],
+    ["0.4", "0.7", "-0.3"],
+    [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]],
+    normalize=True,
 )
 SPHERE = vs.Veselova([2, 2, 2], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
 FOUR = vs.Veselova([3, 3, 2, 1], [1, 2, 1, 1], [2, -1, 3, 1], normalize=True)
 ALIGNED = vs.Veselova([3, 3, 2, 1], [1, 0, 1, 1], [2, -1, 3, 1], normalize=True)
 TINY = vs.Veselova([3, 2, 1], ["1e-150", "0.6", "0.8"], ["1e-150", "0.8", "-0.6"], normalize=True)
-SCALED = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4e140", "0.7e140", "-0.3e140"], normalize=True)
+SCALED = vs.Veselova(
+    [3, 3, 1], ["0.6", 0, "0.8"], ["0.4e140", "0.7e140", "-0.3e140"], normalize=True
+)
 
 SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
 
@@ -42,8 +50,13 @@ SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
     ],
     ids=["symmetric", "framed", "sphere", "four", "tiny", "scaled"],
 )
-def test_certified_motions_of_coincidences_hold_more_digits(problem: vs.Veselova, times: list[str]) -> None:
-    proven, finer = vs.solve(problem, times, certified=True).decimals, vs.solve(problem, times, digits=45).decimals
+def test_certified_motions_of_coincidences_hold_more_digits(
+    problem: vs.Veselova, times: list[str]
+) -> None:
+    proven, finer = (
+        vs.solve(problem, times, certified=True).decimals,
+        vs.solve(problem, times, digits=45).decimals,
+    )
     assert proven.certified
     assert max(proven.error) < Decimal("1e-18")
     for name in SERIES:
@@ -59,25 +72,38 @@ def test_certified_motions_of_equal_A_hold_the_integrated_ones(problem: vs.Vesel
     assert np.max(np.abs(proven.tau1 - tau1)) < 1e-14
 
 
-@pytest.mark.parametrize("problem", [SYMMETRIC, FRAMED, ALIGNED], ids=["symmetric", "framed", "four"])
+@pytest.mark.parametrize(
+    "problem", [SYMMETRIC, FRAMED, ALIGNED], ids=["symmetric", "framed", "four"]
+)
 @pytest.mark.parametrize("digits", [3, 6])
-def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(problem: vs.Veselova, digits: int) -> None:
-    """Equal A's drawn apart by 10^(−2·digits−10): the motions of the two bodies are at most so far from each other."""
+def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(
+    problem: vs.Veselova, digits: int
+) -> None:
+    """Equal A's drawn apart by 10^(−2·digits−10): the motions of the two bodies are at most so far
+    from each other.
+    """
     times, given = [-1, 1, 3], moving_part(problem)
     moved = resolve_spectrum(given, digits).moving
     A = list(problem.exact.A)
     for a, vector in zip(moved.A, moved.vectors, strict=True):
         (axis,) = [i for i, component in vector.items() if component]
         A[axis] = a * moved.unit
-    other = vs.Veselova(A, problem.exact.q, problem.exact.tangent, problem.exact.frame, normalize=True)
+    other = vs.Veselova(
+        A, problem.exact.q, problem.exact.tangent, problem.exact.frame, normalize=True
+    )
     one, two = (vs.solve(p, times, digits=40).decimals for p in (problem, other))
     with balls(40) as xp:
         drift = replace(PerturbationBound.of(given, moved, xp), frames=xp.number(0))
         late, velocity, turned, _ = drift.bounds(xp.array(one.midpoints["tau1"].astype(float)), xp)
-        found = {name: np.abs(one.midpoints[name] - two.midpoints[name]) for name in ("tau1", "q_dot", "q")}
+        found = {
+            name: np.abs(one.midpoints[name] - two.midpoints[name])
+            for name in ("tau1", "q_dot", "q")
+        }
         for name, bound in (("tau1", late), ("q_dot", velocity), ("q", turned)):
             largest = np.max(found[name].reshape(len(times), -1), axis=1)
-            assert all(0 < float(x) <= float(b.upper()) for x, b in zip(largest, bound, strict=True)), name
+            assert all(
+                0 < float(x) <= float(b.upper()) for x, b in zip(largest, bound, strict=True)
+            ), name
             assert float(np.max(largest)) > 1e-5 * 10.0 ** (-2 * digits - 10)
 
 
@@ -85,7 +111,9 @@ def test_growth_is_expected_as_it_is_bounded() -> None:
     found = resolve_spectrum(moving_part(FOUR), 20)
     with balls(40) as xp:
         drift = PerturbationBound.of(moving_part(FOUR), found.moving, xp)
-    assert estimate_growth(found.spectrum, 30.0) == pytest.approx(drift.growth * 30 / np.log(10), abs=1)
+    assert estimate_growth(found.spectrum, 30.0) == pytest.approx(
+        drift.growth * 30 / np.log(10), abs=1
+    )
 
 
 def test_equal_A_are_not_certified_for_ever() -> None:
@@ -95,7 +123,9 @@ def test_equal_A_are_not_certified_for_ever() -> None:
 
 
 def test_a_separatrix_is_not_certified() -> None:
-    """F_1 = v_1² + Σ (q_1v_j−q_jv_1)²/(I_1−I_j) vanishes at q = (0, 1, 1)/√2 with 1/A = 2, 1, 3, whatever the velocity."""
+    """F_1 = v_1² + Σ (q_1v_j−q_jv_1)²/(I_1−I_j) vanishes at q = (0, 1, 1)/√2 with 1/A = 2, 1, 3,
+    whatever the velocity.
+    """
     problem = vs.Veselova(["1/2", 1, "1/3"], [0, 1, 1], [1, "0.5", "-0.5"], normalize=True)
     assert resolve_spectrum(moving_part(problem), 20).separatrices == (1,)
     with pytest.raises(vs.Unsolved, match="separatrix") as caught:
@@ -109,13 +139,17 @@ def test_coincidences_keep_to_the_digits_asked_for(digits: int) -> None:
     for problem in (SYMMETRIC, TINY):
         found, fewer = (vs.solve(problem, [2], digits=d).decimals for d in (digits, 40))
         assert max(found.error) < Decimal(10) ** -digits
-        assert np.max(np.abs(found.midpoints["frame"] - fewer.midpoints["frame"])) < Decimal("1e-40")
+        assert np.max(np.abs(found.midpoints["frame"] - fewer.midpoints["frame"])) < Decimal(
+            "1e-40"
+        )
     smallest = vs.solve(TINY, [2], digits=max(digits, 155)).decimals.midpoints["q"][0, 0]
     assert Decimal("1e-151") < abs(smallest) < Decimal("1e-148")
 
 
-def test_a_direction_that_hardly_moves_across_a_plane_that_is_not_stable_costs_digits_with_time() -> None:
-    """q_2 of 1e-150 grows like e^(t/4) there; doubles do not follow it, and say so like those of a start on the plane's edge."""
+def test_a_direction_that_hardly_moves_across_an_unstable_plane_costs_digits_with_time() -> None:
+    """q_2 of 1e-150 grows like e^(t/4) there; doubles do not follow it, and say so like those of a
+    start on the plane's edge.
+    """
     problem = vs.Veselova([3, 2, 1], ["0.6", "1e-150", "0.8"], ["0.8", "1e-150", "-0.6"])
     early = vs.solve(problem, [10])
     assert early.provenance.details["regime"] == "separatrix"
@@ -131,7 +165,10 @@ def test_the_natural_frame_of_a_direction_that_hardly_moves_has_all_digits() -> 
     start = [4, 3, 2, 1], ["1e-150", "0.5", "0.6", "0.62"], ["1e-150", "0.7", "-0.3", "0.2"]
     problem = vs.Veselova(*start, normalize=True)
     finer = vs.solve(problem, [0], digits=60).decimals
-    for found in (vs.solve(problem, [0], digits=20, certified=True).decimals, vs.solve(problem, [0], digits=30).decimals):
+    for found in (
+        vs.solve(problem, [0], digits=20, certified=True).decimals,
+        vs.solve(problem, [0], digits=30).decimals,
+    ):
         difference = np.abs(found.midpoints["frame"] - finer.midpoints["frame"])
         assert np.all(difference <= found.radii["frame"] + finer.radii["frame"])
         assert max(found.error) < Decimal("1e-20")
@@ -139,7 +176,10 @@ def test_the_natural_frame_of_a_direction_that_hardly_moves_has_all_digits() -> 
 
 @pytest.mark.parametrize("problem", [FRAMED, ALIGNED], ids=["symmetric", "four"])
 def test_a_time_below_the_range_of_doubles_is_no_zero(problem: vs.Veselova) -> None:
-    one, two = (vs.solve(problem, [time], digits=430).decimals.midpoints["tau1"][0] for time in ("1e-400", "2e-400"))
+    one, two = (
+        vs.solve(problem, [time], digits=430).decimals.midpoints["tau1"][0]
+        for time in ("1e-400", "2e-400")
+    )
     assert one > Decimal("1e-401")
     assert abs(two / one - 2) < Decimal("1e-25")
     assert max(vs.solve(problem, ["-1e-400"], certified=True).decimals.error) < Decimal("1e-18")
@@ -148,8 +188,16 @@ def test_a_time_below_the_range_of_doubles_is_no_zero(problem: vs.Veselova) -> N
 @pytest.mark.parametrize("exponent", [140, 146, 291, 300, 400])
 @pytest.mark.parametrize("n", [2, 3, 5])
 def test_of_nearly_equal_moments_no_direction_is_dropped(n: int, exponent: int) -> None:
-    """The cut between them closes with their difference, however much the body moves along either."""
-    A = [Fraction(2), 2 + Fraction(2, 10**exponent), 2 + Fraction(3, 10**exponent), Fraction(1), Fraction(3)][:n]
+    """The cut between them closes with their difference, however much the body moves
+    along either.
+    """
+    A = [
+        Fraction(2),
+        2 + Fraction(2, 10**exponent),
+        2 + Fraction(3, 10**exponent),
+        Fraction(1),
+        Fraction(3),
+    ][:n]
     q, q_dot = (["0.3", "-0.5", "0.4", "0.6", "0.2"][:n], ["0.2", "0.1", "-0.7", "0.3", "0.5"][:n])
     problem = vs.Veselova(A, q, q_dot, normalize=True)
     times = np.array([-2.0, 0.5, 3.0])

@@ -53,7 +53,8 @@ def test_answers_are_what_the_document_says(server: Server, path: str, method: s
     @settings(max_examples=40, suppress_health_check=list(HealthCheck))
     def conforms(case: Any) -> None:
         if isinstance(case.body, dict):
-            case.body = {**case.body, "budget_s": 5.0}  # what is drawn shall not be refused for the seconds of a busy machine
+            # what is drawn shall not be refused for the seconds of a busy machine
+            case.body = {**case.body, "budget_s": 5.0}
         case.validate_response(case.call(timeout=60), checks=CHECKS)
 
     conforms()

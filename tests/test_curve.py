@@ -1,4 +1,6 @@
-"""Spectra, branch points and periods, against arbitrary-precision arithmetic and the bilinear relations."""
+"""Spectra, branch points and periods, against arbitrary-precision arithmetic and the bilinear
+relations.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,13 @@ def eigenvalues(found: Spectrum) -> tuple[list[Any], list[Any]]:
     position = basis.T @ (basis * found.inverse[:, None])
     along = basis.T @ found.q_prime
     with mpmath.workdps(xp.digits + 6):
-        matrices = (mpmath.matrix(values.tolist()) for values in (position, position - np.outer(along, along)))
-        spheroconic, constants = (sorted(mpmath.eigsy(matrix, eigvals_only=True)) for matrix in matrices)
+        matrices = (
+            mpmath.matrix(values.tolist())
+            for values in (position, position - np.outer(along, along))
+        )
+        spheroconic, constants = (
+            sorted(mpmath.eigsy(matrix, eigvals_only=True)) for matrix in matrices
+        )
     return spheroconic, constants
 
 
@@ -51,8 +58,12 @@ def eigenvalues(found: Spectrum) -> tuple[list[Any], list[Any]]:
 def test_spectra_agree_with_the_eigenproblems(n: int, rng: np.random.Generator) -> None:
     problem = random_problem(rng, n)
     found, unit = spectrum_of(problem), float(moving_part(problem).unit)
-    assert np.allclose([float(c) / unit for c in found.constants[1:]], problem.constants, rtol=1e-11, atol=1e-14)
-    assert np.allclose([float(x) / unit for x in found.spheroconic], problem.spheroconic, rtol=1e-11, atol=1e-14)
+    assert np.allclose(
+        [float(c) / unit for c in found.constants[1:]], problem.constants, rtol=1e-11, atol=1e-14
+    )
+    assert np.allclose(
+        [float(x) / unit for x in found.spheroconic], problem.spheroconic, rtol=1e-11, atol=1e-14
+    )
     found = found.in_arithmetic(Extended(found.arithmetic.digits))
     spheroconic, constants = eigenvalues(found)
     assert max(abs(a - b) for a, b in zip(spheroconic, found.spheroconic, strict=True)) < 1e-45
@@ -64,7 +75,9 @@ def test_the_roots_are_found_in_clusters_too() -> None:
     found = spectrum_of(Veselova(A, ["0.5"] * 4, ["0.5", "-0.5", "0.3", "-0.3"]))
     ends = sorted([*found.constants, *found.inverse])
     assert all(b > a for a, b in pairwise(ends))
-    assert all(a <= x <= b for x, a, b in zip(found.spheroconic, ends[1::2], ends[2::2], strict=True))
+    assert all(
+        a <= x <= b for x, a, b in zip(found.spheroconic, ends[1::2], ends[2::2], strict=True)
+    )
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-10])
@@ -72,21 +85,29 @@ def test_a_small_gap_keeps_its_digits(gap: float) -> None:
     problem = near_separatrix(gap).problem()
     rounded = curve_of(problem).differences
     precise = Curve.of(spectrum_of(problem, 40), Extended(60)).differences
-    relative = [abs(rounded[i, j] / precise[i, j] - 1) for i in range(5) for j in range(5) if i != j]
+    relative = [
+        abs(rounded[i, j] / precise[i, j] - 1) for i in range(5) for j in range(5) if i != j
+    ]
     assert max(relative) < 4e-16
 
 
 @pytest.mark.parametrize("exponent", range(60, 300, 5))
 def test_a_zero_next_to_its_pole_is_found_between_very_different_weights(exponent: int) -> None:
-    """0 = 1 + W/(1−δ) − w/δ has δ = w(1−W+…); W is larger than w, so the search begins far from it."""
+    """0 = 1 + W/(1−δ) − w/δ has δ = w(1−W+…); W is larger than w, so the search
+    begins far from it.
+    """
     larger, weight = Decimal(f"1.9e-{exponent - 22}"), Decimal(f"4.8e-{exponent}")
     with Decimals(332) as xp:
         (zero,) = zeros_between_poles(xp.array([1, 2]), xp.array([larger, weight]), 1, xp)
-        assert abs((2 - zero) / weight - 1 + larger) < max(2 * larger**2, Decimal(10) ** (exponent - 332))
+        assert abs((2 - zero) / weight - 1 + larger) < max(
+            2 * larger**2, Decimal(10) ** (exponent - 332)
+        )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_branch_points_start_at_zero_and_alternate_as_cuts_and_gaps(n: int, rng: np.random.Generator) -> None:
+def test_branch_points_start_at_zero_and_alternate_as_cuts_and_gaps(
+    n: int, rng: np.random.Generator
+) -> None:
     curve = curve_of(random_problem(rng, n))
     assert curve.branch_points[0] == 0
     assert np.all(np.diff(curve.branch_points) > 0)
@@ -98,7 +119,9 @@ def test_branch_points_start_at_zero_and_alternate_as_cuts_and_gaps(n: int, rng:
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_the_riemann_matrix_is_symmetric_and_positive_definite(n: int, rng: np.random.Generator) -> None:
+def test_the_riemann_matrix_is_symmetric_and_positive_definite(
+    n: int, rng: np.random.Generator
+) -> None:
     for _ in range(5):
         periods = Periods(curve_of(random_problem(rng, n)))
         assert periods.riemann_matrix_residual < 1e-14
@@ -114,8 +137,14 @@ def nodal_integral(curve: Curve, interval: Interval, k: int) -> Any:
 
         def density(angle: Any) -> Any:
             x = (left + right) / 2 - (right - left) / 2 * mpmath.cos(angle)
-            numerator = mpmath.fprod(x - zero for m, zero in enumerate(zeros) if m != k - 1 or k == curve.genus)
-            rest = mpmath.fprod(abs(x - b) for j, b in enumerate(points) if j not in (interval.left, interval.left + 1))
+            numerator = mpmath.fprod(
+                x - zero for m, zero in enumerate(zeros) if m != k - 1 or k == curve.genus
+            )
+            rest = mpmath.fprod(
+                abs(x - b)
+                for j, b in enumerate(points)
+                if j not in (interval.left, interval.left + 1)
+            )
             return numerator / mpmath.sqrt(rest)
 
         return mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 5))
@@ -159,7 +188,8 @@ def test_bilinear_relations_hold_in_extended_precision() -> None:
 def test_closing_a_gap_costs_its_logarithm(gap: float) -> None:
     periods = Periods(curve_of(near_separatrix(gap).problem()))
     nodes = max(periods.node_count(cut) for cut in periods.cuts)
-    assert nodes < 20 + 9 * np.log10(1 / gap)  # (ln 1/ε)/π per K/K', and K grows by ln(10)/2 per decade
+    # (ln 1/ε)/π per K/K', and K grows by ln(10)/2 per decade
+    assert nodes < 20 + 9 * np.log10(1 / gap)
     assert periods.riemann_matrix_residual < 1e-14
 
 
@@ -175,4 +205,8 @@ def test_distances_are_sums_of_positive_parts(rng: np.random.Generator) -> None:
         assert np.allclose(squares[0], sn**2, atol=1e-13)
         assert np.allclose(squares[1], cn**2, atol=1e-13)
         point = curve.branch_points[cut.left] + below
-        assert np.allclose(cut.to_branch_points(below, above), np.abs(point - curve.branch_points[:, None]), atol=1e-14)
+        assert np.allclose(
+            cut.to_branch_points(below, above),
+            np.abs(point - curve.branch_points[:, None]),
+            atol=1e-14,
+        )

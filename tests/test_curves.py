@@ -1,4 +1,6 @@
-"""Hyperelliptic curves with real branch points: periods, Abel–Jacobi map, Thomae's formula, finite-gap waves."""
+"""Hyperelliptic curves with real branch points: periods, Abel–Jacobi map, Thomae's formula,
+finite-gap waves.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ def test_periods_and_the_riemann_matrix_are_those_of_quadrature(count: int, sign
     ]  # fmt: skip
     for k in range(g):
         for s in range(g):
-            assert abs(curve.periods.a[k, s]) == pytest.approx(abs(float(by_quadrature[k][s])), rel=1e-13)
+            assert abs(curve.periods.a[k, s]) == pytest.approx(
+                abs(float(by_quadrature[k][s])), rel=1e-13
+            )
     T = np.linalg.solve(curve.periods.a, curve.periods.b)
     assert np.max(np.abs(T - curve.riemann_matrix)) <= 1e-12
     assert curve.riemann_matrix_error < 1e-13 * max(1, np.max(np.abs(curve.riemann_matrix)))
@@ -92,7 +96,13 @@ def test_branch_points_map_to_their_half_periods(count: int, sign: int) -> None:
     curve = curves.RealHyperelliptic(points, sign)
     images = curve.abel(points, np.zeros(count))
     for image, (epsilon, delta) in zip(images, curve.characteristics, strict=True):
-        assert off_lattice(image - curve.riemann_matrix @ np.array(epsilon) - np.array(delta), curve.riemann_matrix) < 1e-14
+        assert (
+            off_lattice(
+                image - curve.riemann_matrix @ np.array(epsilon) - np.array(delta),
+                curve.riemann_matrix,
+            )
+            < 1e-14
+        )
 
 
 @pytest.mark.parametrize(("count", "sign"), CASES)
@@ -104,11 +114,19 @@ def test_inversion_undoes_the_map(count: int, sign: int) -> None:
     found, signs = curve.invert(z)
     assert (found >= curve.cuts[:, 0] - 1e-12).all()
     assert (found <= curve.cuts[:, 1] + 1e-12).all()
-    assert np.max(np.abs((curve.torus(found, signs) - z + 0.5) % 1 - 0.5)) < 1e-7  # a point near an end says little of its angle
+    # a point near an end says little of its angle
+    assert np.max(np.abs((curve.torus(found, signs) - z + 0.5) % 1 - 0.5)) < 1e-7
     inner = np.abs(signs).all(axis=1) & (np.min(np.abs(np.sin(np.pi * z)), axis=1) > 0.2)
-    assert np.max(np.abs((curve.torus(found[inner], signs[inner]) - z[inner] + 0.5) % 1 - 0.5)) < 1e-12
+    assert (
+        np.max(np.abs((curve.torus(found[inner], signs[inner]) - z[inner] + 0.5) % 1 - 0.5)) < 1e-12
+    )
     # the same point by the general map
-    lower = [points.index(min(points, key=lambda b, c=cut: abs(b - c[1 if curve._curve.reverses else 0]))) for cut in curve.cuts]
+    lower = [
+        points.index(
+            min(points, key=lambda b, c=cut: abs(b - c[1 if curve._curve.reverses else 0]))
+        )
+        for cut in curve.cuts
+    ]
     base = curve.abel([points[j] for j in lower], np.zeros(curve.genus)).sum(axis=0)
     image = curve.abel(found[0], signs[0]).sum(axis=0) - base
     assert off_lattice(image - z[0], curve.riemann_matrix) < 1e-7
@@ -120,7 +138,9 @@ def test_thomaes_formula_gives_the_theta_constants(count: int, sign: int) -> Non
     constants = theta.theta_constants(curve.riemann_matrix)
     predicted = curve.thomae()
     for constant in predicted:
-        assert abs(constants[constant.characteristic]) ** 4 == pytest.approx(constant.fourth_power, rel=1e-11, abs=1e-13)
+        assert abs(constants[constant.characteristic]) ** 4 == pytest.approx(
+            constant.fourth_power, rel=1e-11, abs=1e-13
+        )
     # The others vanish, for a hyperelliptic curve of genus 3 one even constant among them.
     named = {constant.characteristic for constant in predicted}
     assert max((abs(value) for c, value in constants.items() if c not in named), default=0) < 1e-12
@@ -136,15 +156,21 @@ def test_legendres_relation_holds(count: int, sign: int) -> None:
 
 
 def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
-    """u = −2 ∂_x² log θ(z), z = c_g x + W t, obeys u''' − 6uu' = A u' + B ∂u/∂(c_{g−1}) on the whole torus."""
+    """u = −2 ∂_x² log θ(z), z = c_g x + W t, obeys u''' − 6uu' = A u' + B ∂u/∂(c_{g−1}) on the
+    whole torus.
+    """
     curve = curves.RealHyperelliptic([0, 1, "1.7", 3, "4.5"])
     size = 48
     axis = np.arange(size) / size
     grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
-    values, first, second = (theta.riemann_theta(grid, curve.riemann_matrix, derivatives=k) for k in range(3))
+    values, first, second = (
+        theta.riemann_theta(grid, curve.riemann_matrix, derivatives=k) for k in range(3)
+    )
     along, across = curve.normalized_differentials[:, 1], curve.normalized_differentials[:, 0]
     slope = (first @ along) / values
-    u = (-2 * (np.einsum("nij,i,j->n", second, along, along) / values - slope**2)).real.reshape(size, size)
+    u = (-2 * (np.einsum("nij,i,j->n", second, along, along) / values - slope**2)).real.reshape(
+        size, size
+    )
     k = 2j * np.pi * np.fft.fftfreq(size, 1 / size)
 
     def derivative(direction: Any, order: int) -> Any:
@@ -204,9 +230,15 @@ def test_high_genera_agree_with_quadrature(genus: int) -> None:
         for k in range(genus):
             total = mpmath.mpf(0)
             for s in range(genus):
-                a[k, s] = (-1) ** (genus - s - 1) * quadrature(points, points[2 * s + 1], points[2 * s + 2], k)
-                total += (-1) ** (genus - s + 1) * quadrature(points, points[2 * s], points[2 * s + 1], k)
+                a[k, s] = (-1) ** (genus - s - 1) * quadrature(
+                    points, points[2 * s + 1], points[2 * s + 2], k
+                )
+                total += (-1) ** (genus - s + 1) * quadrature(
+                    points, points[2 * s], points[2 * s + 1], k
+                )
                 b[k, s] = total
         T = mpmath.inverse(a) * b
     found = curve.riemann_matrix.imag
-    assert max(abs(found[i, j] - float(T[i, j])) for i in range(genus) for j in range(genus)) < 1e-13 * np.max(found)
+    assert max(
+        abs(found[i, j] - float(T[i, j])) for i in range(genus) for j in range(genus)
+    ) < 1e-13 * np.max(found)

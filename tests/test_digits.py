@@ -56,7 +56,10 @@ def test_references_are_met_to_their_last_digits(case: Case) -> None:
     for i, point in enumerate(case.points):
         for key in ("q", "q_dot", "frame", "tau1"):
             expected = np.vectorize(Decimal, otypes=[object])(np.array(point[key], dtype=object))
-            assert max(np.abs(np.ravel(found.midpoints[key][i] - expected))) < Decimal("1e-27"), (key, point["t"])
+            assert max(np.abs(np.ravel(found.midpoints[key][i] - expected))) < Decimal("1e-27"), (
+                key,
+                point["t"],
+            )
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
@@ -68,12 +71,17 @@ def test_more_digits_confirm_those_promised(n: int, rng: np.random.Generator) ->
     assert finer is not None
     assert max(found.error) < Decimal("1e-25")
     for name in found.midpoints:
-        assert np.all(np.abs(found.midpoints[name] - finer.midpoints[name]) <= found.radii[name] + finer.radii[name]), name
+        assert np.all(
+            np.abs(found.midpoints[name] - finer.midpoints[name])
+            <= found.radii[name] + finer.radii[name]
+        ), name
 
 
 @pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> None:
-    """Proven radii hold what many more digits give, and the ordinary error is no smaller than what is proven."""
+    """Proven radii hold what many more digits give, and the ordinary error is no smaller than what
+    is proven.
+    """
     problem = random_problem(rng, n)
     times = np.array([-2.0, 0.0, 1.0, 7.0])
     proven = vs.solve(problem, times, certified=True).decimals
@@ -82,10 +90,15 @@ def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> No
     assert finer is not None
     assert proven.certified
     for name in proven.midpoints:
-        assert np.all(np.abs(proven.midpoints[name] - finer.midpoints[name]) <= proven.radii[name] + finer.radii[name]), name
+        assert np.all(
+            np.abs(proven.midpoints[name] - finer.midpoints[name])
+            <= proven.radii[name] + finer.radii[name]
+        ), name
     ordinary = vs.solve(problem, times)
     assert np.all(proven.error.astype(float) < ordinary.error)
-    true_error = np.max(np.abs(ordinary.frame - finer.midpoints["frame"].astype(float)), axis=(1, 2))
+    true_error = np.max(
+        np.abs(ordinary.frame - finer.midpoints["frame"].astype(float)), axis=(1, 2)
+    )
     assert np.all(true_error <= ordinary.error)
 
 
@@ -102,13 +115,19 @@ def test_thirty_digits_at_a_million_million() -> None:
 
 @pytest.mark.parametrize("method", ["theta", "angles"])
 @pytest.mark.parametrize("n", [2, 3])
-def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(n: int, method: str, rng: np.random.Generator) -> None:
-    """Which cell of the torus a phase is in decides signs, and doubles do not tell those of 10²⁰ apart."""
+def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(
+    n: int, method: str, rng: np.random.Generator
+) -> None:
+    """Which cell of the torus a phase is in decides signs, and doubles do not tell those of 10²⁰
+    apart.
+    """
     body = random_problem(rng, n)
     there = vs.solve(body, ["1e20"], digits=42, method=method).decimals
     assert there is not None
     state = (list(map(str, there.midpoints[series][0])) for series in ("q", "q_dot"))
-    back = vs.solve(vs.Veselova(body.A, *state, normalize=True), ["-1e20"], digits=20, method=method).decimals
+    back = vs.solve(
+        vs.Veselova(body.A, *state, normalize=True), ["-1e20"], digits=20, method=method
+    ).decimals
     start = vs.solve(body, [0], digits=20).decimals
     assert back is not None
     assert start is not None
@@ -118,7 +137,9 @@ def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(n: int, m
 
 @pytest.mark.parametrize("time", [1e9, 1e17, 1e25])
 @pytest.mark.parametrize("n", [2, 3])
-def test_doubles_far_out_are_as_near_to_many_digits_as_they_say(n: int, time: float, rng: np.random.Generator) -> None:
+def test_doubles_far_out_are_as_near_to_many_digits_as_they_say(
+    n: int, time: float, rng: np.random.Generator
+) -> None:
     body = random_problem(rng, n)
     found, finer = vs.solve(body, [time]), vs.solve(body, [time], digits=20)
     assert np.max(np.abs(found.frame - finer.frame)) <= found.error[0] < 1e-2
@@ -127,7 +148,10 @@ def test_doubles_far_out_are_as_near_to_many_digits_as_they_say(n: int, time: fl
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_theta_functions_and_angles_agree_in_balls(n: int, rng: np.random.Generator) -> None:
     problem = random_problem(rng, n)
-    by_theta, by_angles = (vs.solve(problem, [-1, 3], digits=30, method=method).decimals for method in ("theta", "angles"))
+    by_theta, by_angles = (
+        vs.solve(problem, [-1, 3], digits=30, method=method).decimals
+        for method in ("theta", "angles")
+    )
     assert by_theta is not None
     assert by_angles is not None
     for name in ("frame", "q_dot", "spheroconic", "tau1"):
@@ -135,10 +159,18 @@ def test_theta_functions_and_angles_agree_in_balls(n: int, rng: np.random.Genera
 
 
 def test_a_separatrix_has_all_digits_of_exact_data() -> None:
-    """A great circle about the middle axis, and the umbilic motion that leaves it: c_2 = I_2 exactly."""
-    umbilic = vs.Veselova(["3", "2", "1"], ["0.6", "0", "0.8"], ["0.8", "0.5", "-0.6"], normalize=True)
+    """A great circle about the middle axis, and the umbilic motion that leaves it: c_2 = I_2
+    exactly.
+    """
+    umbilic = vs.Veselova(
+        ["3", "2", "1"], ["0.6", "0", "0.8"], ["0.8", "0.5", "-0.6"], normalize=True
+    )
     near = vs.Veselova(["3", "2", "1"], ["0", "1", "0"], ["0.6", "1e-30", "0.8"], normalize=True)
-    for problem in (umbilic, near, vs.Veselova(["3", "2", "1"], ["0", "1", "0"], ["0.6", "0", "0.8"])):
+    for problem in (
+        umbilic,
+        near,
+        vs.Veselova(["3", "2", "1"], ["0", "1", "0"], ["0.6", "0", "0.8"]),
+    ):
         found, finer = (vs.solve(problem, [-2, 5], digits=digits).decimals for digits in (20, 30))
         assert found is not None
         assert finer is not None
@@ -155,12 +187,19 @@ def test_many_digits_reach_far_next_to_a_separatrix() -> None:
     soon = vs.solve(near, [50], digits=22)
     assert soon.provenance.details["time_map"] == "panels"
     assert soon.decimals is not None
-    assert np.max(np.abs(soon.decimals.midpoints["frame"][0] - finer.decimals.midpoints["frame"][0])) < 1e-21
+    assert (
+        np.max(np.abs(soon.decimals.midpoints["frame"][0] - finer.decimals.midpoints["frame"][0]))
+        < 1e-21
+    )
 
 
 def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
     with pytest.raises(vs.Unsolved) as caught:
-        vs.solve(vs.Veselova([5, 4, 3, 2, 1], [1] * 5, [1, -2, 3, -4, 2], normalize=True), [1e6], digits=30)
+        vs.solve(
+            vs.Veselova([5, 4, 3, 2, 1], [1] * 5, [1, -2, 3, -4, 2], normalize=True),
+            [1e6],
+            digits=30,
+        )
     assert caught.value.outcome == "too-far"
 
 
@@ -168,7 +207,9 @@ def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
     solution = SolutionInBalls(Solution(body3()), 45, False, "angles")
-    near = vs.solve(body3(), [20]).tau1 / float(solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit)))
+    near = vs.solve(body3(), [20]).tau1 / float(
+        solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit))
+    )
     with solution.arithmetic as xp:
         times = xp.array([20])
         by_panels = ChebyshevTimeMapInBalls(solution.orbit, near, False).tau1(times, near)
@@ -183,7 +224,9 @@ def test_strings_are_taken_exactly_and_doubles_as_what_they_store() -> None:
     exact = vs.Veselova(["3", "2", "1.2"], ["0.6", "0", "0.8"], ["0.4", "0.7", "-0.3"])
     doubles = vs.Veselova([3, 2, 1.2], [0.6, 0, 0.8], [0.4, 0.7, -0.3])
     same_doubles = vs.Veselova([3, 2, Fraction(1.2)], [Fraction(0.6), 0, 0.8], [0.4, 0.7, -0.3])
-    one, two, three = (vs.solve(p, ["0.1"], digits=30).decimals for p in (exact, doubles, same_doubles))
+    one, two, three = (
+        vs.solve(p, ["0.1"], digits=30).decimals for p in (exact, doubles, same_doubles)
+    )
     assert one is not None
     assert two is not None
     assert three is not None
@@ -198,7 +241,9 @@ def test_times_in_an_array_are_taken_as_exactly_as_in_a_list(server: Server) -> 
     assert TimeGrid.of(np.array([0.1])).exact == (Fraction(0.1),)
     with vs.Client(server.url) as client:
         answers = [
-            solve(body3(), given, digits=25).decimals for solve in (vs.solve, client.trajectory) for given in (times, list(times))
+            solve(body3(), given, digits=25).decimals
+            for solve in (vs.solve, client.trajectory)
+            for given in (times, list(times))
         ]
     first = answers[0]
     assert first is not None
@@ -225,7 +270,9 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     assert finer.decimals is not None
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-25
     ordinary = vs.solve(problem, [0, 3 * unit])
-    assert np.all(np.max(np.abs(ordinary.frame - found.frame), axis=(1, 2)) <= ordinary.error + found.error)
+    assert np.all(
+        np.max(np.abs(ordinary.frame - found.frame), axis=(1, 2)) <= ordinary.error + found.error
+    )
 
 
 def test_a_frame_given_to_many_digits_is_made_orthogonal_to_all_of_them() -> None:
@@ -248,7 +295,9 @@ def test_the_rate_of_the_clock_is_one_theta_quotient(n: int, rng: np.random.Gene
 
 
 def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> None:
-    """At the edge of the strip, |Im v| = K'/2, the forms are evaluated with mpmath's elliptic functions."""
+    """At the edge of the strip, |Im v| = K'/2, the forms are evaluated with mpmath's elliptic
+    functions.
+    """
     with balls(20) as xp:
         found = resolve_spectrum(moving_part(random_problem(rng, 4)), 20)
         curve = Curve.of(enclose_spectrum(found), xp)
@@ -258,24 +307,38 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
             k = mpmath.sqrt(mpmath.mpf(float(interval.jacobi.k_squared)))
             v_edge = mpmath.mpc(0, float(interval.jacobi.conjugate_quarter) / 2)
             points = [float(x) for x in curve.branch_points]
-            width, before = points[left + 1] - points[left], points[left] - points[left - 1] if left else None
+            width, before = (
+                points[left + 1] - points[left],
+                points[left] - points[left - 1] if left else None,
+            )
             largest = np.zeros(curve.genus)
             for step in range(24):
                 sn = mpmath.ellipfun("sn", float(interval.jacobi.quarter) * step / 12 + v_edge, k=k)
                 square = complex(sn * sn)
-                below = width * square if before is None else width * before * square / (before + width * (1 - square))
+                below = (
+                    width * square
+                    if before is None
+                    else width * before * square / (before + width * (1 - square))
+                )
                 point = points[left] + below
                 far = [p for i, p in enumerate(points) if not left - 1 <= i <= left + 2]
-                density = float(interval.points.density) / abs(np.prod([point - p for p in far])) ** 0.5
+                density = (
+                    float(interval.points.density) / abs(np.prod([point - p for p in far])) ** 0.5
+                )
                 zeros = [(points[j] + points[j + 1]) / 2 for j in range(2, 2 * curve.genus, 2)]
-                forms = [np.prod([point - z for i, z in enumerate(zeros) if i != l]) for l in range(len(zeros) + 1)]
+                forms = [
+                    np.prod([point - z for i, z in enumerate(zeros) if i != l])
+                    for l in range(len(zeros) + 1)
+                ]
                 largest = np.maximum(largest, density * np.abs(forms))
             assert np.all(largest <= np.array(bound) * (1 + 1e-9))
             assert np.all(largest > 0.05 * np.array(bound))
 
 
 def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -> None:
-    """Taylor coefficients of dt/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
+    """Taylor coefficients of dt/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!|
+    ≤ M y^(−k).
+    """
     for n in (3, 5):
         solution = SolutionInBalls(Solution(random_problem(rng, n)), 50, True, "angles")
         with solution.arithmetic as xp:
@@ -285,7 +348,9 @@ def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -
             values = solution.orbit.rates(step * xp.array(list(range(count))))
             for k in range(1, count):
                 values = np.diff(values)
-                assert abs(float(values[0])) <= float(step) ** k * float(largest) * width**-k * float(mpmath.factorial(k))
+                assert abs(float(values[0])) <= float(step) ** k * float(
+                    largest
+                ) * width**-k * float(mpmath.factorial(k))
 
 
 def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generator) -> None:
@@ -319,7 +384,9 @@ def test_a_process_that_traps_what_is_inexact_gets_the_same_answers() -> None:
 
 @pytest.mark.parametrize("time", ["1e-8", "-1e-9", "1e-16", "1e-20", "-1e-30", "1e-300"])
 @pytest.mark.parametrize("options", [{}, {"method": "angles"}, {"certified": True}], ids=str)
-def test_times_below_the_rounding_of_a_clock_in_doubles_are_served(time: str, options: dict[str, Any]) -> None:
+def test_times_below_the_rounding_of_a_clock_in_doubles_are_served(
+    time: str, options: dict[str, Any]
+) -> None:
     """Near t = 0 the frame is e_1 + t q̇ …, and τ₁ = t dτ₁/dt: both to second order."""
     late, first = (made(vs.solve(body3(), [at], digits=40, **options)) for at in (time, 0))
     rate = Decimal(float(np.linalg.norm(body3().q_dot) / np.linalg.norm(body3().neumann().q_prime)))
@@ -327,14 +394,20 @@ def test_times_below_the_rounding_of_a_clock_in_doubles_are_served(time: str, op
     with localcontext(Context(prec=60)):
         ahead = late.midpoints["q"] - first.midpoints["q"] - t * first.midpoints["q_dot"]
         assert np.max(np.abs(ahead)) <= 10 * t * t + Decimal("1e-39")
-        assert abs(late.midpoints["tau1"][0] - t * rate) <= 10 * abs(t) * (abs(t) + Decimal("1e-15")) + Decimal("1e-39")
+        assert abs(late.midpoints["tau1"][0] - t * rate) <= 10 * abs(t) * (
+            abs(t) + Decimal("1e-15")
+        ) + Decimal("1e-39")
     assert max(late.error) <= Decimal("1e-40")
 
 
 def made(trajectory: vs.Trajectory) -> Decimals:
     """The decimals of a trajectory, all of them made: that is done when they are asked for."""
     assert trajectory.decimals is not None
-    return replace(trajectory.decimals, midpoints=dict(trajectory.decimals.midpoints), radii=dict(trajectory.decimals.radii))
+    return replace(
+        trajectory.decimals,
+        midpoints=dict(trajectory.decimals.midpoints),
+        radii=dict(trajectory.decimals.radii),
+    )
 
 
 def assert_same(found: Decimals, expected: Decimals) -> None:
@@ -345,7 +418,9 @@ def assert_same(found: Decimals, expected: Decimals) -> None:
 
 
 def test_decimals_made_later_are_those_made_at_once() -> None:
-    """Whatever became of Arb's global precision, in pickles too, and doubles are the nearest to them."""
+    """Whatever became of Arb's global precision, in pickles too, and doubles are the nearest to
+    them.
+    """
     trajectory = vs.solve(body3(), [-1, 0, 2], digits=40)
     assert trajectory.decimals is not None
     assert "omega" in trajectory.decimals.radii
@@ -389,7 +464,9 @@ def test_decimals_turn_into_numbers_of_both_libraries() -> None:
         ({"digits": 20, "method": "nufft"}, "method"),
     ],
 )
-def test_precision_that_an_engine_has_not_is_refused_by_name(options: dict[str, Any], field: str) -> None:
+def test_precision_that_an_engine_has_not_is_refused_by_name(
+    options: dict[str, Any], field: str
+) -> None:
     with pytest.raises(vs.InvalidInput) as caught:
         vs.solve(body3(), [1], **options)
     assert caught.value.field == field
@@ -406,14 +483,20 @@ def test_a_matrix_of_inertia_has_the_digits_of_its_axes() -> None:
 @pytest.mark.parametrize("A", [["3", "2", "1"], ["2", "2", "1"], ["2", "2", "2"]], ids=str)
 def test_a_body_at_rest_keeps_the_frame_that_it_was_given(A: list[str]) -> None:
     frame = [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]]
-    found = vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0], frame), [-1, "1e9"], digits=30, certified=True)
+    found = vs.solve(
+        vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0], frame), [-1, "1e9"], digits=30, certified=True
+    )
     assert found.decimals is not None
     assert np.all(found.decimals.midpoints["frame"] == np.vectorize(Decimal)(frame))
     assert not found.tau1.any()
     assert not found.q_dot.any()
     # Between the poles 1/A the λ of q = (0.6, 0, 0.8) is 0.64/A_1 + 0.36/A_3.
-    exact = sorted([Fraction(16, 25) / Fraction(A[0]) + Fraction(9, 25) / Fraction(A[2]), 1 / Fraction(A[1])])
-    for middle, radius, expected in zip(*(x["spheroconic"][1] for x in (found.decimals.midpoints, found.decimals.radii)), exact):
+    exact = sorted(
+        [Fraction(16, 25) / Fraction(A[0]) + Fraction(9, 25) / Fraction(A[2]), 1 / Fraction(A[1])]
+    )
+    for middle, radius, expected in zip(
+        *(x["spheroconic"][1] for x in (found.decimals.midpoints, found.decimals.radii)), exact
+    ):
         assert abs(Fraction(middle) - expected) <= Fraction(radius) < Fraction(1, 10**30)
     with pytest.raises(vs.Unsolved, match="natural frame"):
         vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0]), [1], digits=30)
@@ -443,7 +526,9 @@ def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
 
 def test_the_service_answers_in_decimals(server: Server) -> None:
     with vs.Client(server.url) as client:
-        answer = client.trajectory(body3(), ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S)
+        answer = client.trajectory(
+            body3(), ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S
+        )
     here = vs.solve(body3(), ["0.1", 2], digits=40, certified=True)
     assert answer.decimals is not None
     assert here.decimals is not None

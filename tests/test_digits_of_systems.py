@@ -1,4 +1,6 @@
-"""Many digits and certified errors of Neumann's system and of geodesics: the same chain under another time."""
+"""Many digits and certified errors of Neumann's system and of geodesics: the same chain under
+another time.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +31,15 @@ POINTS = {
     2: (["3", "1"], ["3/5", "4/5"], ["-4/5", "3/5"]),
     3: (["2", "1", "1/2"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
     4: (["3", "2", "3/2", "1"], ["1/2", "1/2", "1/2", "1/2"], ["1", "-1/3", "0", "-2/3"]),
-    5: (["5", "3", "2", "3/2", "1"], ["1/4", "1/2", "1/4", "3/4", "1/4"], ["1", "1/2", "-1", "-1/3", "0"]),
+    5: (
+        ["5", "3", "2", "3/2", "1"],
+        ["1/4", "1/2", "1/4", "3/4", "1/4"],
+        ["1", "1/2", "-1", "-1/3", "0"],
+    ),
 }
 
-#: An umbilic point: X_1² = A_1(A_1−A_2)/(A_1−A_3), X_3² = A_3(A_2−A_3)/(A_1−A_3), to the last digit.
+#: An umbilic point: X_1² = A_1(A_1−A_2)/(A_1−A_3), X_3² = A_3(A_2−A_3)/(A_1−A_3), to the last
+#: digit.
 UMBILIC = (["1.69", "1.1716", "0.25"], ["0.78", "0", "0.4"])
 
 
@@ -56,7 +63,10 @@ def start_of(problem: vs.EllipsoidGeodesic, digits: int) -> tuple[list[Any], lis
     """Return X and X_dot at s = 0 from the exact data, on the ellipsoid to so many digits."""
     with mpmath.workdps(digits + 15):
         exact = problem.exact
-        A, q, tangent = ([mpmath.mpf(x.numerator) / x.denominator for x in row] for row in (exact.A, exact.q, exact.tangent))
+        A, q, tangent = (
+            [mpmath.mpf(x.numerator) / x.denominator for x in row]
+            for row in (exact.A, exact.q, exact.tangent)
+        )
         norm = mpmath.sqrt(mpmath.fdot(q, q))
         root = mpmath.sqrt(sum(a * x * x for a, x in zip(A, q, strict=True))) / norm
         X = [a * x / norm / root for a, x in zip(A, q, strict=True)]
@@ -69,11 +79,17 @@ def start_of(problem: vs.EllipsoidGeodesic, digits: int) -> tuple[list[Any], lis
 
 
 def agree(found: Decimals, name: str, row: int, truth: Sequence[Any], digits: int) -> None:
-    """Hold decimals against numbers of mpmath: within their radii, which have the digits that were asked for."""
+    """Hold decimals against numbers of mpmath: within their radii, which have the digits that were
+    asked for.
+    """
     with mpmath.workdps(digits + 20):
-        for x, radius, expected in zip(found.midpoints[name][row], found.radii[name][row], truth, strict=True):
+        for x, radius, expected in zip(
+            found.midpoints[name][row], found.radii[name][row], truth, strict=True
+        ):
             assert radius < Decimal(10) ** -(digits - 2), (name, row)
-            assert abs(mpmath.mpf(str(x)) - expected) <= mpmath.mpf(str(radius)) + mpmath.mpf(10) ** -(digits + 8), (name, row)
+            assert abs(mpmath.mpf(str(x)) - expected) <= mpmath.mpf(str(radius)) + mpmath.mpf(
+                10
+            ) ** -(digits + 8), (name, row)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
@@ -103,7 +119,9 @@ def test_a_geodesic_has_fifty_digits(n: int) -> None:
 @pytest.mark.parametrize("system", [neumann, geodesic])
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_frames_of_decimals_are_eigenvectors(n: int, system: Any) -> None:
-    """(A⁻¹ − q'q'ᵀ) n_k is c_k n_k but for a multiple of q, and signs are those of the answer in doubles."""
+    """(A⁻¹ − q'q'ᵀ) n_k is c_k n_k but for a multiple of q, and signs are those of the answer in
+    doubles.
+    """
     problem = system(n)
     found, ordinary = decimals(problem, [2], digits=40), vs.solve(problem, [2])
     with mpmath.workdps(60):
@@ -111,14 +129,18 @@ def test_frames_of_decimals_are_eigenvectors(n: int, system: Any) -> None:
         assert mpmath.norm(frame.T * frame - mpmath.eye(n), 1) < mpmath.mpf("1e-39")
         if system is neumann:
             velocity = mpmath.matrix(np.vectorize(str)(found.midpoints["q_prime"][0]).tolist())
-            inverse = mpmath.diag([1 / (mpmath.mpf(a.numerator) / a.denominator) for a in problem.exact.A])
+            inverse = mpmath.diag(
+                [1 / (mpmath.mpf(a.numerator) / a.denominator) for a in problem.exact.A]
+            )
             across = frame[:, 1:].T * (inverse - velocity * velocity.T) * frame[:, 1:]
             rest = [abs(across[i, j]) for i in range(n - 1) for j in range(n - 1) if i != j]
             assert max(rest, default=0) < mpmath.mpf("1e-38")
     assert np.max(np.abs(found.midpoints["frame"].astype(float) - ordinary.frame)) < 1e-12
 
 
-@pytest.mark.parametrize("problem", [neumann(2), neumann(3, "2"), neumann(4), geodesic(2), geodesic(3)], ids=repr)
+@pytest.mark.parametrize(
+    "problem", [neumann(2), neumann(3, "2"), neumann(4), geodesic(2), geodesic(3)], ids=repr
+)
 def test_certified_radii_hold_the_motion(problem: Any) -> None:
     times = ["-2", 0, "1", "6"]
     proven, finer = decimals(problem, times, certified=True), decimals(problem, times, digits=40)
@@ -126,30 +148,45 @@ def test_certified_radii_hold_the_motion(problem: Any) -> None:
     assert proven.certified
     assert max(proven.error) < Decimal("1e-15")
     for name in problem.outputs:
-        assert np.all(np.abs(proven.midpoints[name] - finer.midpoints[name]) <= proven.radii[name] + finer.radii[name]), name
-        assert np.allclose(ordinary.series(name), finer.midpoints[name].astype(float), atol=1e-11, rtol=1e-11), name
+        assert np.all(
+            np.abs(proven.midpoints[name] - finer.midpoints[name])
+            <= proven.radii[name] + finer.radii[name]
+        ), name
+        assert np.allclose(
+            ordinary.series(name), finer.midpoints[name].astype(float), atol=1e-11, rtol=1e-11
+        ), name
 
 
 EQUAL = [
     vs.NeumannSystem(["2", "2", "1"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
     vs.NeumannSystem(["2", "1", "1/2"], ["3/5", "0", "4/5"], ["-4/5", "0", "3/5"]),
-    vs.NeumannSystem(["2", "2", "2", "1"], ["1/2", "1/2", "1/2", "1/2"], ["1", "-1/3", "0", "-2/3"]),
+    vs.NeumannSystem(
+        ["2", "2", "2", "1"], ["1/2", "1/2", "1/2", "1/2"], ["1", "-1/3", "0", "-2/3"]
+    ),
     vs.NeumannSystem(["2", "2", "2"], ["2/3", "1/3", "2/3"], ["1", "2", "-2"]),
     vs.EllipsoidGeodesic(["2", "2", "1"], ["2", "1", "2"], ["1", "2", "-2"], normalize=True),
     vs.EllipsoidGeodesic(["3", "2", "1"], ["1", "0", "1"], ["1", "0", "-2"], normalize=True),
-    vs.EllipsoidGeodesic(["3", "3", "2", "1"], ["1", "1", "0", "1"], ["1", "2", "0", "-2"], normalize=True),
+    vs.EllipsoidGeodesic(
+        ["3", "3", "2", "1"], ["1", "1", "0", "1"], ["1", "2", "0", "-2"], normalize=True
+    ),
 ]
 
 
-@pytest.mark.parametrize("problem", EQUAL, ids=lambda p: f"{p.system}-{'-'.join(map(str, p.given['A']))}")
+@pytest.mark.parametrize(
+    "problem", EQUAL, ids=lambda p: f"{p.system}-{'-'.join(map(str, p.given['A']))}"
+)
 @pytest.mark.parametrize("options", [{"digits": 40}, {"digits": 20, "certified": True}])
-def test_equal_axes_and_resting_directions_have_all_digits(problem: Any, options: dict[str, Any]) -> None:
+def test_equal_axes_and_resting_directions_have_all_digits(
+    problem: Any, options: dict[str, Any]
+) -> None:
     found = decimals(problem, ["-1", "1.5"], **options)
     digits = options["digits"]
     for row, t in enumerate((Fraction(-1), Fraction("1.5"))):
         if problem.system == "neumann":
             start = [[Fraction(x) for x in problem.given[name]] for name in ("q", "q_prime")]
-            truth = dict(zip(("q", "q_prime"), neumann_at(problem.exact.A, *start, t, digits), strict=True))
+            truth = dict(
+                zip(("q", "q_prime"), neumann_at(problem.exact.A, *start, t, digits), strict=True)
+            )
         else:
             position = geodesic_at(problem.exact.A, *start_of(problem, digits), t, digits)
             truth = dict(zip(("X", "X_dot"), position, strict=True))
@@ -158,7 +195,9 @@ def test_equal_axes_and_resting_directions_have_all_digits(problem: Any, options
 
 
 def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
-    """Its neighbours leave it like e^s, and it runs through the opposite umbilic point again and again."""
+    """Its neighbours leave it like e^s, and it runs through the opposite umbilic point again and
+    again.
+    """
     problem = vs.EllipsoidGeodesic(*UMBILIC, ["0.4", "1", "-0.3"], normalize=True)
     found = vs.solve(problem, ["-2", "10"], digits=34)
     assert found.provenance.details["regime"] == "separatrix"
@@ -172,7 +211,9 @@ def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
 
 @pytest.mark.parametrize("time", ["1", "50", "120", "250", "400"])
 def test_a_separatrix_dwells_at_its_equilibrium_for_ever(time: str) -> None:
-    """q = (sech t, tanh t). Neighbours that have fallen back dwell at the other one, both of them at the same times."""
+    """q = (sech t, tanh t). Neighbours that have fallen back dwell at the other one, both of them
+    at the same times.
+    """
     found = decimals(vs.NeumannSystem(["1", "1/2"], ["1", "0"], ["0", "1"]), [time], digits=30)
     with mpmath.workdps(60):
         agree(found, "q", 0, [mpmath.sech(mpmath.mpf(time)), mpmath.tanh(mpmath.mpf(time))], 30)
@@ -184,16 +225,28 @@ def test_a_separatrix_too_far_for_its_bound_is_refused() -> None:
     assert refused.value.outcome == "too-far"
 
 
-@pytest.mark.parametrize("problem", [neumann(2), neumann(3), neumann(5), geodesic(2), geodesic(3)], ids=repr)
+@pytest.mark.parametrize(
+    "problem", [neumann(2), neumann(3), neumann(5), geodesic(2), geodesic(3)], ids=repr
+)
 def test_thirty_digits_at_a_million_million(problem: Any) -> None:
     """Digits beyond those asked for change nothing, and doubles are as near as they say."""
     times = ["1e12"]
-    found, finer, ordinary = decimals(problem, times, digits=30), decimals(problem, times, digits=40), vs.solve(problem, [1e12])
+    found, finer, ordinary = (
+        decimals(problem, times, digits=30),
+        decimals(problem, times, digits=40),
+        vs.solve(problem, [1e12]),
+    )
     assert max(found.error) < Decimal("1e-30")
     for name in problem.outputs:
-        assert np.all(np.abs(found.midpoints[name] - finer.midpoints[name]) <= found.radii[name] + finer.radii[name]), name
+        assert np.all(
+            np.abs(found.midpoints[name] - finer.midpoints[name])
+            <= found.radii[name] + finer.radii[name]
+        ), name
     for name in problem.bounded:
-        assert np.max(np.abs(ordinary.series(name) - finer.midpoints[name].astype(float))) <= ordinary.error[0] + 1e-16, name
+        assert (
+            np.max(np.abs(ordinary.series(name) - finer.midpoints[name].astype(float)))
+            <= ordinary.error[0] + 1e-16
+        ), name
 
 
 def test_neumanns_point_comes_back_from_a_million_million() -> None:
@@ -201,16 +254,20 @@ def test_neumanns_point_comes_back_from_a_million_million() -> None:
     there = decimals(problem, ["1e12"], digits=45)
     state = (list(map(str, there.midpoints[name][0])) for name in ("q", "q_prime"))
     back = decimals(vs.NeumannSystem(POINTS[3][0], *state, normalize=True), ["-1e12"], digits=25)
-    assert max(abs(x - Decimal(y.numerator) / y.denominator) for x, y in zip(back.midpoints["q"][0], problem.exact.q)) < Decimal(
-        "1e-24"
-    )
+    assert max(
+        abs(x - Decimal(y.numerator) / y.denominator)
+        for x, y in zip(back.midpoints["q"][0], problem.exact.q)
+    ) < Decimal("1e-24")
 
 
 @pytest.mark.parametrize("count", [400])
 def test_many_times_come_from_windows(count: int) -> None:
     for problem in (neumann(3), geodesic(3)):
         times = [str(Fraction(i, 20)) for i in range(count)]
-        found, single = decimals(problem, times, digits=30), decimals(problem, times[-3:], digits=40)
+        found, single = (
+            decimals(problem, times, digits=30),
+            decimals(problem, times[-3:], digits=40),
+        )
         for name in problem.outputs:
             apart = np.abs(found.midpoints[name][-3:] - single.midpoints[name])
             assert np.all(apart <= found.radii[name][-3:] + single.radii[name]), name
@@ -218,9 +275,15 @@ def test_many_times_come_from_windows(count: int) -> None:
 
 @pytest.mark.parametrize("q", [["0", "1", "0"], ["3/5", "4/5", "0"]])
 def test_a_resting_point_keeps_its_frame(q: list[str]) -> None:
-    found = decimals(vs.NeumannSystem(["2", "2", "1"], q, ["0", "0", "0"]), ["-1", "5"], digits=40, certified=True)
+    found = decimals(
+        vs.NeumannSystem(["2", "2", "1"], q, ["0", "0", "0"]),
+        ["-1", "5"],
+        digits=40,
+        certified=True,
+    )
     assert (
-        found.strings("q") == [[str(Decimal(x.numerator) / x.denominator) for x in map(Fraction, q)]] * 2
+        found.strings("q")
+        == [[str(Decimal(x.numerator) / x.denominator) for x in map(Fraction, q)]] * 2
         or max(found.error) < 1e-40
     )
     for at_time in found.midpoints["frame"]:
@@ -243,7 +306,11 @@ def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) ->
     stream.seek(0)
     document = trajectory_of(problem, orjson.loads(encode(trajectory_document(trajectory))))
     archive = Trajectory.from_arrays(problem, np.load(stream))
-    for found in (document.decimals, archive.decimals, pickle.loads(pickle.dumps(trajectory)).decimals):
+    for found in (
+        document.decimals,
+        archive.decimals,
+        pickle.loads(pickle.dumps(trajectory)).decimals,
+    ):
         assert found is not None
         for name in problem.stored:
             assert np.all(found.midpoints[name] == expected.midpoints[name]), name
@@ -257,7 +324,9 @@ def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) ->
 @pytest.mark.parametrize("problem", [neumann(3), geodesic(3)], ids=repr)
 def test_the_service_answers_in_decimals(server: Server, problem: Any) -> None:
     with vs.Client(server.url) as client:
-        answer = client.trajectory(problem, ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S)
+        answer = client.trajectory(
+            problem, ["0.1", 2], digits=40, certified=True, budget_s=BUDGET_S
+        )
     here = decimals(problem, ["0.1", 2], digits=40, certified=True)
     assert answer.decimals is not None
     assert answer.decimals.certified
@@ -269,7 +338,11 @@ def test_the_command_line_answers_in_decimals() -> None:
     import json
 
     A, q, v = POINTS[3]
-    request = {"problem": {"system": "neumann", "A": A, "q": q, "q_prime": v}, "times": ["1/3"], "digits": 40}
+    request = {
+        "problem": {"system": "neumann", "A": A, "q": q, "q_prime": v},
+        "times": ["1/3"],
+        "digits": 40,
+    }
     answer = run("solve", "-", "--json", stdin=json.dumps(request).encode())
     assert answer.returncode == 0, answer.stderr
     document = json.loads(answer.stdout)
@@ -279,7 +352,9 @@ def test_the_command_line_answers_in_decimals() -> None:
 
 
 def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
-    """Taylor coefficients of ds/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!| ≤ M y^(−k)."""
+    """Taylor coefficients of ds/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!|
+    ≤ M y^(−k).
+    """
     for n in (3, 5):
         solution = SolutionInBalls(Solution(geodesic(n)), 50, True, "angles")
         with solution.arithmetic as xp:
@@ -289,4 +364,6 @@ def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
             assert np.max(values.astype(float)) <= float(largest)
             for k in range(1, 9):
                 values = np.diff(values)
-                assert abs(float(values[0])) <= float(step) ** k * float(largest) * width**-k * float(mpmath.factorial(k))
+                assert abs(float(values[0])) <= float(step) ** k * float(
+                    largest
+                ) * width**-k * float(mpmath.factorial(k))

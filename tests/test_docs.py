@@ -24,7 +24,9 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_python_of_the_readme_runs(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_of_the_readme_runs(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     scope: dict[str, Any] = {}
     sources = blocks(README, "python")
@@ -42,14 +44,22 @@ def test_the_python_of_the_readme_runs(server: Server, tmp_path: Path, monkeypat
 COMMANDS = next(block for block in blocks(README, "sh") if "veselova demo" in block).splitlines()
 
 
-@pytest.mark.parametrize("command", [slow(line) if "bench" in line else line for line in COMMANDS[:-1]])
+@pytest.mark.parametrize(
+    "command", [slow(line) if "bench" in line else line for line in COMMANDS[:-1]]
+)
 def test_the_commands_of_the_readme_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     assert COMMANDS[-1] == "veselova serve"
     words = shlex.split(command)
     assert words[0] == "veselova"
-    answer = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, timeout=PATIENCE, env=environment)
+    answer = subprocess.run(
+        [sys.executable, "-m", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        timeout=PATIENCE,
+        env=environment,
+    )
     assert answer.returncode == 0, answer.stderr
     for option in ("--plot", "--output"):
         if option in words:
@@ -59,7 +69,9 @@ def test_the_commands_of_the_readme_run(command: str, tmp_path: Path) -> None:
 def test_the_request_of_the_readme_is_answered(server: Server) -> None:
     body = re.search(r"-d '(\{.*?\})'$", README, re.MULTILINE | re.DOTALL)
     assert body
-    response = server.ask("POST", "/v1/trajectories", content=body[1], headers={"content-type": "application/json"})
+    response = server.ask(
+        "POST", "/v1/trajectories", content=body[1], headers={"content-type": "application/json"}
+    )
     assert response.status_code == 200
     assert list(response.json()["series"]) == ["q", "frame"]
 
@@ -102,7 +114,9 @@ def test_no_lock_file_names_an_address() -> None:
     for lock in ROOT.glob("requirements*.lock"):
         text = lock.read_text()
         assert "://" not in text
-        assert all("==" in line for line in text.splitlines() if line and not line.startswith((" ", "#")))
+        assert all(
+            "==" in line for line in text.splitlines() if line and not line.startswith((" ", "#"))
+        )
 
 
 def test_continuous_integration_runs_the_check_of_the_readme() -> None:

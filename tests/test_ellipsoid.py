@@ -1,4 +1,6 @@
-"""Geodesics on ellipsoids: closed form, two integrations and binary128; Chasles' and Moser's theorems."""
+"""Geodesics on ellipsoids: closed form, two integrations and binary128; Chasles' and Moser's
+theorems.
+"""
 
 from __future__ import annotations
 
@@ -38,12 +40,16 @@ def drawn(rng: Generator, n: int, ratio: float = 4.0) -> EllipsoidGeodesic:
 
 def true_error(problem: EllipsoidGeodesic, arcs: Any, **options: Any) -> tuple[Any, Any]:
     found, (X, V) = solve(problem, arcs, **options), true_geodesic(problem, arcs)
-    return np.maximum(np.max(np.abs(found.X - X), axis=1), np.max(np.abs(found.X_dot - V), axis=1)), found.error
+    return np.maximum(
+        np.max(np.abs(found.X - X), axis=1), np.max(np.abs(found.X_dot - V), axis=1)
+    ), found.error
 
 
 @pytest.mark.parametrize("n", range(2, 7))
 @pytest.mark.parametrize("method", ["theta", "products", "nufft", "angles"])
-def test_theta_functions_follow_geodesics_to_twelve_digits(n: int, method: str, rng: Generator) -> None:
+def test_theta_functions_follow_geodesics_to_twelve_digits(
+    n: int, method: str, rng: Generator
+) -> None:
     arcs = np.array([-20.0, -3.0, 0.0, 0.1, 7.0, 20.0])
     for _ in range(2):
         error, reported = true_error(drawn(rng, n), arcs, method=method)
@@ -72,7 +78,9 @@ def test_far_along_a_geodesic_errors_grow_as_rounding_does(n: int, rng: Generato
 @pytest.mark.parametrize("n", [2, 3, *map(slow, range(4, 7))])
 @pytest.mark.parametrize("formulation", ["geodesic", "gauss"])
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
-def test_both_integrations_agree_with_the_closed_form(formulation: str, method: str, n: int, rng: Generator) -> None:
+def test_both_integrations_agree_with_the_closed_form(
+    formulation: str, method: str, n: int, rng: Generator
+) -> None:
     problem, arcs = drawn(rng, n), np.array([-4.0, 2.0, 15.0])
     closed = solve(problem, arcs)
     found = solve(problem, arcs, "numeric", method, formulation=formulation)
@@ -91,7 +99,9 @@ def test_integrals_are_conserved(n: int, rng: Generator) -> None:
 
 
 def test_the_normal_is_neumanns_point_and_the_veselova_body(rng: Generator) -> None:
-    """Theorem Kno, both ways: in τ₁ the normal solves Neumann's system with F_0 = 0, and moves like a Veselova body."""
+    """Theorem Kno, both ways: in τ₁ the normal solves Neumann's system with F_0 = 0, and moves like
+    a Veselova body.
+    """
     problem = drawn(rng, 4)
     found = solve(problem, [0.5, 3.0])
     velocity = normal_velocity(problem.A, problem.frame[:, 0], problem.X_dot)
@@ -102,11 +112,14 @@ def test_the_normal_is_neumanns_point_and_the_veselova_body(rng: Generator) -> N
     body = Veselova(problem.A, problem.frame[:, 0], velocity, problem.frame)
     times = solve(body, np.linspace(0, 20, 2001))
     at = np.array([np.interp(x, times.tau1, times.times) for x in found.tau1])
-    assert np.allclose(solve(body, at).q, found.frame[:, :, 0], atol=1e-4)  # what linear interpolation of t(τ₁) leaves
+    # what linear interpolation of t(τ₁) leaves
+    assert np.allclose(solve(body, at).q, found.frame[:, :, 0], atol=1e-4)
 
 
 def test_the_rate_of_neumann_time_is_knoerrers(rng: Generator) -> None:
-    """(knorrer), corrected: dτ₁/ds = √((V,A⁻¹V)/(X,A⁻²X)) against a difference quotient of τ₁(s)."""
+    """(knorrer), corrected: dτ₁/ds = √((V,A⁻¹V)/(X,A⁻²X)) against a difference
+    quotient of τ₁(s).
+    """
     problem, step = drawn(rng, 3), 1e-4
     found = solve(problem, [2 - step, 2.0, 2 + step])
     X, V = found.X[1], found.X_dot[1]
@@ -130,7 +143,9 @@ def test_moser_pair_is_isospectral_and_moves_the_line(rng: Generator) -> None:
 
 
 def test_tangents_touch_fixed_confocal_quadrics_at_the_frames_normals(rng: Generator) -> None:
-    """Chasles: Σ x_i²/(A_i−α) = 1 at the contact, with the tangent in its plane; normals are the frame's n_k."""
+    """Chasles: Σ x_i²/(A_i−α) = 1 at the contact, with the tangent in its plane; normals are the
+    frame's n_k.
+    """
     problem = drawn(rng, 5)
     found = solve(problem, [-3.0, 0.0, 7.0])
     touched = contacts(problem.A, found.X, found.X_dot)

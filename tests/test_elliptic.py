@@ -12,7 +12,26 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Extended
 from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
 COMPLEMENTS = ["1", "0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
-ANGLES = [1e-8, 0.1, 0.5, 1.0, 1.5, 1.57, 2.0, 3.0, 3.1, 3.5, 5.0, 6.2, 7.0, 9.0, 11.0, 12.5, -1.0, -4.0]
+ANGLES = [
+    1e-8,
+    0.1,
+    0.5,
+    1.0,
+    1.5,
+    1.57,
+    2.0,
+    3.0,
+    3.1,
+    3.5,
+    5.0,
+    6.2,
+    7.0,
+    9.0,
+    11.0,
+    12.5,
+    -1.0,
+    -4.0,
+]
 
 
 def jacobi_of(complement: str) -> Jacobi:
@@ -34,7 +53,8 @@ def exact(complement: Any, psi: float, digits: int) -> tuple[Any, Any, Any]:
 def test_values_are_accurate_relative_to_themselves(complement: str) -> None:
     jacobi = jacobi_of(complement)
     values = jacobi(np.array(ANGLES))
-    # sn and cn vanish linearly, so a rounding of ψ moves them by ε|ψ|·(K/π) relative to their distance from the zero.
+    # sn and cn vanish linearly, so a rounding of ψ moves them by ε|ψ|·(K/π) relative to their
+    # distance from the zero.
     for i, psi in enumerate(ANGLES):
         for value, true in zip(values, exact(complement, psi, 360), strict=True):
             near_zero = 1 / abs(np.sin(psi / 2) * np.cos(psi / 2))

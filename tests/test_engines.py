@@ -1,4 +1,6 @@
-"""Both engines through the problem table: reference motions, agreement, honest errors, far times."""
+"""Both engines through the problem table: reference motions, agreement, honest
+errors, far times.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,25 @@ METHODS = [
 SOLVABLE = [case for case in TABLE if "at-rest" not in case.tags]
 
 #: Cases of every kind, for what is tested of every method.
-CHOSEN = ("random-n2-0", "random-n3-0", "random-n4-0", "axis-start", "symmetric-two", "near-separatrix-1e-06", "umbilic", "fast")
+CHOSEN = (
+    "random-n2-0",
+    "random-n3-0",
+    "random-n4-0",
+    "axis-start",
+    "symmetric-two",
+    "near-separatrix-1e-06",
+    "umbilic",
+    "fast",
+)
 
 #: What a known motion, or an integration, takes seconds or minutes for.
 LONG = ("eight", "wide-ratio", "ratio-100", "random-n6-0", "rising-A")
 
 
 def table(cases: Sequence[Case], methods: Sequence[tuple[str, ...]] = ((),)) -> list[Any]:
-    """Return the rows of a test of cases, by methods: usually the first method for most cases, the others for some."""
+    """Return the rows of a test of cases, by methods: usually the first method for most cases, the
+    others for some.
+    """
     usual = {case.name: {methods[0]} if case.name not in LONG else set() for case in cases}
     usual |= {name: set(methods) for name in CHOSEN}
     return [
@@ -54,13 +67,20 @@ def table(cases: Sequence[Case], methods: Sequence[tuple[str, ...]] = ((),)) -> 
 @cache
 def truth(case: Case) -> Any:
     problem = case.problem()
-    frame, q_dot, tau1 = true_motion(problem, case.times(), case.frame if "reference" in case.tags else None)
+    frame, q_dot, tau1 = true_motion(
+        problem, case.times(), case.frame if "reference" in case.tags else None
+    )
     return problem.to_body_axes(frame), problem.to_body_axes(q_dot), tau1
 
 
 def reference(case: Case) -> tuple[Any, Any, Any, Any]:
-    columns = [np.array([[float(x) for x in np.ravel(point[name])] for point in case.points]) for name in ("frame", "q_dot")]
-    times, tau1 = (np.array([float(point[name]) for point in case.points]) for name in ("t", "tau1"))
+    columns = [
+        np.array([[float(x) for x in np.ravel(point[name])] for point in case.points])
+        for name in ("frame", "q_dot")
+    ]
+    times, tau1 = (
+        np.array([float(point[name]) for point in case.points]) for name in ("t", "tau1")
+    )
     n = len(case.A)
     return times, columns[0].reshape(-1, n, n), columns[1], tau1
 
@@ -83,13 +103,17 @@ def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: s
     if case.name == "slow":  # |q̇| is 1e-3: the turning, not the time, is what counts
         allowed = np.full(times.size, 1e-12)
     assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= allowed)
-    assert np.all(np.max(np.abs(found.q_dot - q_dot), axis=1) <= allowed * max(1.0, np.max(np.abs(q_dot))))
+    assert np.all(
+        np.max(np.abs(found.q_dot - q_dot), axis=1) <= allowed * max(1.0, np.max(np.abs(q_dot)))
+    )
     assert np.all(np.abs(found.tau1 - tau1) <= allowed * np.maximum(1.0, tau1))
 
 
 @pytest.mark.parametrize(("method", "bound"), [("dop853", 1e-8), ("taylor", 1e-12)])
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
-def test_the_numeric_engine_reaches_the_reference_motions(case: Case, method: str, bound: float) -> None:
+def test_the_numeric_engine_reaches_the_reference_motions(
+    case: Case, method: str, bound: float
+) -> None:
     times, frame, _, tau1 = reference(case)
     found = solve(case.problem(), times, "numeric", method)
     allowed = bound * (np.maximum(1.0, times) if method == "taylor" else 1.0)
@@ -121,14 +145,17 @@ def test_what_must_hold_at_every_time_does(case: Case, engine: str, method: str)
     n, E = problem.n, found.frame
     assert np.max(np.abs(np.swapaxes(E, 1, 2) @ E - np.eye(n))) <= 1e-13
     space = np.swapaxes(E, 1, 2) @ found.omega @ E
-    assert np.max(np.abs(space[:, 1:, 1:])) <= 1e-13 * np.max(np.abs(found.omega))  # the constraint (44)
+    # the constraint (44)
+    assert np.max(np.abs(space[:, 1:, 1:])) <= 1e-13 * np.max(np.abs(found.omega))
     assert np.array_equal(found.q, E[:, :, 0])
     assert np.all(np.diff(found.tau1) > 0)
     assert np.all(np.diff(found.spheroconic, axis=1) > 0)
     assert max(found.drift.values()) < 1e-8
 
 
-@pytest.mark.parametrize(("case", "engine", "bound"), table(tagged("generic"), [("analytic", 1e-11), ("numeric", 1e-8)]))
+@pytest.mark.parametrize(
+    ("case", "engine", "bound"), table(tagged("generic"), [("analytic", 1e-11), ("numeric", 1e-8)])
+)
 def test_errors_are_not_empty_promises(case: Case, engine: str, bound: float) -> None:
     """Errors stay useful: at |ωt| of order 50, below 1e-11 in closed form and 1e-8 by DOP853."""
     assert np.max(solve(case.problem(), case.times(), engine).error) < bound
@@ -156,7 +183,9 @@ def test_a_body_at_rest_stands_still(engine: str) -> None:
 def test_adversarial_starts_are_served_honestly(seed: int) -> None:
     name, problem = adversarial_start(np.random.default_rng([2024, seed]), 2 + seed % 4)
     fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
-    times = np.array([-5, 0, 0.1, 1, 5]) * min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
+    times = np.array([-5, 0, 0.1, 1, 5]) * min(
+        1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest
+    )
     found = solve(problem, times)
     frame = true_motion(problem, times)[0]
     assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error), name
@@ -166,7 +195,9 @@ def test_adversarial_starts_are_served_honestly(seed: int) -> None:
 @pytest.mark.parametrize("method", ["theta", "products", slow("nufft"), slow("angles")])
 @pytest.mark.parametrize("count", [0, 3000])
 def test_very_wide_inertia_is_served_honestly_by_every_route(method: str, count: int) -> None:
-    """A's over eight orders of magnitude: q from theta quotients would tell dt/dτ₁ to 1e-12 only."""
+    """A's over eight orders of magnitude: q from theta quotients would tell dt/dτ₁ to
+    1e-12 only.
+    """
     A, q = ["12854689", "68561808", "0.35321", "55950.258"], ["-0.677", "-0.143", "-0.921", "0.396"]
     problem = Veselova(A, q, ["0.345", "-0.448", "-0.006", "0.415"], normalize=True)
     wanted = np.linspace(-0.01, 0.01, 9)
@@ -190,7 +221,9 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
 
 
 def test_errors_grow_where_guard_digits_end() -> None:
-    """The same motion at another scale of A and of time, whose roundings are others, shows the error at any distance."""
+    """The same motion at another scale of A and of time, whose roundings are others, shows the
+    error at any distance.
+    """
     problem = Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
     scaled = Veselova([9, 6, "4.5", 3], ["0.5"] * 4, ["3.3", "-2.1", "0.9", "-2.1"])
     for t in (3.0, 3e9, 3e16, 3e21, 3e25):
@@ -205,11 +238,22 @@ def test_errors_grow_where_guard_digits_end() -> None:
 
 
 def test_a_matrix_of_inertia_adds_the_rounding_of_its_axes() -> None:
-    """R diag(3,2,1) Rᵀ with rational R, against the same body in principal axes, where roundings of the data show."""
-    first, second = np.array([[3, -4, 0], [4, 3, 0], [0, 0, 5]]), np.array([[13, 0, 0], [0, 5, -12], [0, 12, 5]])
+    """R diag(3,2,1) Rᵀ with rational R, against the same body in principal axes, where roundings of
+    the data show.
+    """
+    first, second = (
+        np.array([[3, -4, 0], [4, 3, 0], [0, 0, 5]]),
+        np.array([[13, 0, 0], [0, 5, -12], [0, 12, 5]]),
+    )
     R = [[Fraction(int(x), 65) for x in row] for row in first @ second]
-    A = [[sum(R[i][k] * (3, 2, 1)[k] * R[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
-    q, q_dot = [Fraction(3, 5), Fraction(0), Fraction(4, 5)], [Fraction(4, 5), Fraction(1), Fraction(-3, 5)]
+    A = [
+        [sum(R[i][k] * (3, 2, 1)[k] * R[j][k] for k in range(3)) for j in range(3)]
+        for i in range(3)
+    ]
+    q, q_dot = (
+        [Fraction(3, 5), Fraction(0), Fraction(4, 5)],
+        [Fraction(4, 5), Fraction(1), Fraction(-3, 5)],
+    )
     turned = [[sum(R[i][k] * x[k] for k in range(3)) for i in range(3)] for x in (q, q_dot)]
     for t in (50.0, 1e3, 1e6):
         plain, rotated = solve(Veselova([3, 2, 1], q, q_dot), [t]), solve(Veselova(A, *turned), [t])
@@ -219,12 +263,16 @@ def test_a_matrix_of_inertia_adds_the_rounding_of_its_axes() -> None:
 
 @pytest.mark.parametrize(("n", "cycles"), [(5, 150), (7, 120)])
 def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator) -> None:
-    """To a time of many cycles and, from the state there, home again: two curves, two starts, two clocks."""
+    """To a time of many cycles and, from the state there, home again: two curves, two starts, two
+    clocks.
+    """
     problem = random_problem(rng, n)
     t = cycles / float(np.max(np.abs(Solution(problem).in_time.rates)))
     there = solve_analytic(problem, [t], time_map="panels")
     home = solve_analytic(
-        Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True), [-t], time_map="panels"
+        Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True),
+        [-t],
+        time_map="panels",
     )
     floor = problem.conditioning_floor(np.array([t]))[0]
     assert np.max(np.abs(home.frame[0] - problem.frame)) <= 100 * floor
@@ -233,7 +281,9 @@ def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator)
 
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
-    """t = 10⁶ with 30-digit frequencies, against the same without guard digits: within 100 conditioning floors."""
+    """t = 10⁶ with 30-digit frequencies, against the same without guard digits: within 100
+    conditioning floors.
+    """
     problem = random_problem(rng, n, 5.0)
     times = np.array([1e6 - 0.5, 1e6])
     found = solve(problem, times)
@@ -263,7 +313,10 @@ def test_too_far_is_a_named_outcome() -> None:
     with pytest.raises(Unsolved) as raised:
         solve(problem, [1e9])
     assert raised.value.outcome == "too-far"
-    for system, closed_form in ((problem, True), (EulerPoisson([1, 2, 3], [0.6, 0, 0.8], [1, 1, 1]), False)):
+    for system, closed_form in (
+        (problem, True),
+        (EulerPoisson([1, 2, 3], [0.6, 0, 0.8], [1, 1, 1]), False),
+    ):
         with pytest.raises(Unsolved, match="integration goes to") as raised:
             solve(system, [1e10], "numeric")
         assert ("the closed form farther" in str(raised.value)) is closed_form
@@ -287,10 +340,16 @@ def test_motions_run_backwards() -> None:
 def test_the_order_of_the_axes_is_the_users(permutation: list[int]) -> None:
     problem = tagged("generic")[3].problem()
     turned = Veselova(
-        problem.A[permutation], problem.q[permutation], problem.q_dot[permutation], problem.frame[permutation], normalize=True
+        problem.A[permutation],
+        problem.q[permutation],
+        problem.q_dot[permutation],
+        problem.frame[permutation],
+        normalize=True,
     )
     times = [0.5, 20.0]
-    assert np.allclose(solve(turned, times).frame, solve(problem, times).frame[:, permutation], atol=1e-12)
+    assert np.allclose(
+        solve(turned, times).frame, solve(problem, times).frame[:, permutation], atol=1e-12
+    )
 
 
 def test_scaling_the_inertia_or_the_speed_only_rescales_time() -> None:
@@ -316,12 +375,15 @@ def test_the_torus_describes_the_motion() -> None:
     )
     assert np.allclose(found.branch_points, [names[name] for name in found.origins], atol=1e-13)
     assert found.riemann_matrix_residual < 1e-14
-    # a in the monomial basis: its inverse's last column gives the frequencies too, as λ^{g−1} is the only form that advances.
+    # a in the monomial basis: its inverse's last column gives the frequencies too, as λ^{g−1} is
+    # the only form that advances.
     assert np.allclose(np.linalg.inv(found.periods)[:, -1], found.frequencies_tau1, rtol=1e-9)
 
 
 def test_the_symmetric_limit_is_approached_smoothly() -> None:
-    """Two nearly equal A's: λ between them moves on a tiny cut, and the motion tends to the symmetric body's."""
+    """Two nearly equal A's: λ between them moves on a tiny cut, and the motion tends to the
+    symmetric body's.
+    """
     start = {"q": [0.3, 0.5, 0.8], "q_dot": [1, -0.4, 0.2], "normalize": True}
     frame = np.linalg.qr(np.column_stack([[0.3, 0.5, 0.8], np.eye(3)[:, :2]]))[0]
     frame[:, 0] = np.array([0.3, 0.5, 0.8]) / np.sqrt(0.98)

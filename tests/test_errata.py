@@ -1,4 +1,6 @@
-"""The misprints of the paper that docs/errata.md lists: the printed formula fails on random data, the corrected one holds."""
+"""The misprints of the paper that docs/errata.md lists: the printed formula fails on random data,
+the corrected one holds.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,14 @@ from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.confocal_quadrics import lax_matrix, lax_partner
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
-from veselova.mechanics.geometry.stiefel import admissible_part, angular_velocity, dimension, momentum_map, product, tangent_part
+from veselova.mechanics.geometry.stiefel import (
+    admissible_part,
+    angular_velocity,
+    dimension,
+    momentum_map,
+    product,
+    tangent_part,
+)
 from veselova.mechanics.paper import invariant_measure as measure
 from veselova.mechanics.paper import rank_one
 from veselova.mechanics.paper.chaplygin_multiplier import ChaplyginMultiplier
@@ -28,11 +37,18 @@ from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 
 @pytest.mark.parametrize("N", range(2, 7))
-def test_the_jacobi_identities_hold_with_the_factors_turned_round(N: int, rng: np.random.Generator) -> None:
+def test_the_jacobi_identities_hold_with_the_factors_turned_round(
+    N: int, rng: np.random.Generator
+) -> None:
     rho = rng.normal(size=N)
 
     def total(m: int, sign: int) -> float:
-        return float(sum(rho[s] ** m / np.prod([sign * (rho[s] - rho[k]) for k in range(N) if k != s]) for s in range(N)))
+        return float(
+            sum(
+                rho[s] ** m / np.prod([sign * (rho[s] - rho[k]) for k in range(N) if k != s])
+                for s in range(N)
+            )
+        )
 
     assert all(abs(total(m, 1)) < 1e-8 for m in range(N - 1))
     assert np.isclose(total(N - 1, 1), 1.0)
@@ -40,10 +56,13 @@ def test_the_jacobi_identities_hold_with_the_factors_turned_round(N: int, rng: n
 
 
 @pytest.mark.parametrize("n", range(2, 7))
-def test_the_lagrangian_in_spheroconic_coordinates_has_a_minus_sign(n: int, rng: np.random.Generator) -> None:
+def test_the_lagrangian_in_spheroconic_coordinates_has_a_minus_sign(
+    n: int, rng: np.random.Generator
+) -> None:
     problem = random_problem(rng, n, 5.0)
     A, q, inverse = problem.A, problem.q, 1 / problem.A
-    velocity = integrals.neumann_velocity(A, q, problem.q_dot)  # any tangent vector will do for dq/dτ
+    # any tangent vector will do for dq/dτ
+    velocity = integrals.neumann_velocity(A, q, problem.q_dot)
     step = 1e-6
     lam = to_spheroconic(A, q)
 
@@ -56,11 +75,15 @@ def test_the_lagrangian_in_spheroconic_coordinates_has_a_minus_sign(n: int, rng:
     for k in range(n - 1):
         others = np.prod([lam[k] - lam[s] for s in range(n - 1) if s != k])
         printed += others / (np.prod(lam[k] - inverse) * lam[k]) * rate[k] ** 2 / 8
-    true = ((A * velocity) @ velocity * ((A * q) @ q) - ((A * q) @ velocity) ** 2) / (2 * (q @ (A * q)))
+    true = ((A * velocity) @ velocity * ((A * q) @ q) - ((A * q) @ velocity) ** 2) / (
+        2 * (q @ (A * q))
+    )
     assert np.isclose(-printed, true, rtol=1e-5)
 
 
-def test_in_three_dimensions_the_factor_gamma_is_missing_after_4_2a(rng: np.random.Generator) -> None:
+def test_in_three_dimensions_the_factor_gamma_is_missing_after_4_2a(
+    rng: np.random.Generator,
+) -> None:
     inertia, omega, gamma = np.diag([1.0, 2.0, 3.5]), rng.normal(size=3), rng.normal(size=3)
     gamma /= np.linalg.norm(gamma)
     m = inertia @ omega - (inertia @ omega @ gamma) * gamma + (omega @ gamma) * gamma
@@ -72,7 +95,9 @@ def test_in_three_dimensions_the_factor_gamma_is_missing_after_4_2a(rng: np.rand
 
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_wurzel_takes_the_derivative_of_small_psi(n: int, rng: np.random.Generator) -> None:
-    """(q', n_k)² = |U(c_k)/ψ'(c_k)| with ψ(r) = Π(r − c_k); the printed derivative of Ψ(r) = Π(r − I_i) gives another length."""
+    """(q', n_k)² = |U(c_k)/ψ'(c_k)| with ψ(r) = Π(r − c_k); the printed derivative of Ψ(r) = Π(r −
+    I_i) gives another length.
+    """
     solution = Solution(random_problem(rng, n, 5.0))
     at = solution.attitude(rng.uniform(0, 1, (1, n - 1)), "angles")
     constants = np.array([float(c) for c in solution.spectrum.constants])
@@ -81,14 +106,18 @@ def test_wurzel_takes_the_derivative_of_small_psi(n: int, rng: np.random.Generat
     for k, component in enumerate(components, start=1):
         U = np.prod(constants[k] - at.spheroconic[0])
         small = np.prod([constants[k] - c for j, c in enumerate(constants) if j != k])
-        large = sum(np.prod([constants[k] - x for j, x in enumerate(inverse) if j != i]) for i in range(n))
+        large = sum(
+            np.prod([constants[k] - x for j, x in enumerate(inverse) if j != i]) for i in range(n)
+        )
         assert np.isclose(component**2, abs(U / small), rtol=1e-8, atol=1e-14)
         assert not np.isclose(component**2, abs(U / large), rtol=1e-3)
 
 
 @pytest.mark.parametrize("n", [3, 5])
 def test_4_15_needs_its_second_weight_and_its_brackets(n: int, rng: np.random.Generator) -> None:
-    """Ξ = (Aq,q̇)𝓘ω·q − (Aq,q)𝓘ω·q̇ = −2h Aq up to a multiple of q, with 2h = [(Aq,q)(Aq̇,q̇) − (Aq,q̇)²]/det A."""
+    """Ξ = (Aq,q̇)𝓘ω·q − (Aq,q)𝓘ω·q̇ = −2h Aq up to a multiple of q, with 2h = [(Aq,q)(Aq̇,q̇) −
+    (Aq,q̇)²]/det A.
+    """
     problem = random_problem(rng, n, 5.0)
     A, q, v, det = problem.A, problem.q, problem.q_dot, np.prod(problem.A)
     inertia_omega = (np.outer(A * q, A * v) - np.outer(A * v, A * q)) / det
@@ -107,12 +136,16 @@ def test_4_15_needs_its_second_weight_and_its_brackets(n: int, rng: np.random.Ge
 
 
 def _geodesic(rng: np.random.Generator, step: float) -> Any:
-    problem = EllipsoidGeodesic(rng.uniform(1, 3, 4), rng.normal(size=4), rng.normal(size=4), normalize=True)
+    problem = EllipsoidGeodesic(
+        rng.uniform(1, 3, 4), rng.normal(size=4), rng.normal(size=4), normalize=True
+    )
     return problem.A, solve(problem, [1 - step, 1.0, 1 + step], "numeric", "taylor")
 
 
 def test_knoerrers_time_change_is_printed_upside_down(rng: np.random.Generator) -> None:
-    """The normal obeys q'' = −A⁻¹q + λq in τ₁ only with dτ₁/ds = √((V,A⁻¹V)/(X,A⁻²X)): its speed gives F_0 = 0."""
+    """The normal obeys q'' = −A⁻¹q + λq in τ₁ only with dτ₁/ds = √((V,A⁻¹V)/(X,A⁻²X)): its speed
+    gives F_0 = 0.
+    """
     A, found = _geodesic(rng, 1e-4)
     q, V = found.frame[1, :, 0], found.X_dot[1]
     dq = (found.frame[2, :, 0] - found.frame[0, :, 0]) / 2e-4
@@ -137,7 +170,9 @@ def test_mosers_parameter_runs_along_the_geodesic(rng: np.random.Generator) -> N
 
 
 def rate_along(problem: Any, function: Any) -> float:
-    """The derivative of a function of (Ω, γ) along the field of a body in units of order one, by a complex step."""
+    """The derivative of a function of (Ω, γ) along the field of a body in units of order one, by a
+    complex step.
+    """
     flow = problem.flow()
     rate = flow.vector_field(0.0, flow.initial) / flow.time_unit
     Omega = problem.Omega + 1e-100j * rate[:3] / flow.time_unit
@@ -166,20 +201,34 @@ def test_the_integral_of_3_5_has_the_square_of_the_momentum_and_its_moments_exch
         return (I * Omega) @ (I * Omega) / 2
 
     assert abs(rate_along(problem, lambda W, g: integral(W, g, square(W), 1, 0))) < 1e-13
-    assert abs(rate_along(problem, lambda W, g: integral(W, g, I * W @ W / 2, 1, 0))) > 1e-3  # as printed, (𝓘Ω,Ω)
+    # as printed, (𝓘Ω,Ω)
+    assert abs(rate_along(problem, lambda W, g: integral(W, g, I * W @ W / 2, 1, 0))) > 1e-3
     if member >= 2:
-        assert abs(rate_along(problem, lambda W, g: integral(W, g, square(W), 0, 1))) > 1e-3  # as printed, I₂γ₂² + I₃γ₃²
+        # as printed, I₂γ₂² + I₃γ₃²
+        assert abs(rate_along(problem, lambda W, g: integral(W, g, square(W), 0, 1))) > 1e-3
 
 
-def test_the_condition_of_the_duality_lemma_has_the_vector_product_inside(rng: np.random.Generator) -> None:
-    """[γ×F_γ + 𝓘(V_γ×γ)]×γ = 0 for the Clebsch potential and its F; the printed 𝓘(V_γ)×γ leaves a remainder."""
+def test_the_condition_of_the_duality_lemma_has_the_vector_product_inside(
+    rng: np.random.Generator,
+) -> None:
+    """[γ×F_γ + 𝓘(V_γ×γ)]×γ = 0 for the Clebsch potential and its F; the printed 𝓘(V_γ)×γ leaves a
+    remainder.
+    """
     I, gamma = np.array([1.0, 1.7, 2.6]), np.array([0.48, 0.6, 0.64])
     V_slope, F_slope = 2 * I * gamma, -2 * np.prod(I) * gamma / I
     problem = VeselovaSO3(I, gamma, np.cross(gamma, rng.normal(size=3)), {"clebsch": 1})
-    F = rate_along(problem, lambda W, g: (I * W) @ (I * W) / 2 - (I * W @ g) ** 2 / 2 - np.prod(I) * g**2 @ (1 / I))
+    F = rate_along(
+        problem,
+        lambda W, g: (I * W) @ (I * W) / 2 - (I * W @ g) ** 2 / 2 - np.prod(I) * g**2 @ (1 / I),
+    )
     assert abs(F) < 1e-13
-    assert np.allclose(np.cross(np.cross(gamma, F_slope) + I * np.cross(V_slope, gamma), gamma), 0, atol=1e-14)
-    assert np.max(np.abs(np.cross(np.cross(gamma, F_slope) + np.cross(I * V_slope, gamma), gamma))) > 0.1
+    assert np.allclose(
+        np.cross(np.cross(gamma, F_slope) + I * np.cross(V_slope, gamma), gamma), 0, atol=1e-14
+    )
+    assert (
+        np.max(np.abs(np.cross(np.cross(gamma, F_slope) + np.cross(I * V_slope, gamma), gamma)))
+        > 0.1
+    )
 
 
 def test_the_geodesic_integral_has_the_square_of_the_momentum(rng: np.random.Generator) -> None:
@@ -191,7 +240,9 @@ def test_the_geodesic_integral_has_the_square_of_the_momentum(rng: np.random.Gen
     assert abs(rate_along(problem, lambda W, g: (I * W @ W - along(W, g)) / 2)) > 1e-3
 
 
-def test_the_energy_of_the_euler_poisson_equations_has_their_own_potential(rng: np.random.Generator) -> None:
+def test_the_energy_of_the_euler_poisson_equations_has_their_own_potential(
+    rng: np.random.Generator,
+) -> None:
     """f_1 = ½(𝒥Ω,Ω) + 𝒱; the printed V is the potential of the dual system."""
     I, gamma = np.array([1.0, 1.7, 2.6]), np.array([0.48, 0.6, 0.64])
     problem = EulerPoisson(1 / I, gamma, rng.normal(size=3), {"family": [0, 1, 0, 0, 0]})
@@ -199,12 +250,17 @@ def test_the_energy_of_the_euler_poisson_equations_has_their_own_potential(rng: 
     def energy(Omega: Any, gamma: Any, potential: Any) -> Any:
         return (Omega / I) @ Omega / 2 + potential(gamma)
 
-    assert abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: -np.prod(I) * x**2 @ (1 / I)))) < 1e-13
+    assert (
+        abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: -np.prod(I) * x**2 @ (1 / I))))
+        < 1e-13
+    )
     assert abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: x**2 @ I))) > 1e-3
 
 
 def test_omega_is_minus_epsilon_times_the_angular_velocity(rng: np.random.Generator) -> None:
-    """γ̇ = γ×Ω is (Po), γ̇ = −ωγ, with ω_ij = −ε_ijk Ω_k, and then q∧q̇ is q̇×q; printed without the sign."""
+    """γ̇ = γ×Ω is (Po), γ̇ = −ωγ, with ω_ij = −ε_ijk Ω_k, and then q∧q̇ is q̇×q; printed without
+    the sign.
+    """
     Omega, gamma = rng.normal(size=3), rng.normal(size=3)
     a, b, c = Omega
     printed = np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
@@ -213,7 +269,9 @@ def test_omega_is_minus_epsilon_times_the_angular_velocity(rng: np.random.Genera
     assert not np.allclose(-printed @ gamma, np.cross(gamma, Omega))
     q, q_dot = gamma, Omega
     x, y, z = np.cross(q_dot, q)
-    assert np.allclose(np.outer(q, q_dot) - np.outer(q_dot, q), -np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]]))
+    assert np.allclose(
+        np.outer(q, q_dot) - np.outer(q_dot, q), -np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    )
 
 
 @pytest.mark.parametrize("n", range(2, 6))
@@ -230,7 +288,9 @@ def test_the_dirac_bracket_subtracts_its_second_term(n: int, rng: np.random.Gene
 
 @pytest.mark.parametrize("n", range(2, 6))
 def test_the_force_of_the_bracket_form_is_orthogonal_to_q(n: int, rng: np.random.Generator) -> None:
-    """ṗ = {p,Ĥ}_* − π̂ as printed does not keep (q,p): its derivative is −(q,π̂) = −2h. Without that part it is (extended)."""
+    """ṗ = {p,Ĥ}_* − π̂ as printed does not keep (q,p): its derivative is −(q,π̂) = −2h. Without
+    that part it is (extended).
+    """
     problem = random_problem(rng, n, 5.0)
     A, q = problem.A, problem.q
     p = integrals.momentum(A, q, problem.q_dot)
@@ -238,12 +298,18 @@ def test_the_force_of_the_bracket_form_is_orthogonal_to_q(n: int, rng: np.random
     printed = corrected - (q @ rank_one.nonholonomic_force(A, q, q_dot)) * q
     assert np.isclose(q_dot @ p + q @ corrected, 0, atol=1e-12 * problem.energy)
     assert np.isclose(q_dot @ p + q @ printed, -2 * problem.energy, rtol=1e-10)
-    assert np.allclose(corrected, rank_one.extended_field(A, q, p)[1], rtol=1e-10, atol=1e-13 * np.max(np.abs(p)))
+    assert np.allclose(
+        corrected, rank_one.extended_field(A, q, p)[1], rtol=1e-10, atol=1e-13 * np.max(np.abs(p))
+    )
 
 
 @pytest.mark.parametrize(("n", "r"), [(3, 2), (4, 2), (5, 3), (4, 4)])
-def test_mom_has_no_third_term_for_the_momentum_that_is_defined(n: int, r: int, rng: np.random.Generator) -> None:
-    """P = ∂L/∂Ẋ by differences, as (dotX->P) defines it; pr_𝓓 𝓘ω = XPᵀ − PXᵀ. For r = 1 both forms agree."""
+def test_mom_has_no_third_term_for_the_momentum_that_is_defined(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
+    """P = ∂L/∂Ẋ by differences, as (dotX->P) defines it; pr_𝓓 𝓘ω = XPᵀ − PXᵀ. For r = 1 both forms
+    agree.
+    """
     inertia, X = body_inertia(random_inertia(rng, n, "matrix"), n), random_columns(rng, n, r)
     X_dot = tangent_part(X, rng.normal(size=(n, r)))
 
@@ -264,12 +330,23 @@ def test_mom_has_no_third_term_for_the_momentum_that_is_defined(n: int, r: int, 
 
 
 @pytest.mark.parametrize(("n", "r"), [(n, r) for n in range(2, 6) for r in range(1, n + 1)])
-def test_the_symplectic_leaf_has_twice_the_dimension_of_the_stiefel_variety(n: int, r: int, rng: np.random.Generator) -> None:
-    """The coadjoint orbit of so(n) ⋉ (Rⁿ)^r through (Φ*, e_1 … e_r): δ𝓜 = [𝓜,ξ] + Σ e_k∧a_k, δe = −ξe. It is 2N."""
+def test_the_symplectic_leaf_has_twice_the_dimension_of_the_stiefel_variety(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
+    """The coadjoint orbit of so(n) ⋉ (Rⁿ)^r through (Φ*, e_1 … e_r): δ𝓜 = [𝓜,ξ] + Σ e_k∧a_k, δe =
+    −ξe. It is 2N.
+    """
     X = random_columns(rng, n, r)
     momentum = momentum_map(X, tangent_part(X, rng.normal(size=(n, r))))
-    turned = [np.concatenate([coefficients(momentum @ xi - xi @ momentum), (-xi @ X).ravel()]) for xi in _basis(n)]
-    moved = [np.concatenate([coefficients(np.outer(e, a) - np.outer(a, e)), np.zeros(n * r)]) for e in X.T for a in np.eye(n)]
+    turned = [
+        np.concatenate([coefficients(momentum @ xi - xi @ momentum), (-xi @ X).ravel()])
+        for xi in _basis(n)
+    ]
+    moved = [
+        np.concatenate([coefficients(np.outer(e, a) - np.outer(a, e)), np.zeros(n * r)])
+        for e in X.T
+        for a in np.eye(n)
+    ]
     rank = np.linalg.matrix_rank(np.array(turned + moved), tol=1e-9)
     assert rank == 2 * dimension(n, r)
     assert rank != r * n - r * (r + 1) // 2
@@ -279,9 +356,14 @@ def _basis(n: int) -> Any:
     return skew(np.eye(n * (n - 1) // 2), n)
 
 
-def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(rng: np.random.Generator) -> None:
-    """ṗ = −∇H* − 𝒩⁻¹(∇𝒩,Gp)p with H* = ½𝒩⁻²(Gp̃,p̃), on the rank-one flow of Theorem main in canonical coordinates."""
-    inertia: Any = body_inertia({"special": [1.0, 2.0, 1.0, 0.5]}, 4)  # det A = 1: the units are those of the operator
+def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(
+    rng: np.random.Generator,
+) -> None:
+    """ṗ = −∇H* − 𝒩⁻¹(∇𝒩,Gp)p with H* = ½𝒩⁻²(Gp̃,p̃), on the rank-one flow of Theorem main in
+    canonical coordinates.
+    """
+    # det A = 1: the units are those of the operator
+    inertia: Any = body_inertia({"special": [1.0, 2.0, 1.0, 0.5]}, 4)
     chart, multiplier = Chart(inertia, random_columns(rng, 4, 1)), ChaplyginMultiplier(inertia, 1)
     N, z = chart.N, rng.normal(size=6) * np.array([0.3] * 3 + [1.0] * 3)
     u, p = z[:N], z[N:]
@@ -289,7 +371,10 @@ def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(rng: 
 
     def gradient(power: int) -> Any:
         """∇_q of 𝒩^power·H(q,p̃) at fixed p̃ = 𝒩p."""
-        return slopes(lambda y: multiplier.value(chart.point(y)[0]) ** power * chart.hamiltonian(y, rate * p), u)
+        return slopes(
+            lambda y: multiplier.value(chart.point(y)[0]) ** power * chart.hamiltonian(y, rate * p),
+            u,
+        )
 
     u_dot, p_dot = np.split(chart.field(z), [N])
     growth = slopes(lambda y: np.log(multiplier.value(chart.point(y)[0])), u) @ u_dot
@@ -302,7 +387,9 @@ def test_x4_and_the_hamiltonian_of_its_proof_lack_powers_of_the_multiplier(rng: 
 def test_there_are_more_g_invariant_functions_than_independent_ones_in_the_algebra(
     n: int, rank: int, rng: np.random.Generator
 ) -> None:
-    """T*Q = G ×_H 𝔡, so its G-invariant functions are the H-invariant ones on 𝔡; 𝒜 holds those that come from 𝔤."""
+    """T*Q = G ×_H 𝔡, so its G-invariant functions are the H-invariant ones on 𝔡; 𝒜 holds those that
+    come from 𝔤.
+    """
     system = random_lr(rng, n, rank)
     group, distribution = system.distribution.group, system.distribution
     w, h = distribution.space[: distribution.rank], distribution.space[distribution.rank :]
@@ -318,35 +405,54 @@ def test_there_are_more_g_invariant_functions_than_independent_ones_in_the_algeb
 
 
 @pytest.mark.parametrize(("n", "rank"), [(4, 2), (5, 3)])
-def test_the_index_ranges_of_im3_belong_to_the_other_letters(n: int, rank: int, rng: np.random.Generator) -> None:
-    """⟨e_i∧e_p, 𝓘(e_j∧e_q)⟩ over p ≤ r and all i, as printed, has the row e_p∧e_p = 0: the determinant vanishes."""
+def test_the_index_ranges_of_im3_belong_to_the_other_letters(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """⟨e_i∧e_p, 𝓘(e_j∧e_q)⟩ over p ≤ r and all i, as printed, has the row e_p∧e_p = 0: the
+    determinant vanishes.
+    """
     system = random_lr(rng, n, rank)
     group, frame = system.distribution.group, system.g
 
     def determinant(pairs: list[tuple[int, int]]) -> float:
         rows = [np.outer(frame[i], frame[p]) - np.outer(frame[p], frame[i]) for i, p in pairs]
-        return float(measure.restricted_determinant(system.inertia, group.coordinates(np.array(rows))))
+        return float(
+            measure.restricted_determinant(system.inertia, group.coordinates(np.array(rows)))
+        )
 
-    true = float(measure.momentum_density(system.inertia, system.distribution.in_body(frame)[0])) ** 2
+    true = (
+        float(measure.momentum_density(system.inertia, system.distribution.in_body(frame)[0])) ** 2
+    )
     assert np.isclose(determinant([(i, p) for i in range(rank) for p in range(i + 1, n)]), true)
     assert abs(determinant([(i, p) for p in range(rank) for i in range(n)])) < 1e-12 * true
-    assert not np.isclose(determinant([(i, p) for p in range(rank) for i in range(p)]), true, rtol=1e-3)
+    assert not np.isclose(
+        determinant([(i, p) for p in range(rank) for i in range(p)]), true, rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize(("n", "rank"), [(4, 1), (5, 2), (5, 3)])
-def test_the_expansion_in_the_proof_of_im_a_runs_over_j(n: int, rank: int, rng: np.random.Generator) -> None:
+def test_the_expansion_in_the_proof_of_im_a_runs_over_j(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
     A, g = np.exp(rng.normal(size=n)), np.linalg.qr(rng.normal(size=(n, n)))[0]
     rest = g[rank:].T
     true = np.linalg.det(rest.T @ (rest / A[:, None]))
     squares = measure.plucker_coordinates(rest) ** 2
     J = list(combinations(range(n), n - rank))
-    I = [[i for i in range(n) if i not in indices] for indices in J]  # complementary, as at the end of the proof
+    # complementary, as at the end of the proof
+    I = [[i for i in range(n) if i not in indices] for indices in J]
     assert np.isclose(sum(x / np.prod(A[list(j)]) for x, j in zip(squares, J, strict=True)), true)
-    assert not np.isclose(sum(x / np.prod(A[i]) for x, i in zip(squares, I, strict=True)), true, rtol=1e-3)
+    assert not np.isclose(
+        sum(x / np.prod(A[i]) for x, i in zip(squares, I, strict=True)), true, rtol=1e-3
+    )
 
 
-def test_the_angular_velocity_in_three_dimensions_has_the_other_sign(rng: np.random.Generator) -> None:
-    """(nh3.46) for n = 3, r = 1 is 𝓘Ω̇ = 𝓘Ω×Ω + λγ, γ̇ = γ×Ω for ω_ij = −ε_ijkΩ_k; with +ε both signs of Ω are turned."""
+def test_the_angular_velocity_in_three_dimensions_has_the_other_sign(
+    rng: np.random.Generator,
+) -> None:
+    """(nh3.46) for n = 3, r = 1 is 𝓘Ω̇ = 𝓘Ω×Ω + λγ, γ̇ = γ×Ω for ω_ij = −ε_ijkΩ_k; with +ε both
+    signs of Ω are turned.
+    """
     A = np.exp(rng.normal(size=3))
     draw = random_lr(rng, 3, 1)
     group = draw.distribution.group
@@ -362,7 +468,9 @@ def test_the_angular_velocity_in_three_dimensions_has_the_other_sign(rng: np.ran
     def mismatch(sign: int) -> float:
         Omega, Omega_dot = sign * vector(system.omega), sign * vector(rate[:3]) / flow.time_unit
         force = Omega_dot / A - np.cross(Omega / A, Omega)  # 𝓘 = A⁻¹
-        first = np.linalg.norm(force - (force @ gamma) * gamma) / np.linalg.norm(np.cross(Omega / A, Omega))
+        first = np.linalg.norm(force - (force @ gamma) * gamma) / np.linalg.norm(
+            np.cross(Omega / A, Omega)
+        )
         return float(max(first, np.linalg.norm(gamma_dot - np.cross(gamma, Omega))))
 
     assert mismatch(-1) < 1e-12

@@ -16,8 +16,12 @@ def test_results_are_those_of_the_version() -> None:
     stored, found = json.loads(FILE.read_text()), stored_results.results()
     assert stored["times"] == list(TIMES), f"the times have changed; {ADVICE}"
     changed = differences(stored["results"], found)
-    assert not changed, "\n".join([f"results are not those of version {stored['version']}; {ADVICE}", *changed])
-    assert stored["version"] == __version__, "the fingerprint is of another version; run: python benchmarks/fingerprint.py"
+    assert not changed, "\n".join(
+        [f"results are not those of version {stored['version']}; {ADVICE}", *changed]
+    )
+    assert stored["version"] == __version__, (
+        "the fingerprint is of another version; run: python benchmarks/fingerprint.py"
+    )
 
 
 def test_every_kind_of_change_is_seen() -> None:

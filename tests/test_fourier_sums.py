@@ -1,4 +1,6 @@
-"""Fourier sums beyond 15 digits, in fixed point and in balls, and their clock where that of panels does not reach."""
+"""Fourier sums beyond 15 digits, in fixed point and in balls, and their clock where that of panels
+does not reach.
+"""
 
 from __future__ import annotations
 
@@ -33,34 +35,49 @@ def complex_products(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
 
 
 @pytest.mark.parametrize("bits", [60, 216, 800])
-def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np.random.Generator) -> None:
+def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(
+    bits: int, rng: np.random.Generator
+) -> None:
     count, unit = 40, Fraction(1, 2**bits)
     angles = rng.uniform(0, 7, 3)
     first = FixedPoint.of([np.stack([np.cos(angles), np.sin(angles)])], bits)
     table = first[0, :].turns(first[1, :], count)
-    found, w = np.array(in_rationals(table.parts()), dtype=object).reshape(2, count, 3), in_rationals(first.parts())
+    found, w = (
+        np.array(in_rationals(table.parts()), dtype=object).reshape(2, count, 3),
+        in_rationals(first.parts()),
+    )
     power = [Fraction(1)] * 3 + [Fraction(0)] * 3
     for m in range(count):
         for got, exact in zip(found[:, m].ravel(), power, strict=True):
             assert abs(got - exact) <= 3 * max(m - 1, 0) * unit, m
         power = complex_products(power, w)
-    x, y = FixedPoint(table.limbs[:, 0].swapaxes(1, 2)), FixedPoint(table.limbs[:, 1].swapaxes(1, 2))
+    x, y = (
+        FixedPoint(table.limbs[:, 0].swapaxes(1, 2)),
+        FixedPoint(table.limbs[:, 1].swapaxes(1, 2)),
+    )
     for n, got in enumerate(in_rationals(x.dot(y).parts())):
         assert abs(got - sum(found[0, :, n] * found[1, :, n])) <= count * unit
-    many = FixedPoint(np.tile(x.limbs[:, :1], (1, 1, 60)))  # more than one product of matrices takes
+    # more than one product of matrices takes
+    many = FixedPoint(np.tile(x.limbs[:, :1], (1, 1, 60)))
     once = sum(found[0, :, 0] ** 2)
     assert abs(in_rationals(many.dot(many).parts())[0] - 60 * once) <= 60 * count * unit
 
 
 def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[Any, Any, Any]:
-    """Return modes of which no two are opposite, their coefficients, of which one may be open, and points, exact numbers."""
+    """Return modes of which no two are opposite, their coefficients, of which one may be open, and
+    points, exact numbers.
+    """
     modes = np.unique(rng.integers(-9, 10, (60, genus)), axis=0)
     first = modes[np.arange(len(modes)), np.argmax(modes != 0, axis=1)]
     modes = rng.permutation(modes[first > 0]) * -1
     coefficients = xp.array(rng.normal(size=len(modes))) * xp.number(size) / xp.number(3)
     if size != 1:
         coefficients[-1] = xp.add_error(coefficients[-1], coefficients[-1] * xp.epsilon)
-    return modes, coefficients, xp.midpoints(xp.array(rng.uniform(-2, 2, (11, genus))) / xp.number(7))
+    return (
+        modes,
+        coefficients,
+        xp.midpoints(xp.array(rng.uniform(-2, 2, (11, genus))) / xp.number(7)),
+    )
 
 
 @pytest.mark.parametrize("digits", [18, 61, 240])
@@ -68,14 +85,19 @@ def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[A
 def test_sums_over_modes_hold_those_in_balls(
     genus: int, digits: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With coefficients of all sizes, some places of the box at a time too; and the radii are not empty promises."""
+    """With coefficients of all sizes, some places of the box at a time too; and the radii are not
+    empty promises.
+    """
     with balls(digits, False) as xp:
         for size, places in zip(SIZES, (300, 7, 1), strict=True):
             monkeypatch.setattr(enclosed_waves, "_PLACES", places)
             modes, coefficients, points = drawn(genus, size, xp, rng)
             with xp.at(digits + 30) as finer:
                 waves = finer.waves(modes, finer.turns(points))
-                exact = [finer.product(wave.T, xp.midpoints(coefficients)[:, None])[:, 0] for wave in waves]
+                exact = [
+                    finer.product(wave.T, xp.midpoints(coefficients)[:, None])[:, 0]
+                    for wave in waves
+                ]
             for kind, expected in zip(KINDS, exact, strict=True):
                 with monkeypatch.context() as without:
                     without.setattr(Balls, "waves", None)  # nothing is left to balls
@@ -86,15 +108,25 @@ def test_sums_over_modes_hold_those_in_balls(
 
 @pytest.mark.parametrize("digits", [18, 61, 240])
 @pytest.mark.parametrize("genus", [2, 3])
-def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.random.Generator) -> None:
+def test_sums_over_points_hold_those_in_balls(
+    genus: int, digits: int, rng: np.random.Generator
+) -> None:
     with balls(digits, False) as xp:
         modes, _, points = drawn(genus, 1, xp, rng)
-        weights = np.stack([xp.array(rng.normal(size=len(points))) * xp.number(size) / xp.number(3) for size in SIZES])
+        weights = np.stack(
+            [
+                xp.array(rng.normal(size=len(points))) * xp.number(size) / xp.number(3)
+                for size in SIZES
+            ]
+        )
         sums = SumsOverPoints(xp.turns(points), weights, 9, xp)
         assert sums._in_fixed_point is not None
         with xp.at(digits + 30) as finer:
-            expected = finer.product(finer.waves(modes, finer.turns(points))[0], xp.midpoints(weights).T)
-        for rows in (slice(0, 1), slice(None)):  # rows of modes are kept from the first to the second
+            expected = finer.product(
+                finer.waves(modes, finer.turns(points))[0], xp.midpoints(weights).T
+            )
+        # rows of modes are kept from the first to the second
+        for rows in (slice(0, 1), slice(None)):
             for found, plain in zip(sums.cosines(modes[rows]), expected[rows], strict=True):
                 for a, b, size in zip(found, plain, SIZES, strict=True):
                     assert a.contains(b)
@@ -102,33 +134,60 @@ def test_sums_over_points_hold_those_in_balls(genus: int, digits: int, rng: np.r
 
 
 def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Generator) -> None:
-    """Of more digits than doubles have room for, of no size, of no modes, and at points that are open to a digit or two."""
-    for digits, size, slack, genus in ((300, 1, 0, 3), (30, 0, 0, 2), (30, 10**200, 0, 1), (30, 1, Fraction(1, 1000), 2)):
+    """Of more digits than doubles have room for, of no size, of no modes, and at points that are
+    open to a digit or two.
+    """
+    for digits, size, slack, genus in (
+        (300, 1, 0, 3),
+        (30, 0, 0, 2),
+        (30, 10**200, 0, 1),
+        (30, 1, Fraction(1, 1000), 2),
+    ):
         with balls(digits, False) as xp:
             modes, coefficients, _ = drawn(genus, size, xp, rng)
-            turns = xp.turns(xp.add_error(xp.array(rng.uniform(-1, 1, (4, genus))), xp.number(slack)))
+            turns = xp.turns(
+                xp.add_error(xp.array(rng.uniform(-1, 1, (4, genus))), xp.number(slack))
+            )
             weights = coefficients[None, :4]
             points = SumsOverPoints(turns, weights, 9, xp)
             assert points._in_fixed_point is None
             of_points = xp.product(xp.waves(modes, turns)[0], weights.T)
-            assert all((a - b).contains(0) for a, b in zip(points.cosines(modes)[:, 0], of_points[:, 0], strict=True))
+            assert all(
+                (a - b).contains(0)
+                for a, b in zip(points.cosines(modes)[:, 0], of_points[:, 0], strict=True)
+            )
             for kind, waves in zip(KINDS, xp.waves(modes, turns), strict=True):
                 expected = xp.product(waves.T, coefficients[:, None])[:, 0]
-                for a, b in zip(sums_over_modes(kind, modes, coefficients, turns, xp), expected, strict=True):
+                for a, b in zip(
+                    sums_over_modes(kind, modes, coefficients, turns, xp), expected, strict=True
+                ):
                     assert (a - b).contains(0)
-                assert sums_over_modes(kind, modes[:0], coefficients[:0], turns, xp).tolist() == [0] * 4
+                assert (
+                    sums_over_modes(kind, modes[:0], coefficients[:0], turns, xp).tolist()
+                    == [0] * 4
+                )
 
 
 @pytest.mark.parametrize("A", [["3", "2", "1.2"], ["4", "3", "2", "1"]])
-def test_modes_take_over_where_panels_do_not_reach(A: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    body, times = vs.Veselova(A, [1, 1, 1, 1][-len(A) :], [1, -2, 3, 1][-len(A) :], normalize=True), ["-1e-30", "0.5", 7]
+def test_modes_take_over_where_panels_do_not_reach(
+    A: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, times = (
+        vs.Veselova(A, [1, 1, 1, 1][-len(A) :], [1, -2, 3, 1][-len(A) :], normalize=True),
+        ["-1e-30", "0.5", 7],
+    )
     by_panels = vs.solve(body, times, digits=20)
     monkeypatch.setattr(enclosed_clock, "_MOST_NODES", 10)
     by_modes = vs.solve(body, times, digits=20)
-    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == [
+        "panels",
+        "fourier",
+    ]
     assert by_panels.decimals is not None
     assert by_modes.decimals is not None
-    difference = np.abs(by_panels.decimals.midpoints["frame"] - by_modes.decimals.midpoints["frame"])
+    difference = np.abs(
+        by_panels.decimals.midpoints["frame"] - by_modes.decimals.midpoints["frame"]
+    )
     assert np.max(difference) < 1e-20
     assert float(max(by_modes.decimals.error)) < 1e-20
     with pytest.raises(vs.Unsolved) as caught:
@@ -141,12 +200,17 @@ def test_panels_take_over_where_there_are_too_many_modes(monkeypatch: pytest.Mon
     by_modes = vs.solve(body, [300], digits=20)
     monkeypatch.setattr(enclosed_fourier, "MOST_MODES", 30)
     by_panels = vs.solve(body, [300], digits=20)
-    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == [
+        "panels",
+        "fourier",
+    ]
     assert np.max(np.abs(by_panels.frame - by_modes.frame)) < 1e-15
 
 
 def test_the_choice_of_a_clock_takes_no_integral_over_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside a closed cut they take digits² nodes in balls, which the route by angles does without."""
+    """Beside a closed cut they take digits² nodes in balls, which the route by angles
+    does without.
+    """
     asked: list[int] = []
     formed = Periods._forms_at_nodes
 
@@ -157,20 +221,31 @@ def test_the_choice_of_a_clock_takes_no_integral_over_gaps(monkeypatch: pytest.M
 
     monkeypatch.setattr(Periods, "_forms_at_nodes", recorded)
     body = vs.Veselova([2, 2, 1], ["2/3", "1/3", "2/3"], ["0.5", "0.5", "-0.75"])
-    assert vs.solve(body, [1, 3], digits=40, method="angles").provenance.details["regime"] == "closed-cut"
+    assert (
+        vs.solve(body, [1, 3], digits=40, method="angles").provenance.details["regime"]
+        == "closed-cut"
+    )
     assert asked == []
     vs.solve(body, [1, 3], digits=40, method="theta")
     assert asked
 
 
 def test_many_times_far_out_are_those_of_each() -> None:
-    """Ten thousand times over [0, 1000] with 50 digits are more than panels reach; some of them here."""
-    body, times = vs.Veselova([3, 2, 1], [1, 1, 1], [1, -2, 1], normalize=True), np.linspace(900, 1000, 600)
+    """Ten thousand times over [0, 1000] with 50 digits are more than panels reach; some of them
+    here.
+    """
+    body, times = (
+        vs.Veselova([3, 2, 1], [1, 1, 1], [1, -2, 1], normalize=True),
+        np.linspace(900, 1000, 600),
+    )
     many, single = vs.solve(body, times, digits=50), vs.solve(body, times[::100], digits=50)
     assert many.provenance.details["time_map"] == single.provenance.details["time_map"] == "fourier"
     assert many.decimals is not None
     assert single.decimals is not None
-    assert np.max(np.abs(many.decimals.midpoints["frame"][::100] - single.decimals.midpoints["frame"])) < 1e-50
+    assert (
+        np.max(np.abs(many.decimals.midpoints["frame"][::100] - single.decimals.midpoints["frame"]))
+        < 1e-50
+    )
 
 
 def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,21 +253,39 @@ def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) 
     by_modes = vs.solve(body, ["20"], digits=350)
     monkeypatch.setattr(time_map_balls, "MOST_MODES", 0)
     by_panels = vs.solve(body, ["20"], digits=350)
-    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == ["panels", "fourier"]
+    assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == [
+        "panels",
+        "fourier",
+    ]
     assert by_panels.decimals is not None
     assert by_modes.decimals is not None
     assert max(by_modes.decimals.error) < Decimal("1e-350")
-    assert np.max(np.abs(by_modes.decimals.midpoints["frame"] - by_panels.decimals.midpoints["frame"])) < Decimal("1e-350")
+    assert np.max(
+        np.abs(by_modes.decimals.midpoints["frame"] - by_panels.decimals.midpoints["frame"])
+    ) < Decimal("1e-350")
 
 
 @pytest.mark.parametrize("apart", [["1", "2.5"], ["1", "2", "3.5"]])
 def test_modes_of_nearly_coinciding_phases_are_found(apart: list[str]) -> None:
     """A proven radius holds them: that of panels, which know nothing of modes."""
     A = [1, *(1 + Fraction(x) / 10**16 for x in apart)]
-    body = vs.Veselova(A, ["0.797", "0.1", "0.604", "0.3"][: len(A)], ["-0.5", "0.82", "0.69", "0.4"][: len(A)], normalize=True)
-    by_modes, proven = vs.solve(body, [29, 1e5], digits=18), vs.solve(body, [29], digits=18, certified=True)
-    assert [found.provenance.details["time_map"] for found in (by_modes, proven)] == ["fourier", "panels"]
+    body = vs.Veselova(
+        A,
+        ["0.797", "0.1", "0.604", "0.3"][: len(A)],
+        ["-0.5", "0.82", "0.69", "0.4"][: len(A)],
+        normalize=True,
+    )
+    by_modes, proven = (
+        vs.solve(body, [29, 1e5], digits=18),
+        vs.solve(body, [29], digits=18, certified=True),
+    )
+    assert [found.provenance.details["time_map"] for found in (by_modes, proven)] == [
+        "fourier",
+        "panels",
+    ]
     assert by_modes.decimals is not None
     assert proven.decimals is not None
-    difference = np.max(np.abs(by_modes.decimals.midpoints["frame"][0] - proven.decimals.midpoints["frame"][0]))
+    difference = np.max(
+        np.abs(by_modes.decimals.midpoints["frame"][0] - proven.decimals.midpoints["frame"][0])
+    )
     assert difference <= by_modes.decimals.error[0] + proven.decimals.error[0]

@@ -27,7 +27,9 @@ DIMENSIONS = range(2, 9)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_the_closed_frame_is_orthonormal_everywhere_on_the_torus(n: int, rng: np.random.Generator) -> None:
+def test_the_closed_frame_is_orthonormal_everywhere_on_the_torus(
+    n: int, rng: np.random.Generator
+) -> None:
     solution = Solution(random_problem(rng, n))
     at = solution.attitude(rng.uniform(-2, 2, (100, n - 1)), "angles")
     frame = np.concatenate([at.q[:, :, None], at.normals], axis=2)
@@ -35,13 +37,17 @@ def test_the_closed_frame_is_orthonormal_everywhere_on_the_torus(n: int, rng: np
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_the_last_bits_of_a_natural_frame_change_no_number_of_a_motion(n: int, rng: np.random.Generator) -> None:
+def test_the_last_bits_of_a_natural_frame_change_no_number_of_a_motion(
+    n: int, rng: np.random.Generator
+) -> None:
     drawn, times = random_problem(rng, n), [0, 0.5, 7]
     problem = Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True)
     natural = solve(problem, times)  # before the last bits are asked for
     given = solve(Veselova(drawn.A, drawn.q, drawn.q_dot, problem.frame, normalize=True), times)
     assert np.max(np.abs(natural.frame[0] - problem.frame)) <= natural.error[0]
-    assert np.all(np.abs(natural.frame - given.frame) <= (natural.error + given.error)[:, None, None])
+    assert np.all(
+        np.abs(natural.frame - given.frame) <= (natural.error + given.error)[:, None, None]
+    )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -49,7 +55,9 @@ def test_the_normals_are_eigenvectors_of_mosers_matrix(n: int, rng: np.random.Ge
     solution = Solution(random_problem(rng, n, 10.0))
     at = solution.attitude(rng.uniform(0, 1, (10, n - 1)), "angles")
     inverse = np.array([float(x) for x in solution.spectrum.inverse])
-    constants = [float(c) for c in [*solution.spectrum.constants[1:], solution.spectrum.constants[0]]]
+    constants = [
+        float(c) for c in [*solution.spectrum.constants[1:], solution.spectrum.constants[0]]
+    ]
     for q, v, normals in zip(at.q, at.q_prime, at.normals, strict=True):
         projector = np.eye(n) - np.outer(q, q)
         matrix = projector @ (np.diag(inverse) - np.outer(v, v)) @ projector
@@ -76,7 +84,9 @@ def test_the_frame_turns_with_the_body_along_the_flow(n: int, rng: np.random.Gen
 
 
 @pytest.mark.parametrize("n", [3, 4])
-def test_normals_change_sign_analytically_with_their_cycles(n: int, rng: np.random.Generator) -> None:
+def test_normals_change_sign_analytically_with_their_cycles(
+    n: int, rng: np.random.Generator
+) -> None:
     solution = Solution(random_problem(rng, n))
     z = rng.uniform(0, 1, (5, n - 1))
     before = solution.attitude(z, "angles")
@@ -94,7 +104,9 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
     for _ in range(3):
         solution = Solution(random_problem(rng, n))
         times = np.sort(rng.uniform(-80, 80, 30))
-        fourier, panels = (EvaluationPlan(solution, times).clock(name) for name in ("fourier", "panels"))
+        fourier, panels = (
+            EvaluationPlan(solution, times).clock(name) for name in ("fourier", "panels")
+        )
         (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
         scale = np.max(np.abs(tau_panels))
         assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
@@ -107,7 +119,10 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
 def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Generator) -> None:
     solution = Solution(random_problem(rng, n))
     means = np.sort(rng.uniform(-40, 40, 30))
-    clocks = [EvaluationPlan(solution, np.array([-80.0, 80.0])).clock(name) for name in ("fourier", "panels")]
+    clocks = [
+        EvaluationPlan(solution, np.array([-80.0, 80.0])).clock(name)
+        for name in ("fourier", "panels")
+    ]
     (fourier, z_fourier), (panels, z_panels) = (clock.ahead(means) for clock in clocks)
     assert np.allclose(fourier, panels, rtol=0, atol=1e-12)
     assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
@@ -118,7 +133,9 @@ def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Gen
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Generator) -> None:
-    """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at once."""
+    """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at
+    once.
+    """
     solution = Solution(random_problem(rng, n))
     clock = EvaluationPlan(solution, np.array([1.0])).clock("fourier")
     assert isinstance(clock, FourierTimeMap)
@@ -130,7 +147,8 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     expected = np.sqrt(np.sum(A * q * q, axis=1) / start) / float(solution.spectrum.time_rate)
     assert np.allclose(series, expected, rtol=1e-12)
     assert np.allclose(solution.rate.at(solution.inversion.invert(z)), expected, rtol=1e-13)
-    # What makes a step of the inverse clock one of fourth order: the derivatives of the rate along the flow.
+    # What makes a step of the inverse clock one of fourth order: the derivatives of the rate along
+    # the flow.
     step = 1e-4 / np.max(np.abs(solution.in_tau1.rates))
     advance = z - solution.in_tau1.start
     coefficients = clock._sum.at(advance)
@@ -143,11 +161,17 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 7])
 @pytest.mark.parametrize("time", ["t", "s"])
-def test_two_theta_functions_give_the_rate_that_angles_give(n: int, time: str, rng: np.random.Generator) -> None:
-    """dt/dτ₁ is a power of |θ[η(0)]/θ|; what all places share, and an orbit adds up, is less than they scatter."""
+def test_two_theta_functions_give_the_rate_that_angles_give(
+    n: int, time: str, rng: np.random.Generator
+) -> None:
+    """dt/dτ₁ is a power of |θ[η(0)]/θ|; what all places share, and an orbit adds up, is less than
+    they scatter.
+    """
     for _ in range(4):
         body = random_problem(rng, n, 5.0)
-        problem = body if time == "t" else EllipsoidGeodesic(body.A, body.q, body.q_dot, normalize=True)
+        problem = (
+            body if time == "t" else EllipsoidGeodesic(body.A, body.q, body.q_dot, normalize=True)
+        )
         solution, z = Solution(problem), rng.uniform(0, 2, (200, n - 1))
         assert solution.problem.time == time
         off = solution.rate_at(z, in_angles=False) / solution.rate_at(z, in_angles=True) - 1
@@ -160,7 +184,10 @@ def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: in
     problem = random_problem(np.random.default_rng(n), n, 5.0)
     solution = Solution(problem)
     times = np.array([1.0, 40.0, 100.0]) / solution.fastest
-    assert [solution.takes_rate_from_angles(None, cycles) for cycles in (1.0, 100.0)] == [True, False]
+    assert [solution.takes_rate_from_angles(None, cycles) for cycles in (1.0, 100.0)] == [
+        True,
+        False,
+    ]
     assert solution.takes_rate_from_angles("angles", 100.0)
     found, in_angles = solve(problem, times), solve(problem, times, method="angles")
     assert found.provenance.method == in_angles.provenance.method == "angles"
@@ -170,11 +197,14 @@ def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: in
 
 
 def test_angles_that_are_asked_for_make_no_theta_functions() -> None:
-    problem = random_problem(np.random.default_rng(600), 6, 1000.0)  # dt/dτ₁ varies so much that the error looks at it
+    # dt/dτ₁ varies so much that the error looks at it
+    problem = random_problem(np.random.default_rng(600), 6, 1000.0)
     solution = Solution(problem)
     assert solution.moving.rate_variation > 10
     assert solution.is_even
-    solve_analytic(problem, np.array([1.0, 100.0]) / solution.fastest, method="angles", solution=solution)
+    solve_analytic(
+        problem, np.array([1.0, 100.0]) / solution.fastest, method="angles", solution=solution
+    )
     assert "quotients" not in vars(solution)
 
 
@@ -189,14 +219,20 @@ def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
 def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
     solution = Solution(near_separatrix(gap).problem())
     times = np.linspace(-30, 30, 41)
-    tau_fourier, tau_panels = (EvaluationPlan(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels"))
+    tau_fourier, tau_panels = (
+        EvaluationPlan(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels")
+    )
     assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
 
 
 def test_panels_stretch_to_the_wanted_times() -> None:
     solution = Solution(tagged("generic")[3].problem())
-    clock = ChebyshevTimeMap(partial(solution.rate_at, in_angles=False), solution.mean_rate, solution.in_tau1, -0.5, 33.0)
-    assert np.allclose(clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13)
+    clock = ChebyshevTimeMap(
+        partial(solution.rate_at, in_angles=False), solution.mean_rate, solution.in_tau1, -0.5, 33.0
+    )
+    assert np.allclose(
+        clock.time(clock.tau1(np.array([-0.5, 0.0, 33.0]))[0]), [-0.5, 0.0, 33.0], atol=1e-13
+    )
 
 
 def test_phases_far_out_are_reduced_without_losing_digits() -> None:
@@ -215,16 +251,28 @@ def test_inversion_of_an_increasing_function_needs_no_good_guess() -> None:
     def steep(x: Any, _: Any) -> Any:
         return np.tanh(50 * (x - 0.3)) + 0.01 * (x - 0.3), 50 / np.cosh(50 * (x - 0.3)) ** 2 + 0.01
 
-    roots = increasing_root(steep, np.array([-4.0, 0.31, 4.0]), np.full(3, -5.0), np.full(3, 5.0), 1e-9)
+    roots = increasing_root(
+        steep, np.array([-4.0, 0.31, 4.0]), np.full(3, -5.0), np.full(3, 5.0), 1e-9
+    )
     assert np.allclose(roots, 0.3, atol=1e-15)
-    flat = increasing_root(lambda x, _: (x, np.where(np.abs(x) > 0.5, -1.0, 1.0)), np.full(1, 0.9), -np.ones(1), np.ones(1), 1e-9)
+    flat = increasing_root(
+        lambda x, _: (x, np.where(np.abs(x) > 0.5, -1.0, 1.0)),
+        np.full(1, 0.9),
+        -np.ones(1),
+        np.ones(1),
+        1e-9,
+    )
     assert flat == 0  # a slope that is wrong, or none, is not followed
     with pytest.raises(InternalContradiction):
-        increasing_root(lambda x, _: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9)
+        increasing_root(
+            lambda x, _: (x * np.nan, x * np.nan), np.zeros(1), -np.ones(1), np.ones(1), 1e-9
+        )
 
 
 def test_settled_roots_are_left_alone() -> None:
-    """Of a thousand entries that one step settles and one that takes several, the thousand are not looked at again."""
+    """Of a thousand entries that one step settles and one that takes several, the thousand are not
+    looked at again.
+    """
     exponents, looked_at = np.append(np.ones(1000), 9.0), []
 
     def power(x: Any, rows: Any) -> Any:
@@ -243,16 +291,29 @@ def test_a_bracket_settles_what_no_step_does() -> None:
     one = np.ones(1)
     assert increasing_root(lambda x, _: (x**3, 3 * x * x), np.zeros(1), -one, one, 1e-9) == 0
     for scale in (1e-9, 1e-3):
-        jump = increasing_root(lambda x, _: (np.sign(x - 0.3), 0 * x), np.zeros(1), -one, one, scale, 1e-9)
+        jump = increasing_root(
+            lambda x, _: (np.sign(x - 0.3), 0 * x), np.zeros(1), -one, one, scale, 1e-9
+        )
         assert abs(jump[0] - 0.3) <= 1e-9
-        rough = increasing_root(lambda x, _: (x - 0.3 + 1e-6 * np.sign(np.sin(1e9 * x)), 0 * x + 1), -one, -one, one, 1e-8, 1e-9)
+        rough = increasing_root(
+            lambda x, _: (x - 0.3 + 1e-6 * np.sign(np.sin(1e9 * x)), 0 * x + 1),
+            -one,
+            -one,
+            one,
+            1e-8,
+            1e-9,
+        )
         assert abs(rough[0] - 0.3) <= 2e-6
 
 
 @pytest.mark.parametrize("spread", [5.0, 100.0])
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """t(τ₁(t)) = t to rounding wherever the last step was allowed to end, and A's within a factor of 5 take two sums."""
+def test_the_inverse_clock_leaves_rounding_after_two_sums(
+    n: int, spread: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """t(τ₁(t)) = t to rounding wherever the last step was allowed to end, and A's within a factor
+    of 5 take two sums.
+    """
     rng, sums, few = np.random.default_rng(8), [], 0
     plain = fourier_clock._Sum.at
 
@@ -261,7 +322,9 @@ def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float,
         return plain(modes, advance)
 
     for _ in range(12):
-        clock = EvaluationPlan(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock("fourier")
+        clock = EvaluationPlan(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock(
+            "fourier"
+        )
         assert isinstance(clock, FourierTimeMap)
         times = np.sort(rng.uniform(-20, 20, 40))
         together, _ = clock.tau1(times)
@@ -279,7 +342,9 @@ def test_the_inverse_clock_leaves_rounding_after_two_sums(n: int, spread: float,
 
 @pytest.mark.slow
 def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
-    """A's over seven orders: dt/dτ₁ is thirty times smaller at one of the times than its mean, and τ₁ as much less certain."""
+    """A's over seven orders: dt/dτ₁ is thirty times smaller at one of the times than its mean, and
+    τ₁ as much less certain.
+    """
     name, problem = adversarial_start(np.random.default_rng([510, 275]), 4)
     assert name == "wide A's"
     times = np.array([-10, -3, 0.1, 1, 4, 10]) * 0.3 / np.max(np.abs(problem.q_dot))
@@ -292,7 +357,11 @@ def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
 @pytest.mark.parametrize(
     ("A", "q", "q_dot"),
     [
-        (["250/513", "500/373", "50850250/375909129"], ["1/250942", "-451/1000", "114/125"], ["-461/1000", "36/125", "-189/200"]),
+        (
+            ["250/513", "500/373", "50850250/375909129"],
+            ["1/250942", "-451/1000", "114/125"],
+            ["-461/1000", "36/125", "-189/200"],
+        ),
         (
             [14147.070577173487, 34.19169315663742, 29.082953358331732],
             [-0.842449710659526, 0.10501640977494625, 0.5284411402300748],
@@ -300,22 +369,35 @@ def test_errors_of_the_clock_count_by_the_rate_where_they_fall() -> None:
         ),
     ],
 )
-def test_modes_that_are_met_again_are_not_taken_again(A: list[object], q: list[object], q_dot: list[object]) -> None:
-    """Next to the edge of the set a mode may be found large, or not, by the rounding of the nodes at hand."""
+def test_modes_that_are_met_again_are_not_taken_again(
+    A: list[object], q: list[object], q_dot: list[object]
+) -> None:
+    """Next to the edge of the set a mode may be found large, or not, by the rounding of the nodes
+    at hand.
+    """
     problem = Veselova(A, q, q_dot, normalize=True)
     times = np.array([0.3, 1.0, 5.0]) / np.max(np.abs(Solution(problem).in_time.rates))
-    fourier, panels = (solve_analytic(problem, times, time_map=clock) for clock in ("fourier", "panels"))
+    fourier, panels = (
+        solve_analytic(problem, times, time_map=clock) for clock in ("fourier", "panels")
+    )
     difference = np.max(np.abs(fourier.frame - panels.frame), axis=(1, 2))
     assert np.all(difference <= fourier.error + panels.error)
 
 
 @pytest.mark.parametrize("gap", [1e-4, 3e-6, 1e-7, 2e-9])
 @pytest.mark.parametrize("n", [3, 4, 5])
-def test_modes_of_nearly_coinciding_phases_are_found(n: int, gap: float, rng: np.random.Generator) -> None:
-    """With all A's nearly equal the modes with Σm = 1 count, as far as slow differences reach, and neither Σm = 0 nor 2 does."""
+def test_modes_of_nearly_coinciding_phases_are_found(
+    n: int, gap: float, rng: np.random.Generator
+) -> None:
+    """With all A's nearly equal the modes with Σm = 1 count, as far as slow differences reach, and
+    neither Σm = 0 nor 2 does.
+    """
     A = 1.7 * (1 + gap * np.cumsum(rng.uniform(0.5, 2, n)))
     solution = Solution(Veselova(A, rng.normal(size=n), rng.normal(size=n), normalize=True))
-    clocks = [EvaluationPlan(solution, np.array([0.0, 30.0])).clock(name) for name in ("fourier", "panels")]
+    clocks = [
+        EvaluationPlan(solution, np.array([0.0, 30.0])).clock(name)
+        for name in ("fourier", "panels")
+    ]
     fourier, panels = (clock.tau1(np.linspace(0, 30, 50))[0] for clock in clocks)
     assert np.max(np.abs(fourier - panels)) < 1e-13
 
@@ -327,7 +409,10 @@ def test_no_mode_is_looked_at_twice() -> None:
 
     def coefficients(modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rows = list(map(tuple, modes.tolist()))
-        large = [max(map(abs, m)) <= 6 and m not in wall and (m != (2, 0) or m in looked_at) for m in rows]
+        large = [
+            max(map(abs, m)) <= 6 and m not in wall and (m != (2, 0) or m in looked_at)
+            for m in rows
+        ]
         looked_at.extend(rows)
         return np.ones(len(rows)), np.array(large)
 
@@ -352,33 +437,52 @@ def test_modes_end_next_to_a_separatrix(q_2: str, q_dot_2: str) -> None:
     assert found.provenance.details["time_map_size"] < 4000
     assert np.max(found.error) < 1e-10
     by_panels = solve_analytic(problem, [2000.0], time_map="panels")
-    assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+    assert (
+        np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+    )
 
 
 def test_modes_end_where_one_column_stays_and_the_other_is_rounding() -> None:
-    """Next to a separatrix of wide A's determinants never fall below the rounding of angles, which grow with the modes."""
-    A, q = [1.0, 390.21320456884774, 1.6904640691868722], [1.4480029447187863, 1.8618863684064193, -9.235342032590449e-09]
-    problem = Veselova(A, q, [-1.0297444583406776, 0.2868748135792803, 8.900348438623115e-11], normalize=True)
+    """Next to a separatrix of wide A's determinants never fall below the rounding of angles, which
+    grow with the modes.
+    """
+    A, q = (
+        [1.0, 390.21320456884774, 1.6904640691868722],
+        [1.4480029447187863, 1.8618863684064193, -9.235342032590449e-09],
+    )
+    problem = Veselova(
+        A, q, [-1.0297444583406776, 0.2868748135792803, 8.900348438623115e-11], normalize=True
+    )
     found = solve(problem, [2000.0, 1e8])
     assert found.provenance.details["time_map_size"] < 8000
     assert np.max(found.error) < 1e-9
     by_panels = solve_analytic(problem, [2000.0], time_map="panels")
-    assert np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+    assert (
+        np.max(np.abs(found.frame[0] - by_panels.frame[0])) <= found.error[0] + by_panels.error[0]
+    )
 
 
 def test_nodes_follow_modes_where_forms_are_steep() -> None:
-    """Next to a separatrix e^{−2πi m·G} turns far faster than the entries of m say, and too few nodes take it for a slow wave."""
+    """Next to a separatrix e^{−2πi m·G} turns far faster than the entries of m say, and too few
+    nodes take it for a slow wave.
+    """
     rate = Solution(near_unstable_circle(*NEAR_A_SEPARATRIX[-1])).rate
     columns = ColumnsForModes(rate, lambda weights, G, _: (weights, G))
     for modes in (np.array([[1, 0]]), np.array([[20, 36], [16, 42], [14, 50], [58, 32], [0, 86]])):
         for (weights, G), (finer, finer_G) in zip(columns(modes), rate.columns(4000), strict=True):
-            found, expected = (w @ np.cos(2 * np.pi * g @ modes.T) for w, g in ((weights, G), (finer, finer_G)))
+            found, expected = (
+                w @ np.cos(2 * np.pi * g @ modes.T) for w, g in ((weights, G), (finer, finer_G))
+            )
             assert np.max(np.abs(found - expected)) < 3e-14 * np.max(np.abs(finer).sum(axis=1))
 
 
 def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:
-    """Over twenty-five orders of A the least dt/dτ₁ is below the rounding of the mean, and sums over modes need not increase."""
-    problem = Veselova([1e25, 30.0, 2.0, 1.0], [0.3, 0.5, 0.4, 0.7], [0.2, -0.4, 0.6, 0.1], normalize=True)
+    """Over twenty-five orders of A the least dt/dτ₁ is below the rounding of the mean, and sums
+    over modes need not increase.
+    """
+    problem = Veselova(
+        [1e25, 30.0, 2.0, 1.0], [0.3, 0.5, 0.4, 0.7], [0.2, -0.4, 0.6, 0.1], normalize=True
+    )
     with pytest.raises(Unsolved, match="beyond-floats: dt/dτ₁ may vary by"):
         solve_analytic(problem, [0.1], time_map="fourier")
     found = solve(problem, [0.1, 1.0])

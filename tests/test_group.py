@@ -1,4 +1,6 @@
-"""Compact matrix groups and inertia operators: products, brackets, projection, and what is refused."""
+"""Compact matrix groups and inertia operators: products, brackets, projection, and
+what is refused.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def levi_civita() -> Any:
 
 
 @pytest.mark.parametrize("name", GROUPS)
-def test_the_product_of_a_group_is_invariant_and_its_brackets_close(name: str, rng: np.random.Generator) -> None:
+def test_the_product_of_a_group_is_invariant_and_its_brackets_close(
+    name: str, rng: np.random.Generator
+) -> None:
     group = group_named(name)
     x, y, z = rng.normal(size=(3, group.dimension))
     g = group.exponential(rng.normal(size=group.dimension))
@@ -34,7 +38,11 @@ def test_the_product_of_a_group_is_invariant_and_its_brackets_close(name: str, r
     assert np.allclose(group.coordinates(group.basis), np.eye(group.dimension), atol=1e-14)
     assert np.allclose(np.einsum("a,b,abk->k", x, y, c), group.bracket(x, y), atol=1e-12)
     assert np.allclose(c, -np.swapaxes(c, 1, 2), atol=1e-13)  # ⟨[X,Y],Z⟩ = ⟨X,[Y,Z]⟩
-    jacobi = group.bracket(x, group.bracket(y, z)) + group.bracket(y, group.bracket(z, x)) + group.bracket(z, group.bracket(x, y))
+    jacobi = (
+        group.bracket(x, group.bracket(y, z))
+        + group.bracket(y, group.bracket(z, x))
+        + group.bracket(z, group.bracket(x, y))
+    )
     assert np.max(np.abs(jacobi)) < 1e-12
     assert np.allclose(group.element(group.adjoint(g, x)), g @ group.element(x) @ g.T, atol=1e-12)
     assert np.isclose(np.linalg.norm(group.adjoint(g, x)), np.linalg.norm(x))
@@ -43,11 +51,15 @@ def test_the_product_of_a_group_is_invariant_and_its_brackets_close(name: str, r
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])
-def test_the_basis_of_so_n_is_orthonormal_for_minus_half_the_trace_and_lexicographic(n: int) -> None:
+def test_the_basis_of_so_n_is_orthonormal_for_minus_half_the_trace_and_lexicographic(
+    n: int,
+) -> None:
     group = MatrixGroup.so(n)
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
     for (i, j), X in zip(pairs, group.basis, strict=True):
-        assert np.array_equal(X, np.outer(np.eye(n)[i], np.eye(n)[j]) - np.outer(np.eye(n)[j], np.eye(n)[i]))
+        assert np.array_equal(
+            X, np.outer(np.eye(n)[i], np.eye(n)[j]) - np.outer(np.eye(n)[j], np.eye(n)[i])
+        )
     products = -np.trace(group.basis[:, None] @ group.basis[None], axis1=-2, axis2=-1) / 2
     assert np.array_equal(products, np.eye(len(pairs)))
 
@@ -90,7 +102,9 @@ J = [[0, 1], [-1, 0]]
         ("basis[0]", ["ab"], "a square matrix"),
     ],
 )
-def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(field: str, basis: Any, words: str) -> None:
+def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(
+    field: str, basis: Any, words: str
+) -> None:
     with pytest.raises(InvalidInput) as raised:
         MatrixGroup(basis)
     assert raised.value.field == field
@@ -117,7 +131,9 @@ def test_groups_of_no_size_are_refused(call: Any, value: Any) -> None:
 )
 def test_a_matrix_off_the_group_is_refused_with_how_far(name: str, matrix: Any) -> None:
     group = group_named(name)
-    with pytest.raises(InvalidInput, match="a matrix of the group to 1e-9; given one that is off it by") as raised:
+    with pytest.raises(
+        InvalidInput, match="a matrix of the group to 1e-9; given one that is off it by"
+    ) as raised:
         LRSystem.on(group, np.eye(group.dimension), [], matrix, group.basis[0])
     assert raised.value.field == "g"
 
@@ -134,7 +150,9 @@ def test_the_special_operator_is_a_omega_a_over_det_a(n: int, rng: np.random.Gen
     assert matrix.operator.ndim == 1
 
 
-def test_in_three_dimensions_the_special_operator_is_any_inertia_tensor(rng: np.random.Generator) -> None:
+def test_in_three_dimensions_the_special_operator_is_any_inertia_tensor(
+    rng: np.random.Generator,
+) -> None:
     A, x, y = np.exp(rng.normal(size=3)), *rng.normal(size=(2, 3))
     group = MatrixGroup.so(3)
     inertia = Inertia.special(A, 3)
@@ -146,7 +164,9 @@ def test_in_three_dimensions_the_special_operator_is_any_inertia_tensor(rng: np.
     assert np.allclose(moved, np.cross(A * x, A * y) / np.prod(A))  # 𝓘(x×y) = Ax×Ay/det A
 
 
-def test_an_operator_is_scaled_to_moments_near_one_by_a_power_of_two(rng: np.random.Generator) -> None:
+def test_an_operator_is_scaled_to_moments_near_one_by_a_power_of_two(
+    rng: np.random.Generator,
+) -> None:
     inertia = random_inertia(rng, 6)
     scaled = Inertia.of_matrix(2.0**40 * inertia.matrix, 6).rescale()
     mantissa = np.log2(scaled.matrix[0, 0] / inertia.matrix[0, 0])

@@ -79,7 +79,9 @@ def test_a_comparison_has_both_engines_and_their_differences(server: Server) -> 
     assert document["agrees"] is True
     assert set(document["seconds"]) == {"analytic", "numeric"}
     assert list(document["analytic"]["series"]) == ["q"]
-    assert is_problem(post(server, "/v1/comparisons", {**GOOD, "engine": "numeric"}), 422, "invalid-input")
+    assert is_problem(
+        post(server, "/v1/comparisons", {**GOOD, "engine": "numeric"}), 422, "invalid-input"
+    )
 
 
 def test_a_torus_is_the_one_of_the_library(server: Server) -> None:
@@ -88,20 +90,30 @@ def test_a_torus_is_the_one_of_the_library(server: Server) -> None:
 
 
 def test_the_worked_examples_of_the_document_are_true(server: Server) -> None:
-    motion = post(server, "/v1/trajectories", {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}).json()
+    motion = post(
+        server,
+        "/v1/trajectories",
+        {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
+    ).json()
     for name, values in ANSWERS["trajectory"]["series"].items():
         assert np.allclose(motion["series"][name], values, atol=1e-12)
     assert set(ANSWERS["trajectory"]) == set(motion)
     found = post(server, "/v1/tori", {"problem": BODY4_PROBLEM}).json()
     assert set(ANSWERS["torus"]) == set(found)
     for name, value in ANSWERS["torus"].items():
-        same = found[name] == value if name in ("origins", "regime") else np.allclose(found[name], value, atol=1e-9)
+        same = (
+            found[name] == value
+            if name in ("origins", "regime")
+            else np.allclose(found[name], value, atol=1e-9)
+        )
         assert same, name
 
 
 def test_the_openapi_document_describes_and_exemplifies_every_resource(server: Server) -> None:
     document = server.get("/openapi.json").json()
-    assert {"/v1/trajectories", "/v1/trajectories/{name}", "/v1/comparisons", "/v1/tori"} < set(document["paths"])
+    assert {"/v1/trajectories", "/v1/trajectories/{name}", "/v1/comparisons", "/v1/tori"} < set(
+        document["paths"]
+    )
     for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori"):
         operation = document["paths"][path]["post"]
         body = operation["requestBody"]["content"]["application/json"]
@@ -120,7 +132,9 @@ def test_systems_health_and_readiness(server: Server) -> None:
     assert server.get("/readyz").json() == {"status": "ready"}
 
 
-@pytest.mark.parametrize(("body", "pointer"), [row[1:] for row in INVALID], ids=[row[0] for row in INVALID])
+@pytest.mark.parametrize(
+    ("body", "pointer"), [row[1:] for row in INVALID], ids=[row[0] for row in INVALID]
+)
 def test_invalid_input_gets_422_with_a_pointer(server: Server, body: str, pointer: str) -> None:
     document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
     fault = document["errors"][0]
@@ -130,7 +144,9 @@ def test_invalid_input_gets_422_with_a_pointer(server: Server, body: str, pointe
     assert "\n" not in fault["detail"]
 
 
-@pytest.mark.parametrize(("given", "word"), [(None, "null"), (True, "true"), (False, "false"), ("None", "'None'")])
+@pytest.mark.parametrize(
+    ("given", "word"), [(None, "null"), (True, "true"), (False, "false"), ("None", "'None'")]
+)
 def test_constants_are_reported_as_json_spells_them(server: Server, given: Any, word: str) -> None:
     bad = {**GOOD, "problem": {**GOOD["problem"], "A": [3, given, 1]}}
     document = is_problem(post(server, "/v1/trajectories", bad), 422, "invalid-input")
@@ -159,7 +175,11 @@ def test_headers_without_end_are_not_read(server: Server) -> None:
 
 
 def test_several_faults_are_reported_together(server: Server) -> None:
-    document = is_problem(post(server, "/v1/trajectories", changed(engine="x", digits=3, outputs=[])), 422, "invalid-input")
+    document = is_problem(
+        post(server, "/v1/trajectories", changed(engine="x", digits=3, outputs=[])),
+        422,
+        "invalid-input",
+    )
     assert {fault["pointer"] for fault in document["errors"]} == {"/engine", "/digits", "/outputs"}
 
 
@@ -181,12 +201,23 @@ def test_a_body_of_200_megabytes_is_refused(server: Server, chunked: bool) -> No
 
 @pytest.mark.parametrize("media_type", ["text/plain", "application/x-www-form-urlencoded", ""])
 def test_another_media_type_gets_415(server: Server, media_type: str) -> None:
-    is_problem(post(server, "/v1/tori", GOOD, **{"content-type": media_type}), 415, "unsupported-media-type")
+    is_problem(
+        post(server, "/v1/tori", GOOD, **{"content-type": media_type}),
+        415,
+        "unsupported-media-type",
+    )
 
 
 def test_a_coded_body_gets_415_and_a_byte_order_mark_is_none(server: Server) -> None:
-    is_problem(post(server, "/v1/tori", GOOD, **{"content-encoding": "gzip"}), 415, "unsupported-media-type")
-    assert post(server, "/v1/trajectories", b"\xef\xbb\xbf" + json.dumps(GOOD).encode()).status_code == 200
+    is_problem(
+        post(server, "/v1/tori", GOOD, **{"content-encoding": "gzip"}),
+        415,
+        "unsupported-media-type",
+    )
+    assert (
+        post(server, "/v1/trajectories", b"\xef\xbb\xbf" + json.dumps(GOOD).encode()).status_code
+        == 200
+    )
     empty = is_problem(post(server, "/v1/tori", b" "), 400, "malformed-json")
     assert empty["detail"] == "The body: required one JSON document; given nothing."
 
@@ -199,12 +230,17 @@ def test_head_is_get_without_a_body(server: Server, path: str) -> None:
     assert told.headers["content-length"] == asked.headers["content-length"]
 
 
-@pytest.mark.parametrize("accept", ["application/json", "application/*;q=0.5", "*/*", "text/html, */*;q=0.1"])
+@pytest.mark.parametrize(
+    "accept", ["application/json", "application/*;q=0.5", "*/*", "text/html, */*;q=0.1"]
+)
 def test_json_is_served_to_who_takes_it(server: Server, accept: str) -> None:
     assert post(server, "/v1/trajectories", GOOD, accept=accept).status_code == 200
 
 
-@pytest.mark.parametrize("accept", ["text/html", "image/png", "application/json;q=0, application/x-npz;q=0", "text/*;q=0"])
+@pytest.mark.parametrize(
+    "accept",
+    ["text/html", "image/png", "application/json;q=0, application/x-npz;q=0", "text/*;q=0"],
+)
 def test_what_cannot_be_served_gets_406(server: Server, accept: str) -> None:
     is_problem(post(server, "/v1/trajectories", GOOD, accept=accept), 406, "not-acceptable")
 
@@ -243,7 +279,9 @@ def test_unknown_paths_and_methods_are_problems_too(server: Server) -> None:
         ),
     ],
 )
-def test_a_named_outcome_is_a_problem_with_its_name(server: Server, path: str, change: dict[str, Any], outcome: str) -> None:
+def test_a_named_outcome_is_a_problem_with_its_name(
+    server: Server, path: str, change: dict[str, Any], outcome: str
+) -> None:
     request = {**GOOD, **change}
     if path == "/v1/tori":
         del request["times"]
@@ -252,7 +290,9 @@ def test_a_named_outcome_is_a_problem_with_its_name(server: Server, path: str, c
 
 def test_work_over_its_budget_is_stopped(server: Server) -> None:
     before = set(server.workers())
-    stopped = server.ask("POST", "/v1/trajectories", json={**ENDLESS, "budget_s": 0.5}, timeout=BUDGET_S / 2)
+    stopped = server.ask(
+        "POST", "/v1/trajectories", json={**ENDLESS, "budget_s": 0.5}, timeout=BUDGET_S / 2
+    )
     is_problem(stopped, 504, "over-budget")
     assert before
     wait_until(lambda: len(before - set(server.workers())) == 1)
@@ -262,9 +302,14 @@ def test_work_over_its_budget_is_stopped(server: Server) -> None:
 def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1", max_budget_s=str(2 * PATIENCE)) as own:
         before = set(own.workers())
-        with socket.create_connection((urlsplit(own.url).hostname, urlsplit(own.url).port)) as connection:
+        with socket.create_connection(
+            (urlsplit(own.url).hostname, urlsplit(own.url).port)
+        ) as connection:
             body = json.dumps({**ENDLESS, "budget_s": 2 * PATIENCE}).encode()
-            head = b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            head = (
+                b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+                b"application/json\r\n"
+            )
             connection.sendall(head + b"Content-Length: %d\r\n\r\n" % len(body) + body)
             wait_until(lambda: own.at_work() == (1, 0))
         wait_until(lambda: own.at_work() == (0, 0))
@@ -294,16 +339,21 @@ def test_without_a_queue_a_free_worker_still_serves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("accept", "status"), [("application/json;q=0, */*", 406), ("text/html, */*;q=0.1", 200), ("text/csv", 406)]
+    ("accept", "status"),
+    [("application/json;q=0, */*", 406), ("text/html, */*;q=0.1", 200), ("text/csv", 406)],
 )
 def test_the_most_specific_media_range_decides(server: Server, accept: str, status: int) -> None:
-    assert post(server, "/v1/tori", {"problem": GOOD["problem"]}, accept=accept).status_code == status
+    assert (
+        post(server, "/v1/tori", {"problem": GOOD["problem"]}, accept=accept).status_code == status
+    )
 
 
 def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
         answers: list[httpx2.Response] = []
-        thread = threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
+        thread = threading.Thread(
+            target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS))
+        )
         thread.start()
         wait_until(lambda: own.at_work() == (1, 0))
         os.kill(own.workers()[0], signal.SIGKILL)
@@ -311,7 +361,8 @@ def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path
         is_problem(answers[0], 503, "worker-lost")
         assert answers[0].headers["retry-after"] == "1"
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
-        os.kill(own.workers()[0], signal.SIGKILL)  # an idle worker: the next request may meet its remains, the one after not
+        # an idle worker: the next request may meet its remains, the one after not
+        os.kill(own.workers()[0], signal.SIGKILL)
         assert post(own, "/v1/trajectories", GOOD).status_code in (200, 503)
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
 
@@ -319,7 +370,10 @@ def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1", max_waiting="1", shutdown_grace_s="1") as own:
         answers: list[httpx2.Response] = []
-        threads = [threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS))) for _ in range(4)]
+        threads = [
+            threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
+            for _ in range(4)
+        ]
         for thread in threads:
             thread.start()
         wait_until(lambda: len(answers) == 2)
@@ -352,7 +406,9 @@ def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: 
     with running_server(tmp_path, workers="1", shutdown_grace_s="1") as own:
         workers = own.workers()
         answers: list[Any] = []
-        thread = threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
+        thread = threading.Thread(
+            target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS))
+        )
         thread.start()
         wait_until(lambda: own.at_work() == (1, 0))
         if from_terminal:
@@ -388,7 +444,9 @@ try:
 except KeyboardInterrupt:
     print("awake")
 """
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout
         process.stdout.readline()
         process.send_signal(signal.SIGINT)
@@ -396,14 +454,22 @@ except KeyboardInterrupt:
 
 
 def test_the_server_stays_small(tmp_path: Path) -> None:
-    """Resident memory of a server of its own and its worker after the first answers: below 300 MB."""
+    """Resident memory of a server of its own and its worker after the first answers:
+    below 300 MB.
+    """
 
     def resident(pid: int) -> float:
-        line = next(line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("VmRSS"))
+        line = next(
+            line
+            for line in Path(f"/proc/{pid}/status").read_text().splitlines()
+            if line.startswith("VmRSS")
+        )
         return float(line.split()[1]) / 1024
 
     with running_server(tmp_path, workers="1") as own:
         for engine in ("analytic", "numeric"):
             assert post(own, "/v1/trajectories", {**GOOD, "engine": engine}).status_code == 200
-        with_one_worker = resident(own.process.pid) + max(resident(worker) for worker in own.workers())
+        with_one_worker = resident(own.process.pid) + max(
+            resident(worker) for worker in own.workers()
+        )
     assert with_one_worker < 300

@@ -1,4 +1,6 @@
-"""What comes on a connection: requests in any pieces and order, heads without end, upgrades, broken HTTP."""
+"""What comes on a connection: requests in any pieces and order, heads without end, upgrades, broken
+HTTP.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,10 @@ from veselova.service.api.examples import BODY4_PROBLEM
 
 HOST = b"Host: localhost\r\n"
 HEALTH = b"GET /healthz HTTP/1.1\r\n" + HOST + b"\r\n"
-UPGRADE = b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAEAAEAAAAIAAAABAAMAAABkAAQBAAAAAAUAAEAA\r\n"
+UPGRADE = (
+    b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: "
+    b"AAEAAEAAAAIAAAABAAMAAABkAAQBAAAAAAUAAEAA\r\n"
+)
 
 
 @contextmanager
@@ -29,7 +34,9 @@ def connected(server: Server) -> Iterator[socket.socket]:
 
 
 def received(connection: socket.socket, count: int) -> list[tuple[int, Any, str | None]]:
-    """Return (status, body, Connection) of so many answers that come, or of those before the end."""
+    """Return (status, body, Connection) of so many answers that come, or of those
+    before the end.
+    """
     answers = []
     stream = connection.makefile("rb")
     for _ in range(count):
@@ -120,7 +127,9 @@ def test_a_whole_body_comes_with_a_request_to_upgrade(server: Server) -> None:
 
 
 @pytest.mark.parametrize("before", [b"", HEALTH])
-def test_an_invented_method_gets_its_problem_document_on_any_connection(server: Server, before: bytes) -> None:
+def test_an_invented_method_gets_its_problem_document_on_any_connection(
+    server: Server, before: bytes
+) -> None:
     with connected(server) as connection:
         if before:
             connection.sendall(before)
@@ -128,12 +137,18 @@ def test_an_invented_method_gets_its_problem_document_on_any_connection(server: 
         connection.sendall(b"BREW /v1/tori HTTP/1.1\r\n" + HOST + b"\r\n")
         connection.sendall(HEALTH)
         (status, body, _), (after, _, _) = received(connection, 2)
-    assert (status, json.loads(body)["type"], after) == (501, "urn:veselova:problem:unknown-method", 200)
+    assert (status, json.loads(body)["type"], after) == (
+        501,
+        "urn:veselova:problem:unknown-method",
+        200,
+    )
 
 
 BROKEN = {
     "space before a colon": b"GET /healthz HTTP/1.1\r\nHost : x\r\n\r\n",
-    "two lengths": b"POST /v1/tori HTTP/1.1\r\n" + HOST + b"Content-Length: 3\r\nContent-Length: 4\r\n\r\nabcd",
+    "two lengths": b"POST /v1/tori HTTP/1.1\r\n"
+    + HOST
+    + b"Content-Length: 3\r\nContent-Length: 4\r\n\r\nabcd",
     "noise": bytes(range(256)),
     "no chunk": b"POST /v1/tori HTTP/1.1\r\n"
     + HOST
@@ -142,11 +157,17 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("request_", BROKEN.values(), ids=BROKEN)
-def test_what_is_no_http_gets_a_problem_document_and_the_end(server: Server, request_: bytes) -> None:
+def test_what_is_no_http_gets_a_problem_document_and_the_end(
+    server: Server, request_: bytes
+) -> None:
     with connected(server) as connection:
         connection.sendall(request_)
         ((status, body, name),) = received(connection, 2)
-    assert (status, json.loads(body)["type"], name) == (400, "urn:veselova:problem:malformed-http", "close")
+    assert (status, json.loads(body)["type"], name) == (
+        400,
+        "urn:veselova:problem:malformed-http",
+        "close",
+    )
     assert server.get("/healthz").status_code == 200
 
 
@@ -161,7 +182,10 @@ ENDLESS = {
         + b"Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n",
         b"X-Many: 1\r\n",
     ),
-    "an extension": (b"POST /v1/tori HTTP/1.1\r\n" + HOST + b"Transfer-Encoding: chunked\r\n\r\n2;", b"a"),
+    "an extension": (
+        b"POST /v1/tori HTTP/1.1\r\n" + HOST + b"Transfer-Encoding: chunked\r\n\r\n2;",
+        b"a",
+    ),
     "fields to upgrade": (b"POST /v1/tori HTTP/1.1\r\n" + HOST + UPGRADE, b"X-Many: 1\r\n"),
 }
 

@@ -58,7 +58,9 @@ def together(call: Callable[[int], Any], count: int) -> list[Any]:
         return list(pool.map(one, range(count)))
 
 
-def test_a_sweep_that_many_ask_for_at_once_is_one_job(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+def test_a_sweep_that_many_ask_for_at_once_is_one_job(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
     jobs = opened(store)
     for seed in range(5):
         sweep = sweep_request(seed=seed)
@@ -67,16 +69,23 @@ def test_a_sweep_that_many_ask_for_at_once_is_one_job(store: Settings, opened: C
     assert jobs.counts() == {"queued": 5}
 
 
-def test_the_first_chunks_of_a_job_may_be_stored_at_once(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+def test_the_first_chunks_of_a_job_may_be_stored_at_once(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
     jobs = opened(store)
     for seed in range(5):
-        sweep = sweep_request(samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True)
+        sweep = sweep_request(
+            samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True
+        )
         job = jobs.submit(sweep)
         result = Result(jobs, job)
 
         def store(position: int, job: Job = job, result: Result = result) -> None:
             start, stop = job.rows(position)
-            result.store(position, [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})])
+            result.store(
+                position,
+                [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})],
+            )
 
         together(store, job.chunk_count)
         kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
@@ -86,7 +95,9 @@ def test_the_first_chunks_of_a_job_may_be_stored_at_once(store: Settings, opened
 def test_a_listing_reads_no_request(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
     jobs, statements = opened(store), list[str]()
     job = jobs.submit(sweep_request())
-    sa.event.listen(jobs._engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
+    sa.event.listen(
+        jobs._engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2])
+    )
     assert [status.id for status in jobs.newest()] == [job.id]
     assert jobs.status(job.id).total == 15
     assert len(statements) == 2
@@ -105,7 +116,9 @@ def test_only_an_ended_job_is_removed(store: Settings, opened: Callable[[Setting
     assert not jobs.chunk_path(job.id, 0).exists()
 
 
-def test_limits_are_named_before_a_job_is_made(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+def test_limits_are_named_before_a_job_is_made(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
     with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
         opened(store.model_copy(update={"max_sweep_problems": 10})).submit(sweep_request())
     with pytest.raises(InvalidInput, match="bytes of results"):
@@ -117,7 +130,9 @@ def test_limits_are_named_before_a_job_is_made(store: Settings, opened: Callable
         jobs.submit(sweep_request(seed=8))
 
 
-def test_a_sweep_runs_on_either_database_to_the_same_result(store: Settings, tmp_path: Path) -> None:
+def test_a_sweep_runs_on_either_database_to_the_same_result(
+    store: Settings, tmp_path: Path
+) -> None:
     sweep = sweep_request(samples=3, times=[0, 1], outputs=["q"])
     job, jobs = run_sweep(sweep, store, lambda done, total: None)
     assert (job.state, job.done, job.total) == ("finished", 9, 9)
@@ -131,7 +146,9 @@ def test_servers_that_start_together_make_the_tables_of_the_code_once(store: Set
         engine.dispose()
 
 
-def test_a_job_goes_through_its_states_and_keeps_its_dates(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
+def test_a_job_goes_through_its_states_and_keeps_its_dates(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
     jobs = opened(store)
     job = jobs.submit(sweep_request(), "a key")
     assert (job.state, job.done, job.finished_at) == ("queued", 0, None)

@@ -27,7 +27,13 @@ import veselova
 from conftest import PATIENCE, Server, free_port, running_server
 from test_http import is_problem, post
 
-BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+BASE = {
+    "system": "veselova",
+    "A": [3, "1.5", 1],
+    "q": [0.6, 0, 0.8],
+    "q_dot": [0, 0.5, 0],
+    "normalize": True,
+}
 
 #: Some seconds of work for two processors, in eight chunks.
 LONG = {
@@ -93,7 +99,13 @@ def undisturbed(jobs_server: Server) -> bytes:
 
 
 def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
-    body = {"problem": BASE, "vary": {"/A/0": [2, 3, -1]}, "times": [0, 1], "outputs": ["q"], "trajectories": True}
+    body = {
+        "problem": BASE,
+        "vary": {"/A/0": [2, 3, -1]},
+        "times": [0, 1],
+        "outputs": ["q"],
+        "trajectories": True,
+    }
     response = post(jobs_server, "/v1/sweeps", body)
     assert response.status_code == 202
     link = response.headers["location"]
@@ -128,13 +140,20 @@ def test_a_job_whose_files_are_gone_is_run_again(jobs_server: Server) -> None:
 def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
     body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
     first = post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"})
-    assert post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"] == first.headers["location"]
-    other = post(jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"})
+    assert (
+        post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"]
+        == first.headers["location"]
+    )
+    other = post(
+        jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"}
+    )
     assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
 
 
 def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
-    link = post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [2, 3.5]}}).headers["location"]
+    link = post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [2, 3.5]}}).headers[
+        "location"
+    ]
     wait_for(jobs_server, link, finished)
     expected = table(jobs_server, link)
     url = f"{jobs_server.url}{link}/result"
@@ -148,12 +167,22 @@ def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
 
 
 def test_the_client_sweeps_as_the_library_does(jobs_server: Server, tmp_path: Path) -> None:
-    options: dict[str, Any] = {"samples": 2, "seed": 3, "times": [0, 1], "outputs": ["q"], "trajectories": True}
+    options: dict[str, Any] = {
+        "samples": 2,
+        "seed": 3,
+        "times": [0, 1],
+        "outputs": ["q"],
+        "trajectories": True,
+    }
     said: list[tuple[int, int]] = []
-    expected = veselova.sweep(BASE, {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}, folder=tmp_path, **options)
+    expected = veselova.sweep(
+        BASE, {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}, folder=tmp_path, **options
+    )
     with veselova.Client(jobs_server.url) as client:
         job = client.sweep(BASE, {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}, **options)
-        assert job.dataset(progress=lambda done, total: said.append((done, total))).identical(expected)
+        assert job.dataset(progress=lambda done, total: said.append((done, total))).identical(
+            expected
+        )
         assert said[-1] == (4, 4)
         assert client.job(job.id).status()["state"] == "finished"
         job.download(tmp_path / "table.parquet")
@@ -169,7 +198,10 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
     async def ask() -> tuple[Any, Any]:
         async with veselova.AsyncClient(jobs_server.url) as client:
             job = await client.sweep(
-                LONG["problem"], LONG["vary"], **{k: v for k, v in LONG.items() if k not in BASE_FIELDS}, seed=5
+                LONG["problem"],
+                LONG["vary"],
+                **{k: v for k, v in LONG.items() if k not in BASE_FIELDS},
+                seed=5,
             )
             document = await job.cancel()
             with pytest.raises(veselova.ServiceError, match="is cancelled"):
@@ -183,14 +215,26 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
 
 
 def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
-    for path, methods in (("/v1/jobs/x", "DELETE, GET"), ("/v1/trajectories/x", "GET, HEAD"), ("/v1/tori", "POST")):
+    for path, methods in (
+        ("/v1/jobs/x", "DELETE, GET"),
+        ("/v1/trajectories/x", "GET, HEAD"),
+        ("/v1/tori", "POST"),
+    ):
         assert jobs_server.ask("PUT", path).headers["allow"] == methods
 
 
 def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
-    fault = is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/B": [1]}}), 422, "invalid-input")
+    fault = is_problem(
+        post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/B": [1]}}),
+        422,
+        "invalid-input",
+    )
     assert fault["errors"][0]["pointer"] == "/vary/~1B"
-    is_problem(post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [1]}, "budget_s": 1e6}), 422, "invalid-input")
+    is_problem(
+        post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [1]}, "budget_s": 1e6}),
+        422,
+        "invalid-input",
+    )
     for path in ("", "/events", "/result", "/trajectories"):
         is_problem(jobs_server.get(f"/v1/jobs/none{path}"), 404, "no-such-job")
     is_problem(jobs_server.ask("DELETE", "/v1/jobs/none"), 404, "no-such-job")
@@ -233,7 +277,9 @@ def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: byte
         assert server.get(f"{link}/result").content == undisturbed
 
 
-def test_the_death_of_the_server_loses_no_finished_chunk(tmp_path: Path, undisturbed: bytes) -> None:
+def test_the_death_of_the_server_loses_no_finished_chunk(
+    tmp_path: Path, undisturbed: bytes
+) -> None:
     with running_server(tmp_path, sweep_workers="2") as server:
         link = post(server, "/v1/sweeps", LONG).headers["location"]
         wait_for(server, link, half_way)
@@ -285,15 +331,24 @@ def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undistur
 def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     with running_server(tmp_path, awaited="/healthz", data_dir=str(tmp_path / "file")) as server:
-        assert "Jobs cannot be stored" in is_problem(server.get("/readyz"), 503, "not-ready")["detail"]
+        assert (
+            "Jobs cannot be stored" in is_problem(server.get("/readyz"), 503, "not-ready")["detail"]
+        )
         assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
         refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
-        assert "Jobs cannot be stored at present" in is_problem(refused, 503, "storage-unavailable")["detail"]
+        assert (
+            "Jobs cannot be stored at present"
+            in is_problem(refused, 503, "storage-unavailable")["detail"]
+        )
 
 
 @contextmanager
 def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen([sys.executable, "-m", "dask", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dask", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         yield process
     finally:
@@ -302,12 +357,24 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 @pytest.mark.slow
-def test_a_cluster_that_was_started_elsewhere_computes_the_same(tmp_path: Path, undisturbed: bytes) -> None:
+def test_a_cluster_that_was_started_elsewhere_computes_the_same(
+    tmp_path: Path, undisturbed: bytes
+) -> None:
     """The scheduler dies in the middle, too, and another takes its place."""
     port = str(free_port())
     address = f"tcp://127.0.0.1:{port}"
     scheduler = ("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
-    worker = ("worker", address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1", "--local-directory", str(tmp_path))
+    worker = (
+        "worker",
+        address,
+        "--nthreads",
+        "1",
+        "--no-dashboard",
+        "--host",
+        "127.0.0.1",
+        "--local-directory",
+        str(tmp_path),
+    )
     with running_server(tmp_path, dask_scheduler=address) as server:
         with dask(*scheduler), dask(*worker), dask(*worker):
             link = post(server, "/v1/sweeps", LONG).headers["location"]
@@ -321,17 +388,29 @@ def test_a_cluster_that_was_started_elsewhere_computes_the_same(tmp_path: Path, 
     ("settings", "message"),
     [
         ({"dask_scheduler": "tcp://192.0.2.1:8786"}, "required tls://"),
-        ({"dask_scheduler": "tls://192.0.2.1:8786"}, "VESELOVA_DASK_CA_FILE: required a file, for tls://; given nothing"),
+        (
+            {"dask_scheduler": "tls://192.0.2.1:8786"},
+            "VESELOVA_DASK_CA_FILE: required a file, for tls://; given nothing",
+        ),
         ({"dask_scheduler": "nowhere"}, "required an address tls://HOST:PORT; given nowhere"),
-        ({"database_url": "mysql://me:secret@host/name"}, "required an address sqlite:///PATH or postgresql://"),
+        (
+            {"database_url": "mysql://me:secret@host/name"},
+            "required an address sqlite:///PATH or postgresql://",
+        ),
     ],
 )
 def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(
     settings: dict[str, str], message: str, tmp_path: Path
 ) -> None:
-    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), **{f"VESELOVA_{k.upper()}": v for k, v in settings.items()}}
+    environment = {
+        **os.environ,
+        "VESELOVA_DATA_DIR": str(tmp_path),
+        **{f"VESELOVA_{k.upper()}": v for k, v in settings.items()},
+    }
     command = [sys.executable, "-m", "veselova", "serve", "--port", "0"]
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE, check=False)
+    answer = subprocess.run(
+        command, capture_output=True, text=True, env=environment, timeout=PATIENCE, check=False
+    )
     assert answer.returncode == 2
     assert message in answer.stderr
     assert "secret" not in answer.stderr

@@ -1,4 +1,6 @@
-"""LR systems: input, the two formulations against the paper and each other, integrals, closed forms, and every door."""
+"""LR systems: input, the two formulations against the paper and each other, integrals, closed
+forms, and every door.
+"""
 
 from __future__ import annotations
 
@@ -59,10 +61,22 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         ("inertia.special", {"inertia": {"special": ["1e200", 1, 1]}}, "ratios up to 1e+14"),
         ("inertia.special", {"inertia": {"special": 3 * ["1e-310"]}}, "range of a float"),
         ("inertia.matrix", {"inertia": {"matrix": np.diag([1, 1, 0])}}, "a singular one"),
-        ("inertia.matrix", {"inertia": {"matrix": np.diag([1, 1, -1])}}, "an indefinite one, with eigenvalue -1"),
-        ("inertia.matrix[0][1]", {"inertia": {"matrix": [[1, 2, 0], [0, 9, 0], [0, 0, 1]]}}, "2.0 against 0.0"),
+        (
+            "inertia.matrix",
+            {"inertia": {"matrix": np.diag([1, 1, -1])}},
+            "an indefinite one, with eigenvalue -1",
+        ),
+        (
+            "inertia.matrix[0][1]",
+            {"inertia": {"matrix": [[1, 2, 0], [0, 9, 0], [0, 0, 1]]}},
+            "2.0 against 0.0",
+        ),
         ("inertia.matrix", {"inertia": {"matrix": np.eye(2)}}, "3 rows of 3"),
-        ("inertia.matrix", {"inertia": {"matrix": 1e-310 * np.eye(3)}}, "an inverse within the range"),
+        (
+            "inertia.matrix",
+            {"inertia": {"matrix": 1e-310 * np.eye(3)}},
+            "an inverse within the range",
+        ),
         ("g", {"g": np.eye(2)}, "3 rows of 3"),
         ("g", {"g": 2 * np.eye(3)}, "off it by 2"),
         ("g", {"g": TURNED}, "off it by 1e-06"),
@@ -118,16 +132,29 @@ def test_what_is_wrong_with_a_system_on_a_group_is_named() -> None:
 
 @pytest.mark.parametrize("name", GROUPS)
 def test_both_fields_are_the_euler_poincare_equations(name: str, rng: np.random.Generator) -> None:
-    """(EPS): 𝓘ω̇ − [𝓘ω,ω] + y(v) lies in g⁻¹𝔥g and ω̇ keeps the constraints; for any 𝔥, constants and potential."""
+    """(EPS): 𝓘ω̇ − [𝓘ω,ω] + y(v) lies in g⁻¹𝔥g and ω̇ keeps the constraints; for any 𝔥, constants
+    and potential.
+    """
     group = group_named(name)
     for constraints in (group.dimension // 3, 2 * group.dimension // 3):
-        system = random_lr_on(rng, group, constraints, random_potential(rng, group.size, group.size))
-        flow, other, distribution, inertia = system.flow(), system.flow("multipliers"), system.distribution, system.inertia
+        system = random_lr_on(
+            rng, group, constraints, random_potential(rng, group.size, group.size)
+        )
+        flow, other, distribution, inertia = (
+            system.flow(),
+            system.flow("multipliers"),
+            system.distribution,
+            system.inertia,
+        )
         # ω̇ of the momentum formulation: a complex step along its field.
         step = flow.initial + 1e-30j * flow.field(flow.initial, flow.parameters, FLOATS)
         g, along = step[: group.size**2].reshape(group.size, -1), step[group.size**2 :]
         operator = flow.inertia.inverse if distribution.uses_inverse else flow.inertia.operator
-        rate = distribution.velocity(operator, *distribution.in_body(g), along, flow.across).imag / 1e-30 / flow.time_unit**2
+        rate = (
+            distribution.velocity(operator, *distribution.in_body(g), along, flow.across).imag
+            / 1e-30
+            / flow.time_unit**2
+        )
         field = other.field(other.initial, other.parameters, FLOATS) / flow.time_unit**2
         assert np.allclose(rate, field[: group.dimension], rtol=1e-11, atol=1e-11)
         assert system.potential is not None
@@ -144,12 +171,19 @@ def numerical_gradient(system: LRSystem) -> Any:
     group, v = system.distribution.group, system.potential
     assert v is not None
     turns = [expm(1e-6 * Y) for Y in group.basis]
-    return np.array([float(v.value(system.g @ turn) - v.value(system.g @ turn.T)) for turn in turns]) / 2e-6
+    return (
+        np.array([float(v.value(system.g @ turn) - v.value(system.g @ turn.T)) for turn in turns])
+        / 2e-6
+    )
 
 
 @pytest.mark.parametrize(("n", "rank"), RANKS)
-def test_the_momentum_equation_and_its_projections_hold_on_so_n(n: int, rank: int, rng: np.random.Generator) -> None:
-    """(mom_eq), (1.4), (mom_eq1), (4.1c)–(4.2a): 𝓜̇ = [𝓜,ω], Γ̇ = [Γ,ω], 𝓜 = ω + (𝓘ω−ω)Γ + Γ(𝓘ω−ω) − Γ(𝓘ω−ω)Γ."""
+def test_the_momentum_equation_and_its_projections_hold_on_so_n(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """(mom_eq), (1.4), (mom_eq1), (4.1c)–(4.2a): 𝓜̇ = [𝓜,ω], Γ̇ = [Γ,ω], 𝓜 = ω + (𝓘ω−ω)Γ + Γ(𝓘ω−ω)
+    − Γ(𝓘ω−ω)Γ.
+    """
     system = random_lr(rng, n, rank, homogeneous=False)
     group, distribution, inertia = system.distribution.group, system.distribution, system.inertia
     flow = system.flow("multipliers")
@@ -162,7 +196,13 @@ def test_the_momentum_equation_and_its_projections_hold_on_so_n(n: int, rank: in
         excess = momentum - X
         M = X + excess @ Gamma + Gamma @ excess - Gamma @ excess @ Gamma
         along = Gamma @ momentum + momentum @ Gamma - Gamma @ momentum @ Gamma
-        return {"M": M, "Gamma": Gamma, "along": along, "across": X - (Gamma @ X + X @ Gamma - Gamma @ X @ Gamma), "omega": X}
+        return {
+            "M": M,
+            "Gamma": Gamma,
+            "along": along,
+            "across": X - (Gamma @ X + X @ Gamma - Gamma @ X @ Gamma),
+            "omega": X,
+        }
 
     here, rate = at(flow.initial), at(step)
     assert np.allclose(here["M"], system.derive("momentum", system.start)[0], atol=1e-13)
@@ -177,8 +217,12 @@ def test_the_momentum_equation_and_its_projections_hold_on_so_n(n: int, rank: in
 
 
 @pytest.mark.parametrize(("n", "rank"), [(n, r) for n, r in RANKS if r < n - 1])
-def test_the_distribution_is_where_omega_wedge_e_1_to_e_r_vanishes(n: int, rank: int, rng: np.random.Generator) -> None:
-    """(D): of the components of ω∧e_1∧…∧e_r only (n−r)(n−r−1)/2 are independent, and they vanish on 𝒟_r."""
+def test_the_distribution_is_where_omega_wedge_e_1_to_e_r_vanishes(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """(D): of the components of ω∧e_1∧…∧e_r only (n−r)(n−r−1)/2 are independent, and they vanish on
+    𝒟_r.
+    """
     system = random_lr(rng, n, rank)
     group, X = system.distribution.group, system.g[:rank].T
 
@@ -191,10 +235,13 @@ def test_the_distribution_is_where_omega_wedge_e_1_to_e_r_vanishes(n: int, rank:
     assert np.allclose(wedge(group.element(system.omega)), 0, atol=1e-14)
     assert np.allclose(wedge(system.derive("momentum", system.start)[0]), 0, atol=1e-13)
     energy = np.sum(system.derive("momentum", system.start)[0] * group.element(system.omega)) / 4
-    assert np.isclose(energy, system.inertia(system.omega) @ system.omega / 2)  # ½⟨𝓜,ω⟩ = ½⟨𝓘ω,ω⟩ on D
+    # ½⟨𝓜,ω⟩ = ½⟨𝓘ω,ω⟩ on D
+    assert np.isclose(energy, system.inertia(system.omega) @ system.omega / 2)
 
 
-@pytest.mark.parametrize(("n", "rank", "homogeneous"), [(3, 1, True), (4, 2, False), slow(5, 1, True), slow(6, 3, False)])
+@pytest.mark.parametrize(
+    ("n", "rank", "homogeneous"), [(3, 1, True), (4, 2, False), slow(5, 1, True), slow(6, 3, False)]
+)
 def test_two_formulations_and_two_methods_agree_and_keep_every_integral(
     n: int, rank: int, homogeneous: bool, rng: np.random.Generator
 ) -> None:
@@ -214,32 +261,48 @@ def test_two_formulations_and_two_methods_agree_and_keep_every_integral(
         assert np.max(np.abs(default.integrals["constraint"])) < 1e-14
 
 
-@pytest.mark.parametrize(("name", "constraints"), [("su-2", 1), ("su-3", 3), ("so3xsu2", 2), ("irreducible", 2), ("g2", 1)])
-def test_systems_on_other_groups_agree_and_stay_on_the_group(name: str, constraints: int, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(
+    ("name", "constraints"),
+    [("su-2", 1), ("su-3", 3), ("so3xsu2", 2), ("irreducible", 2), ("g2", 1)],
+)
+def test_systems_on_other_groups_agree_and_stay_on_the_group(
+    name: str, constraints: int, rng: np.random.Generator
+) -> None:
     system = random_lr_on(rng, group_named(name), constraints)
     times = np.linspace(-5, 5, 5)
     default, other = solve(system, times), solve(system, times, formulation="multipliers")
     assert max(default.drift.values()) < DRIFT
     assert np.max(default.integrals["group"]) < 1e-14
-    assert np.all(np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error)
+    assert np.all(
+        np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error
+    )
 
 
 @pytest.mark.parametrize(("n", "rank", "rows"), [(3, 1, 1), (4, 2, 2)])
 def test_a_potential_of_the_frame_adds_its_energy_and_takes_the_momentum(
     n: int, rank: int, rows: int, rng: np.random.Generator
 ) -> None:
-    """v is a function of e_1 … e_r, H-invariant: the Jacobi–Painlevé integral holds with any constants of the constraints."""
+    """v is a function of e_1 … e_r, H-invariant: the Jacobi–Painlevé integral holds with any
+    constants of the constraints.
+    """
     system = random_lr(rng, n, rank, homogeneous=False, potential=random_potential(rng, n, rows))
     times = np.linspace(0, 10, 6)
-    default, other = solve(system, times), solve(system, times, method="taylor", formulation="multipliers")
+    default, other = (
+        solve(system, times),
+        solve(system, times, method="taylor", formulation="multipliers"),
+    )
     assert {"energy", "constraint"} <= set(default.integrals)
     assert "traces" not in default.integrals
     assert max(default.drift.values()) < DRIFT
     assert max(other.drift.values()) < 1e-13
-    assert np.all(np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error)
+    assert np.all(
+        np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error
+    )
 
 
-def test_with_constants_the_kinetic_energy_changes_and_the_jacobi_painleve_integral_does_not(rng: np.random.Generator) -> None:
+def test_with_constants_the_kinetic_energy_changes_and_the_jacobi_painleve_integral_does_not(
+    rng: np.random.Generator,
+) -> None:
     system = random_lr(rng, 4, 1, homogeneous=False)
     trajectory = solve(system, np.linspace(0, 10, 11), method="taylor")
     omega = system.distribution.group.coordinates(trajectory.omega)
@@ -248,7 +311,9 @@ def test_with_constants_the_kinetic_energy_changes_and_the_jacobi_painleve_integ
     assert trajectory.drift["energy"] < TAYLOR_DRIFT
 
 
-def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(rng: np.random.Generator) -> None:
+def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(
+    rng: np.random.Generator,
+) -> None:
     potential = monomial([2, 1, 1], coefficient=0.3)  # (e_2)_1 is not invariant under H
     system = random_lr(rng, 3, 1, homogeneous=False, potential=potential)
     trajectory = solve(system, np.linspace(0, 10, 11))
@@ -262,8 +327,12 @@ def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(rn
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
 def test_collisions_with_a_singular_potential_are_named(formulation: str, method: str) -> None:
     attracting = LRSystem(**GOOD, potential=monomial([1, 1, -2], coefficient=-0.1))
-    assert np.all(np.isfinite(solve(attracting, [1.0], method=method, formulation=formulation).frame))
-    with pytest.raises(Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.059035,"):
+    assert np.all(
+        np.isfinite(solve(attracting, [1.0], method=method, formulation=formulation).frame)
+    )
+    with pytest.raises(
+        Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.059035,"
+    ):
         solve(attracting, [0.5, 1.2], method=method, formulation=formulation)
     repelling = LRSystem(**GOOD, potential=monomial([1, 1, -2], coefficient=0.1))
     trajectory = solve(repelling, [0.0, 3.0], method=method, formulation=formulation)
@@ -273,14 +342,20 @@ def test_collisions_with_a_singular_potential_are_named(formulation: str, method
 
 def test_a_collision_is_named_where_other_entries_of_the_potential_start_at_zero() -> None:
     potential = monomial([1, 1, -2], [1, 2, 2], coefficient=-0.1)
-    system = LRSystem(3, 2, {"special": [1, 2, 3]}, None, [[0, 1, 0.1], [-1, 0, 0], [-0.1, 0, 0]], potential)
+    system = LRSystem(
+        3, 2, {"special": [1, 2, 3]}, None, [[0, 1, 0.1], [-1, 0, 0], [-0.1, 0, 0]], potential
+    )
     for formulation in LRSystem.formulations:
-        with pytest.raises(Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.08041,"):
+        with pytest.raises(
+            Unsolved, match=r"collision: the motion runs into g_11 = 0 at about t = 1\.08041,"
+        ):
             solve(system, [5.0], formulation=formulation)
 
 
 def test_momentum_is_kept_along_what_leaves_the_potential_alone(rng: np.random.Generator) -> None:
-    """Noether: v(g) = c g_11 is constant under rotations of space about E_1, of which E_2∧E_3 lies in 𝔡 for r = 2 and n = 3."""
+    """Noether: v(g) = c g_11 is constant under rotations of space about E_1, of which E_2∧E_3 lies
+    in 𝔡 for r = 2 and n = 3.
+    """
     system = random_lr(rng, 3, 2, potential=monomial([1, 1, 1], coefficient=0.3))
     trajectory = solve(system, np.linspace(0, 20, 11))
     assert trajectory.integrals["momentum"].shape == (11, 1)
@@ -293,7 +368,9 @@ def test_momentum_is_kept_along_what_leaves_the_potential_alone(rng: np.random.G
 
 
 @pytest.mark.parametrize(("n", "rank"), [row if row[0] < 5 else slow(*row) for row in RANKS])
-def test_a_body_with_equal_moments_turns_uniformly_in_space(n: int, rank: int, rng: np.random.Generator) -> None:
+def test_a_body_with_equal_moments_turns_uniformly_in_space(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
     """𝓘 = 2: g(t) = exp(Ω t) g(0) with any constants, whatever the constraints: a closed form."""
     draw = random_lr(rng, n, rank, homogeneous=False)
     inertia = {"matrix": 2 * np.eye(n * (n - 1) // 2)}
@@ -306,7 +383,9 @@ def test_a_body_with_equal_moments_turns_uniformly_in_space(n: int, rank: int, r
 
 @pytest.mark.parametrize("n", [3, 4, 6])
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
-def test_rank_one_with_the_special_inertia_is_the_veselova_problem(n: int, method: str, rng: np.random.Generator) -> None:
+def test_rank_one_with_the_special_inertia_is_the_veselova_problem(
+    n: int, method: str, rng: np.random.Generator
+) -> None:
     A = np.exp(rng.uniform(0, 1, n))
     frame = np.linalg.qr(rng.normal(size=(n, n)))[0]
     q_dot = frame[:, 1:] @ rng.normal(size=n - 1)
@@ -315,7 +394,9 @@ def test_rank_one_with_the_special_inertia_is_the_veselova_problem(n: int, metho
     system = LRSystem(n, 1, {"special": A}, problem.frame.T, omega)
     times = np.linspace(-5, 5, 5)
     found, expected = solve(system, times, method=method), solve(problem, times)
-    assert np.all(np.max(np.abs(found.frame - expected.frame), axis=(1, 2)) <= found.error + expected.error)
+    assert np.all(
+        np.max(np.abs(found.frame - expected.frame), axis=(1, 2)) <= found.error + expected.error
+    )
     assert np.allclose(found.omega, expected.omega, atol=1e-9 * np.linalg.norm(q_dot))
     assert np.allclose(found.integrals["energy"], problem.energy)
 
@@ -337,11 +418,15 @@ def test_in_the_plane_the_inertia_drops_out_of_the_field(formulation: str) -> No
 
 
 @pytest.mark.parametrize("formulation", LRSystem.formulations)
-def test_a_reflected_frame_is_taken_and_obeys_the_same_equations(formulation: str, rng: np.random.Generator) -> None:
+def test_a_reflected_frame_is_taken_and_obeys_the_same_equations(
+    formulation: str, rng: np.random.Generator
+) -> None:
     system = random_lr(rng, 3, 1)
     group = system.distribution.group
     mirror = np.diag([1.0, 1.0, -1.0])
-    reflected = LRSystem(3, 1, system.given["inertia"], mirror @ system.g, group.element(system.omega))
+    reflected = LRSystem(
+        3, 1, system.given["inertia"], mirror @ system.g, group.element(system.omega)
+    )
     one, other = (solve(x, [3.0], formulation=formulation) for x in (system, reflected))
     assert np.allclose(one.frame @ mirror, other.frame, atol=1e-11)
     assert np.isclose(np.linalg.det(one.frame[0]), -np.linalg.det(other.frame[0]))
@@ -361,14 +446,19 @@ def test_a_body_at_rest_stays_and_a_torque_along_the_constraints_moves_nothing()
 @pytest.mark.parametrize("scale", [1e-120, 1e-9, 1e9, 1e120])
 def test_motions_do_not_depend_on_the_units(scale: float, rng: np.random.Generator) -> None:
     system = random_lr(rng, 4, 2, homogeneous=False)
-    omega, matrix = system.distribution.group.element(system.omega), np.array(system.given["inertia"]["matrix"])
+    omega, matrix = (
+        system.distribution.group.element(system.omega),
+        np.array(system.given["inertia"]["matrix"]),
+    )
     scaled = LRSystem(4, 2, {"matrix": matrix / scale}, system.g, scale * omega)
     one, other = solve(system, [0, 3.0]), solve(scaled, [0, 3.0 / scale])
     assert np.allclose(one.frame, other.frame, atol=1e-11)
     assert np.max(list(other.drift.values())) < DRIFT
 
 
-def test_omega_off_the_constraints_is_an_inhomogeneous_system_unless_it_must_not_be(rng: np.random.Generator) -> None:
+def test_omega_off_the_constraints_is_an_inhomogeneous_system_unless_it_must_not_be(
+    rng: np.random.Generator,
+) -> None:
     system = random_lr(rng, 4, 1, homogeneous=False)
     spatial = system.g @ system.distribution.group.element(system.omega) @ system.g.T
     assert np.allclose(system.constraint, [spatial[1, 2], spatial[1, 3], spatial[2, 3]])
@@ -385,7 +475,9 @@ def test_the_spanning_elements_of_h_may_be_any(rng: np.random.Generator) -> None
     """D_r given by another basis of 𝔥 is the same system."""
     system = random_lr(rng, 4, 2, homogeneous=False)
     group = system.distribution.group
-    other = LRSystem.on(group, system.inertia.matrix, [3 * group.basis[5]], system.g, group.element(system.omega))
+    other = LRSystem.on(
+        group, system.inertia.matrix, [3 * group.basis[5]], system.g, group.element(system.omega)
+    )
     one, two = solve(system, [7.0]), solve(other, [7.0])
     assert np.allclose(one.frame, two.frame, atol=1e-11)
     assert np.allclose(one.momentum, two.momentum, atol=1e-11)
@@ -418,7 +510,11 @@ EXAMPLE = Path(__file__).parent.parent / "examples" / "lr4.json"
 
 
 def test_the_example_is_solved_on_the_command_line() -> None:
-    answer = subprocess.run([sys.executable, "-m", "veselova", "solve", str(EXAMPLE), "--json"], capture_output=True, check=True)
+    answer = subprocess.run(
+        [sys.executable, "-m", "veselova", "solve", str(EXAMPLE), "--json"],
+        capture_output=True,
+        check=True,
+    )
     document = json.loads(answer.stdout)
     problem = json.loads(EXAMPLE.read_text())["problem"]
     problem.pop("system")

@@ -1,4 +1,6 @@
-"""Sweeps over three hundred random LR systems, n ≤ 6, every rank, over t = 100. Minutes: run with ./check --sweep."""
+"""Sweeps over three hundred random LR systems, n ≤ 6, every rank, over t = 100. Minutes: run with
+./check --sweep.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ TIMES = np.linspace(0, 100, 51)
 
 
 def worst_drift(trajectory: Trajectory) -> float:
-    """The largest drift; the energy's against the kinetic energy where terms of both signs make it small."""
+    """The largest drift; the energy's against the kinetic energy where terms of both signs make it
+    small.
+    """
     system, drift = trajectory.problem, dict(trajectory.drift)
     kinetic = float(system.inertia(system.omega) @ system.omega) / 2
     drift["energy"] *= min(1.0, abs(float(trajectory.integrals["energy"][0])) / kinetic)
@@ -23,7 +27,9 @@ def worst_drift(trajectory: Trajectory) -> float:
 
 
 def hold(system: LRSystem) -> None:
-    """Both formulations, by different methods, keep their integrals and agree, and errors are what they say."""
+    """Both formulations, by different methods, keep their integrals and agree, and errors are what
+    they say.
+    """
     default = solve(system, TIMES)
     other = solve(system, TIMES, method="taylor", formulation="multipliers")
     assert worst_drift(default) < DRIFT
@@ -50,4 +56,6 @@ def test_systems_on_other_groups(name: str) -> None:
         default, other = solve(system, TIMES), solve(system, TIMES, formulation="multipliers")
         assert worst_drift(default) < DRIFT
         assert np.max(default.integrals["group"]) < 1e-14
-        assert np.all(np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error)
+        assert np.all(
+            np.max(np.abs(default.frame - other.frame), axis=(1, 2)) <= default.error + other.error
+        )

@@ -34,10 +34,19 @@ BODIES = {
 
 @pytest.mark.parametrize("name", BODIES)
 def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
-    """A dense stretch before t = 0, one after it, and times between that no window could serve alone."""
-    times = np.unique(np.concatenate([np.linspace(-1, -0.5, 900), np.linspace(-0.4, 1, 30), np.linspace(1, 1.5, 900)]))
+    """A dense stretch before t = 0, one after it, and times between that no window could serve
+    alone.
+    """
+    times = np.unique(
+        np.concatenate(
+            [np.linspace(-1, -0.5, 900), np.linspace(-0.4, 1, 30), np.linspace(1, 1.5, 900)]
+        )
+    )
     chosen = np.arange(0, times.size, 97)
-    many, single = vs.solve(BODIES[name], times, digits=30), vs.solve(BODIES[name], times[chosen], digits=30)
+    many, single = (
+        vs.solve(BODIES[name], times, digits=30),
+        vs.solve(BODIES[name], times[chosen], digits=30),
+    )
     assert many.provenance.details["evaluations"] < times.size / 3
     assert single.provenance.details["evaluations"] == chosen.size
     for series in ("frame", "q", "q_dot", "omega", "spheroconic", "tau1"):
@@ -56,7 +65,9 @@ def test_windows_in_balls_serve_either_route_and_far_times(method: str) -> None:
     single = vs.solve(BODIES["three"], [times[k] for k in chosen], digits=35, method=method)
     assert (many.provenance.details["time_map"], many.provenance.method) == ("fourier", method)
     assert many.provenance.details["evaluations"] < 400
-    difference = np.abs(many.decimals.midpoints["frame"][chosen] - single.decimals.midpoints["frame"])
+    difference = np.abs(
+        many.decimals.midpoints["frame"][chosen] - single.decimals.midpoints["frame"]
+    )
     assert np.max(difference) < 1e-25
 
 
@@ -83,13 +94,23 @@ def test_windows_that_do_not_resolve_a_motion_say_so() -> None:
 
 
 @pytest.mark.parametrize("bits", [60, 216, 400])
-def test_fixed_point_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np.random.Generator) -> None:
-    """Against rationals: products, Chebyshev's polynomials, and sums of more terms than one product of matrices takes."""
+def test_fixed_point_numbers_are_off_by_no_more_than_they_say(
+    bits: int, rng: np.random.Generator
+) -> None:
+    """Against rationals: products, Chebyshev's polynomials, and sums of more terms than one product
+    of matrices takes.
+    """
     count, terms = 5, 90
     parts = [rng.uniform(-1, 1, count) * 2.0 ** (-50 * k) for k in range(bits // 50 + 2)]
-    weights = [rng.uniform(-1, 1, (terms, 2)) / terms * 2.0 ** (-50 * k) for k in range(bits // 50 + 2)]
+    weights = [
+        rng.uniform(-1, 1, (terms, 2)) / terms * 2.0 ** (-50 * k) for k in range(bits // 50 + 2)
+    ]
     x, w = FixedPoint.of([part / 2 for part in parts], bits), FixedPoint.of(weights, bits)
-    polynomials, exact_x, exact_w = x.polynomials(terms), in_rationals(x.parts()), in_rationals(w.parts())
+    polynomials, exact_x, exact_w = (
+        x.polynomials(terms),
+        in_rationals(x.parts()),
+        in_rationals(w.parts()),
+    )
     exact: list[list[Fraction]] = [[Fraction(1)] * count, exact_x]
     for _ in range(2, terms):
         exact.append([2 * a * b - c for a, b, c in zip(exact_x, exact[-1], exact[-2], strict=True)])
@@ -109,17 +130,27 @@ def test_fixed_point_numbers_are_off_by_no_more_than_they_say(bits: int, rng: np
 
 
 def in_rationals(parts: list[Any]) -> list[Fraction]:
-    return [sum(map(Fraction, row), Fraction()) for row in np.stack([part.ravel() for part in parts], axis=1).tolist()]
+    return [
+        sum(map(Fraction, row), Fraction())
+        for row in np.stack([part.ravel() for part in parts], axis=1).tolist()
+    ]
 
 
 @pytest.mark.parametrize(("digits", "terms"), [(15, 1), (20, 2), (30, 41), (60, 130), (100, 90)])
-def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng: np.random.Generator) -> None:
-    """Of all sizes, zero and coefficients that are open to a digit among them; and the radii are not empty promises."""
+def test_series_in_fixed_point_hold_those_in_balls(
+    digits: int, terms: int, rng: np.random.Generator
+) -> None:
+    """Of all sizes, zero and coefficients that are open to a digit among them; and the radii are
+    not empty promises.
+    """
     sizes = [1, Fraction(1, 10**140), 10**140, 0, 3]
     with balls(digits, True) as xp:
         decay = 10.0 ** (-digits / terms)
         rows = [
-            [xp.number(size) * xp.number(x) * xp.number(decay) ** k for k, x in enumerate(rng.normal(size=terms))]
+            [
+                xp.number(size) * xp.number(x) * xp.number(decay) ** k
+                for k, x in enumerate(rng.normal(size=terms))
+            ]
             for size in sizes
         ]
         coefficients = np.array(rows, dtype=object)
@@ -130,18 +161,24 @@ def test_series_in_fixed_point_hold_those_in_balls(digits: int, terms: int, rng:
         assert series._in_fixed_point is not None
         for row, of_balls in zip(found, plain, strict=True):
             assert all(a.overlaps(b) for a, b in zip(row, of_balls, strict=True))
-            widths = [float(a.rad() / xp.number(size)) for a, size in zip(row, sizes, strict=True) if size]
+            widths = [
+                float(a.rad() / xp.number(size)) for a, size in zip(row, sizes, strict=True) if size
+            ]
             assert max(widths[:3]) < 10.0 ** (2 - digits) * terms
             assert 1e-6 < widths[3] < 1e-5 * (2 * terms) ** 2
             assert row[3] == 0 or abs(row[3]) < xp.number(10) ** -digits
 
 
 def test_series_beyond_the_range_of_fixed_point_stay_in_balls() -> None:
-    """Those too large for doubles, those whose last digits are below them, and points that are not in [−1, 1]."""
+    """Those too large for doubles, those whose last digits are below them, and points that are not
+    in [−1, 1].
+    """
     with balls(80, False) as xp:
         for size in (10**400, Fraction(1, 10**249)):
             row = [xp.number(size), xp.number(size) / 3]
-            found = ChebyshevSeriesInBalls(np.array([[row]], dtype=object), xp)(0, xp.array([Fraction(1, 7)]))[0, 0]
+            found = ChebyshevSeriesInBalls(np.array([[row]], dtype=object), xp)(
+                0, xp.array([Fraction(1, 7)])
+            )[0, 0]
             assert (found - row[0] - row[1] / 7).contains(0)
             assert found.rad() < xp.number(size) * xp.number(10) ** -78
         polynomial = np.zeros((1, 1, 40), dtype=object)
@@ -169,10 +206,20 @@ def test_theta_functions_in_balls_hold_flints(genus: int, rng: np.random.Generat
 
 @pytest.mark.parametrize("digits", [20, 60])
 @pytest.mark.parametrize("size", [2, 3, 4])
-def test_lambdas_of_many_positions_hold_those_of_each(size: int, digits: int, rng: np.random.Generator) -> None:
+def test_lambdas_of_many_positions_hold_those_of_each(
+    size: int, digits: int, rng: np.random.Generator
+) -> None:
     """At random, on a coordinate plane, beside one, and where two of them all but meet."""
-    inverse = [Fraction(1, 5), Fraction(1, 4), Fraction(1, 4) + Fraction(1, 10**9), Fraction(1)][-size:]
-    chosen = [[0.6, 0, 0.8, 0], [0.6, 1e-25, 0.5, 0.3], [0.6, 1e-9, 1e-9, 0.8], [0, 0, 0, 1], [0.3, 1, 1e-12, 0]]
+    inverse = [Fraction(1, 5), Fraction(1, 4), Fraction(1, 4) + Fraction(1, 10**9), Fraction(1)][
+        -size:
+    ]
+    chosen = [
+        [0.6, 0, 0.8, 0],
+        [0.6, 1e-25, 0.5, 0.3],
+        [0.6, 1e-9, 1e-9, 0.8],
+        [0, 0, 0, 1],
+        [0.3, 1, 1e-12, 0],
+    ]
     rows = [row[-size:] for row in rng.normal(size=(5, 4)).tolist() + chosen]
     with balls(digits, False) as xp:
         q = xp.array(rows)
@@ -183,12 +230,16 @@ def test_lambdas_of_many_positions_hold_those_of_each(size: int, digits: int, rn
                 squares = [xp.rational(x) ** 2 for x in row]
                 zeros = zeros_between_poles(exact.array(inverse), exact.array(squares), 0, exact)
             for ball, zero in zip(balls_of_row, zeros, strict=True):
-                assert abs(xp.rational(ball) - Fraction(zero)) <= xp.rational(ball.rad()) + Fraction(1, 10 ** (2 * digits))
+                assert abs(xp.rational(ball) - Fraction(zero)) <= xp.rational(
+                    ball.rad()
+                ) + Fraction(1, 10 ** (2 * digits))
                 assert float(ball.rad()) < 10.0 ** (3 - digits)
 
 
 @pytest.mark.parametrize("A", [("2", "2.002", "2.005"), ("2", "2.2", "2.4"), ("1", "3", "1000")])
-def test_three_lambdas_that_do_not_meet_are_found_all_at_once(A: tuple[str, ...], rng: np.random.Generator) -> None:
+def test_three_lambdas_that_do_not_meet_are_found_all_at_once(
+    A: tuple[str, ...], rng: np.random.Generator
+) -> None:
     """However near the A's are to one another: about as well as the positions are known."""
     inverse = sorted(1 / Fraction(a) for a in A)
     with balls(60, False) as xp:
@@ -209,13 +260,21 @@ def test_decimals_cover_their_balls() -> None:
             return xp.rational(x)
 
         for _ in range(3000):
-            middle = xp.number(generator.uniform(-1, 1)) * xp.number(10) ** generator.choice([0, 0, -3, 5, -150, 150, -40])
-            radius = xp.number(generator.random()) * xp.number(2) ** generator.choice([-200, -600, -3, 5])
-            ball = xp.add_error(middle * generator.choice([0, 1]), radius * generator.choice([0, 1]))
+            middle = xp.number(generator.uniform(-1, 1)) * xp.number(10) ** generator.choice(
+                [0, 0, -3, 5, -150, 150, -40]
+            )
+            radius = xp.number(generator.random()) * xp.number(2) ** generator.choice(
+                [-200, -600, -3, 5]
+            )
+            ball = xp.add_error(
+                middle * generator.choice([0, 1]), radius * generator.choice([0, 1])
+            )
             midpoints, radii = xp.decimals(np.array([ball]), 53)
             off = abs(Fraction(midpoints[0]) - exactly(ball))
             assert exactly(ball.rad()) + off <= Fraction(radii[0])
-            loose = exactly(ball.rad()) + Fraction(1, 10**52) * max(abs(exactly(ball)), exactly(ball.rad()))
+            loose = exactly(ball.rad()) + Fraction(1, 10**52) * max(
+                abs(exactly(ball)), exactly(ball.rad())
+            )
             assert Fraction(radii[0]) <= loose * Fraction(100_002, 100_000)
             assert len(midpoints[0].as_tuple().digits) <= 54
 
@@ -230,11 +289,15 @@ def test_balls_take_numbers_of_other_arithmetics_with_their_signs() -> None:
             extended_arithmetic(40).number(0),
             extended_arithmetic(40).number(7),
         ):
-            assert xp.number(value).contains(flint.arb(flint.fmpq(*Fraction(str(value)).as_integer_ratio()))), value
+            assert xp.number(value).contains(
+                flint.arb(flint.fmpq(*Fraction(str(value)).as_integer_ratio()))
+            ), value
 
 
 @pytest.mark.parametrize("count", [301, 640])
-def test_series_of_many_nodes_are_the_sums_that_define_them(count: int, rng: np.random.Generator) -> None:
+def test_series_of_many_nodes_are_the_sums_that_define_them(
+    count: int, rng: np.random.Generator
+) -> None:
     with balls(30) as xp:
         values = xp.array(rng.normal(size=(2, count))) / 3
         direct = Arithmetic.cosine_series(xp, values)
@@ -244,7 +307,9 @@ def test_series_of_many_nodes_are_the_sums_that_define_them(count: int, rng: np.
 
 
 def test_many_digits_near_a_separatrix_fit_into_memory() -> None:
-    """A relative gap of 1e-251: series of thousands of terms, whose sums node by node took gigabytes."""
+    """A relative gap of 1e-251: series of thousands of terms, whose sums node by node took
+    gigabytes.
+    """
     problem = Veselova([3, 2, 1], ["0.6", "1e-125", "0.8"], ["0.8", "1e-125", "-0.6"])
     found, finer = (vs.solve(problem, [1], digits=digits).decimals for digits in (20, 30))
     assert np.max(np.abs(found.midpoints["frame"] - finer.midpoints["frame"])) < 1e-20
@@ -252,7 +317,9 @@ def test_many_digits_near_a_separatrix_fit_into_memory() -> None:
 
 def test_time_zero_takes_no_digits_from_the_others() -> None:
     """There τ₁ is an end of the clock's first panel, and no root is looked for."""
-    problem = vs.Veselova([3, 2, 1], ["0.6", "0.48", "0.64"], ["0.3", "-0.7", "0.4"], normalize=True)
+    problem = vs.Veselova(
+        [3, 2, 1], ["0.6", "0.48", "0.64"], ["0.3", "-0.7", "0.4"], normalize=True
+    )
     found = [vs.solve(problem, times, digits=50) for times in ([0, 1, 100], [1, 100])]
     working = [trajectory.provenance.details["working_digits"] for trajectory in found]
     assert working[0] == working[1]

@@ -38,7 +38,9 @@ def test_energy_is_the_kinetic_energy_of_the_body(n: int, rng: np.random.Generat
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_momentum_is_the_derivative_of_the_reduced_lagrangian(n: int, rng: np.random.Generator) -> None:
+def test_momentum_is_the_derivative_of_the_reduced_lagrangian(
+    n: int, rng: np.random.Generator
+) -> None:
     problem = random_problem(rng, n, 5.0)
     p = integrals.momentum(problem.A, problem.q, problem.q_dot)
     step = 1e-6
@@ -53,18 +55,26 @@ def test_momentum_is_the_derivative_of_the_reduced_lagrangian(n: int, rng: np.ra
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_linear_integrals_are_the_components_of_the_momentum(n: int, rng: np.random.Generator) -> None:
+def test_linear_integrals_are_the_components_of_the_momentum(
+    n: int, rng: np.random.Generator
+) -> None:
     problem = random_problem(rng, n)
     A, E = problem.A, problem.frame
     p = integrals.momentum(A, problem.q, problem.q_dot)
     omega = wedge(problem.q, problem.q_dot)
     expected = [product(inertia(A, omega), wedge(E[:, 0], E[:, k])) for k in range(1, n)]
-    assert np.allclose(integrals.linear_integrals(p, E), expected, rtol=1e-11, atol=1e-12 * np.max(np.abs(p)))
+    assert np.allclose(
+        integrals.linear_integrals(p, E), expected, rtol=1e-11, atol=1e-12 * np.max(np.abs(p))
+    )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_the_field_satisfies_the_euler_poincare_equations_up_to_a_constraint_force(n: int, rng: np.random.Generator) -> None:
-    """𝓘ω̇ + [ω, 𝓘ω] is a combination of e_p∧e_q, p,q ≥ 2 (nh3.46): its components along e_1∧e_k vanish."""
+def test_the_field_satisfies_the_euler_poincare_equations_up_to_a_constraint_force(
+    n: int, rng: np.random.Generator
+) -> None:
+    """𝓘ω̇ + [ω, 𝓘ω] is a combination of e_p∧e_q, p,q ≥ 2 (nh3.46): its components along e_1∧e_k
+    vanish.
+    """
     problem = random_problem(rng, n, 5.0)
     flow, step = problem.flow(), 1e-5
 
@@ -78,7 +88,11 @@ def test_the_field_satisfies_the_euler_poincare_equations_up_to_a_constraint_for
 
     rate = (omega_at(step) - omega_at(-step)) / (2 * step) / flow.time_unit
     omega = wedge(problem.q, problem.q_dot)
-    force = inertia(problem.A, rate) + omega @ inertia(problem.A, omega) - inertia(problem.A, omega) @ omega
+    force = (
+        inertia(problem.A, rate)
+        + omega @ inertia(problem.A, omega)
+        - inertia(problem.A, omega) @ omega
+    )
     E, size = problem.frame, float(np.max(np.abs(inertia(problem.A, rate)))) + 1.0
     assert all(abs(product(force, wedge(E[:, 0], E[:, k]))) < 1e-8 * size for k in range(1, n))
 
@@ -89,30 +103,48 @@ def test_the_field_is_the_extended_system_of_the_paper(n: int, rng: np.random.Ge
     A, flow = problem.A, problem.flow()
     det, q, p = np.prod(A), problem.q, integrals.momentum(problem.A, problem.q, problem.q_dot)
     q_dot = det / (q @ (A * q)) * (p / A - (p @ (q / A)) / (q @ q) * q)
-    p_dot = -det * ((p @ (p / A)) * (q @ q) - (p @ q) * (q @ (p / A))) / ((q @ (A * q)) * (q @ q) ** 2) * q
+    p_dot = (
+        -det
+        * ((p @ (p / A)) * (q @ q) - (p @ q) * (q @ (p / A)))
+        / ((q @ (A * q)) * (q @ q) ** 2)
+        * q
+    )
     derivative = flow.vector_field(0.0, flow.initial) / flow.time_unit
     E_dot = derivative[n:-1].reshape(n, n)
     assert np.allclose(q_dot, problem.q_dot, rtol=1e-11, atol=1e-13)
     assert np.allclose(E_dot, -wedge(q, q_dot) @ problem.frame, rtol=1e-11, atol=1e-12)
-    assert np.allclose(derivative[:n] * p[0] / flow.initial[0], p_dot, rtol=1e-10, atol=1e-12 * np.max(np.abs(p_dot)))
+    assert np.allclose(
+        derivative[:n] * p[0] / flow.initial[0],
+        p_dot,
+        rtol=1e-10,
+        atol=1e-12 * np.max(np.abs(p_dot)),
+    )
     rate = np.sqrt(2 * problem.energy * det / (q @ (A * q)))
     assert np.isclose(derivative[-1] * np.sqrt(A[0] / flow.A[0]), rate, rtol=1e-12)
     assert np.isclose(integrals.time_rate(A, q, problem.q_dot), rate, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_projection_keeps_points_of_the_manifold_and_mends_points_beside_it(n: int, rng: np.random.Generator) -> None:
+def test_projection_keeps_points_of_the_manifold_and_mends_points_beside_it(
+    n: int, rng: np.random.Generator
+) -> None:
     flow = random_problem(rng, n).flow()
-    assert np.allclose(flow.project(flow.initial), flow.initial, atol=1e-13 * np.max(np.abs(flow.initial)))
+    assert np.allclose(
+        flow.project(flow.initial), flow.initial, atol=1e-13 * np.max(np.abs(flow.initial))
+    )
     state = flow.project(flow.initial + 1e-8 * rng.normal(size=flow.initial.size))
     E, p = state[n:-1].reshape(n, n), state[:n]
     assert np.max(np.abs(E.T @ E - np.eye(n))) < 1e-14
     assert abs(p @ E[:, 0]) < 1e-14 * np.max(np.abs(p))
-    assert np.isclose(p @ (p / flow.A) / (E[:, 0] @ (flow.A * E[:, 0])), flow.twice_energy, rtol=1e-14)
+    assert np.isclose(
+        p @ (p / flow.A) / (E[:, 0] @ (flow.A * E[:, 0])), flow.twice_energy, rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_constants_of_motion_are_zeros_of_the_division_free_polynomial(n: int, rng: np.random.Generator) -> None:
+def test_constants_of_motion_are_zeros_of_the_division_free_polynomial(
+    n: int, rng: np.random.Generator
+) -> None:
     problem = random_problem(rng, n)
     inverse, q_squared, wedge_squared = polynomial_data(problem)
     scale = max(inverse)
@@ -122,19 +154,34 @@ def test_constants_of_motion_are_zeros_of_the_division_free_polynomial(n: int, r
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_the_division_free_polynomial_is_the_sum_that_defines_it(n: int, rng: np.random.Generator) -> None:
+def test_the_division_free_polynomial_is_the_sum_that_defines_it(
+    n: int, rng: np.random.Generator
+) -> None:
     inverse, q_squared, wedge_squared = polynomial_data(random_problem(rng, n, 5.0))
     x, step = 0.37, 1e-6
 
     def defined(x: float) -> float:
         pairs = [(i, j) for j in range(n) for i in range(j)]
-        value = sum(wedge_squared[i][j] * np.prod([x - y for k, y in enumerate(inverse) if k not in (i, j)]) for i, j in pairs)
-        return float(value + sum(q_squared[i] * np.prod([x - y for k, y in enumerate(inverse) if k != i]) for i in range(n)))
+        value = sum(
+            wedge_squared[i][j] * np.prod([x - y for k, y in enumerate(inverse) if k not in (i, j)])
+            for i, j in pairs
+        )
+        return float(
+            value
+            + sum(
+                q_squared[i] * np.prod([x - y for k, y in enumerate(inverse) if k != i])
+                for i in range(n)
+            )
+        )
 
     value, slope = integrals.neumann_polynomial(x, inverse, q_squared, wedge_squared)
     assert np.isclose(value, defined(x), rtol=1e-12, atol=1e-14)
-    assert np.isclose(slope, (defined(x + step) - defined(x - step)) / (2 * step), rtol=1e-6, atol=1e-8)
-    exact = integrals.neumann_polynomial(Fraction(x), *([Fraction(y) for y in ys] for ys in (inverse, q_squared)), wedge_squared)
+    assert np.isclose(
+        slope, (defined(x + step) - defined(x - step)) / (2 * step), rtol=1e-6, atol=1e-8
+    )
+    exact = integrals.neumann_polynomial(
+        Fraction(x), *([Fraction(y) for y in ys] for ys in (inverse, q_squared)), wedge_squared
+    )
     assert np.isclose(float(exact[0]), value, rtol=1e-12, atol=1e-14)
 
 
@@ -145,13 +192,17 @@ def polynomial_data(problem: Veselova) -> tuple[list[float], list[float], list[l
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_neumann_integrals_sum_to_one_and_to_the_residues_of_the_polynomial(n: int, rng: np.random.Generator) -> None:
+def test_neumann_integrals_sum_to_one_and_to_the_residues_of_the_polynomial(
+    n: int, rng: np.random.Generator
+) -> None:
     problem = random_problem(rng, n, 5.0)
     F = integrals.neumann_integrals(problem.A, problem.q, problem.q_dot)
     assert np.isclose(F.sum(), 1.0, atol=1e-12)
     inverse, roots = 1 / problem.A, np.concatenate([[0.0], problem.constants])
     for i in range(n):
-        residue = np.prod(inverse[i] - roots) / np.prod([inverse[i] - x for k, x in enumerate(inverse) if k != i])
+        residue = np.prod(inverse[i] - roots) / np.prod(
+            [inverse[i] - x for k, x in enumerate(inverse) if k != i]
+        )
         assert np.isclose(F[i], residue, rtol=1e-8, atol=1e-10)
 
 
@@ -170,7 +221,9 @@ def test_spheroconic_coordinates_interlace_and_invert(n: int, rng: np.random.Gen
     assert np.all(coordinates <= ordered[1:])
     again = from_spheroconic(problem.A, coordinates, problem.q)
     assert np.allclose(again, problem.q, atol=1e-9)
-    assert np.isclose(np.sum(problem.A * problem.q**2), np.prod(coordinates) * np.prod(problem.A), rtol=1e-11)
+    assert np.isclose(
+        np.sum(problem.A * problem.q**2), np.prod(coordinates) * np.prod(problem.A), rtol=1e-11
+    )
 
 
 def test_spheroconic_coordinates_that_do_not_interlace_are_refused() -> None:
@@ -195,9 +248,15 @@ def test_the_natural_frame_is_the_one_of_the_formula(n: int, rng: np.random.Gene
         S = -np.sum(q * v / d) / np.sum(q * q / d)
         normal = (v + S * q) / d
         normal /= np.linalg.norm(normal)
-        assert min(np.max(np.abs(E[:, column] - normal)), np.max(np.abs(E[:, column] + normal))) < 1e-9
+        assert (
+            min(np.max(np.abs(E[:, column] - normal)), np.max(np.abs(E[:, column] + normal))) < 1e-9
+        )
     gamma = A * (v - (A * q) @ v / (q @ (A * q)) * q)
-    assert np.allclose(E[:, -1] * (1 if n > 2 else np.sign(E[:, -1] @ gamma)), gamma / np.linalg.norm(gamma), atol=1e-12)
+    assert np.allclose(
+        E[:, -1] * (1 if n > 2 else np.sign(E[:, -1] @ gamma)),
+        gamma / np.linalg.norm(gamma),
+        atol=1e-12,
+    )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -226,7 +285,9 @@ def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Gener
     assert np.isclose(turned.energy, plain.energy, rtol=1e-13)
     assert np.allclose(turned.constants, plain.constants, atol=1e-14)
     assert np.allclose(turned.to_body_axes(turned.q[None, :]), turn @ plain.q, atol=1e-15)
-    assert np.allclose(turned.to_body_axes(turned.frame[None, :, :]), turn @ plain.frame, atol=1e-15)
+    assert np.allclose(
+        turned.to_body_axes(turned.frame[None, :, :]), turn @ plain.frame, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("scale", [1e-150, 1e-9, 1e9, 1e150])

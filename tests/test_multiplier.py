@@ -1,4 +1,6 @@
-"""Chaplygin's reducing multiplier: the measure, Theorem Th_reduce both ways, the Hamiltonian form in τ, and what obstructs it."""
+"""Chaplygin's reducing multiplier: the measure, Theorem Th_reduce both ways, the Hamiltonian form
+in τ, and what obstructs it.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from stiefel_chart import Chart, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Veselova, solve
 from veselova.mechanics.bodies.stiefel_inertia import MatrixInertia, SpecialInertia, body_inertia
-from veselova.mechanics.geometry.stiefel import admissible_basis, angular_velocity, cotangent, product, tangent_part
+from veselova.mechanics.geometry.stiefel import (
+    admissible_basis,
+    angular_velocity,
+    cotangent,
+    product,
+    tangent_part,
+)
 from veselova.mechanics.paper.chaplygin_multiplier import (
     ChaplyginMultiplier,
     gyroscopic_tensor,
@@ -32,7 +40,9 @@ def operator(rng: np.random.Generator, n: int, kind: str) -> Any:
     return replace(inertia, exponent=0)
 
 
-def drawn_chart(rng: np.random.Generator, n: int, r: int, kind: str, *potential: Any) -> tuple[Chart, Any]:
+def drawn_chart(
+    rng: np.random.Generator, n: int, r: int, kind: str, *potential: Any
+) -> tuple[Chart, Any]:
     """Return a chart and a point (u, p) in it."""
     chart = Chart(operator(rng, n, kind), random_columns(rng, n, r), *potential)
     return chart, np.concatenate([0.3 * rng.normal(size=chart.N), rng.normal(size=chart.N)])
@@ -52,7 +62,9 @@ def in_new_time(chart: Chart, multiplier: ChaplyginMultiplier, z: Any) -> Any:
 def of_hamiltonian(chart: Chart, multiplier: ChaplyginMultiplier, z: Any) -> Any:
     """Return (∂H*/∂p̃, −∂H*/∂u) at z = (u, p̃)."""
     N = chart.N
-    gradient = slopes(lambda y: multiplier.hamiltonian(chart.point(y[:N])[0], chart.momentum(y[:N], y[N:])), z)
+    gradient = slopes(
+        lambda y: multiplier.hamiltonian(chart.point(y[:N])[0], chart.momentum(y[:N], y[N:])), z
+    )
     return np.concatenate([gradient[N:], -gradient[:N]])
 
 
@@ -73,8 +85,12 @@ def clebsch(weights: Any) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [*RANKS, (2, 1), (4, 4)])
-def test_the_reduced_flow_preserves_its_measure(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
-    """Theorem mes: div(ρF) = 0 for ρ = 1/√det(𝓘|𝓓_r) in canonical coordinates; with ρ = 1 not, where there are constraints."""
+def test_the_reduced_flow_preserves_its_measure(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
+    """Theorem mes: div(ρF) = 0 for ρ = 1/√det(𝓘|𝓓_r) in canonical coordinates; with ρ = 1 not,
+    where there are constraints.
+    """
     chart, z = drawn_chart(rng, n, r, kind)
 
     def density(y: Any) -> float:
@@ -85,14 +101,19 @@ def test_the_reduced_flow_preserves_its_measure(n: int, r: int, kind: str, rng: 
 
 
 @pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_density_of_the_special_inertia_is_a_power_of_the_pluecker_sum(n: int, r: int, rng: np.random.Generator) -> None:
+def test_the_density_of_the_special_inertia_is_a_power_of_the_pluecker_sum(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
     """(true): det(𝓘|𝓓_r) ∝ [Σ A_I (e_1∧…∧e_r)_I²]^(n−r−1), and the sum is det XᵀAX."""
     A = np.exp(rng.uniform(0, 1.5, n))
     inertia = SpecialInertia.of(A)
     ratios = []
     for _ in range(3):
         X = random_columns(rng, n, r)
-        ratios.append(restricted_determinant(inertia, X) / np.linalg.det(X.T @ (A[:, None] * X)) ** (n - r - 1))
+        ratios.append(
+            restricted_determinant(inertia, X)
+            / np.linalg.det(X.T @ (A[:, None] * X)) ** (n - r - 1)
+        )
     assert np.allclose(ratios, ratios[0], rtol=1e-12)
 
 
@@ -101,7 +122,9 @@ def test_the_density_of_the_special_inertia_is_a_power_of_the_pluecker_sum(n: in
 def test_the_gyroscopic_tensor_is_what_the_flow_adds_to_a_hamiltonian_one(
     n: int, r: int, kind: str, rng: np.random.Generator
 ) -> None:
-    """Π = ṗ + ∂H/∂q of (2.1) in canonical coordinates, against the tensor; its cyclic sum vanishes."""
+    """Π = ṗ + ∂H/∂q of (2.1) in canonical coordinates, against the tensor; its cyclic
+    sum vanishes.
+    """
     chart, z = drawn_chart(rng, n, r, kind)
     u, p = z[: chart.N], z[chart.N :]
     X, tangents, _ = chart.point(u)
@@ -112,14 +135,20 @@ def test_the_gyroscopic_tensor_is_what_the_flow_adds_to_a_hamiltonian_one(
     tensor, basis = gyroscopic_tensor(chart.inertia, X)
     components = product(chart.inertia.apply(basis), chart.omega(u, p))
     directions = product(chart.inertia.apply(basis)[None], angular_velocity(X, tangents)[:, None])
-    assert np.allclose(np.einsum("abc,a,b,kc->k", tensor, components, components, directions), force, atol=ROUGH)
-    assert np.allclose(tensor + tensor.transpose(1, 2, 0) + tensor.transpose(2, 0, 1), 0, atol=1e-13)
+    assert np.allclose(
+        np.einsum("abc,a,b,kc->k", tensor, components, components, directions), force, atol=ROUGH
+    )
+    assert np.allclose(
+        tensor + tensor.transpose(1, 2, 0) + tensor.transpose(2, 0, 1), 0, atol=1e-13
+    )
     assert np.allclose(tensor, tensor.transpose(1, 0, 2), atol=1e-14)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_logarithm_of_the_density_is_the_trace_of_the_force(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
+def test_the_logarithm_of_the_density_is_the_trace_of_the_force(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
     """(x3): (∇_p,Π) = α(q̇) with d ln f + α = 0, f = 𝒩^(N−1); the slopes are those of 𝒩 itself."""
     multiplier = ChaplyginMultiplier(operator(rng, n, kind), r)
     X, N = random_columns(rng, n, r), multiplier.freedom
@@ -128,43 +157,75 @@ def test_the_logarithm_of_the_density_is_the_trace_of_the_force(n: int, r: int, 
     assert np.allclose(alpha, -(N - 1) * multiplier.slopes(X, basis), atol=1e-13)
     step = 1e-5
     for direction in admissible_basis(X):
-        turns = (np.linalg.qr(X - s * step * direction @ X + step * step / 2 * direction @ direction @ X)[0] for s in (1, -1))
+        turns = (
+            np.linalg.qr(
+                X - s * step * direction @ X + step * step / 2 * direction @ direction @ X
+            )[0]
+            for s in (1, -1)
+        )
         upper, lower = (np.log(multiplier.value(x)) for x in turns)
-        assert np.isclose((upper - lower) / (2 * step), multiplier.slopes(X, direction[None])[0], atol=ROUGH)
-    ratio = [multiplier.value(x) ** (N - 1) / invariant_density(multiplier.inertia, x) for x in (X, random_columns(rng, n, r))]
+        assert np.isclose(
+            (upper - lower) / (2 * step), multiplier.slopes(X, direction[None])[0], atol=ROUGH
+        )
+    ratio = [
+        multiplier.value(x) ** (N - 1) / invariant_density(multiplier.inertia, x)
+        for x in (X, random_columns(rng, n, r))
+    ]
     assert np.isclose(*ratio, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])
-def test_the_rank_one_flow_with_special_inertia_is_hamiltonian_in_chaplygins_time(n: int, rng: np.random.Generator) -> None:
-    """Theorem main, item 1, and item 1 of Theorem Th_reduce: (x2) holds with 𝒩 = √(det A/(Aq,q)) and f = 𝒩^(n−2)."""
+def test_the_rank_one_flow_with_special_inertia_is_hamiltonian_in_chaplygins_time(
+    n: int, rng: np.random.Generator
+) -> None:
+    """Theorem main, item 1, and item 1 of Theorem Th_reduce: (x2) holds with 𝒩 = √(det A/(Aq,q))
+    and f = 𝒩^(n−2).
+    """
     chart, z = drawn_chart(rng, n, 1, "special")
     multiplier = ChaplyginMultiplier(chart.inertia, 1)
-    assert np.allclose(in_new_time(chart, multiplier, z), of_hamiltonian(chart, multiplier, z), atol=ROUGH)
+    assert np.allclose(
+        in_new_time(chart, multiplier, z), of_hamiltonian(chart, multiplier, z), atol=ROUGH
+    )
     A, q = 7.0 * np.exp(rng.uniform(0, 1.5, n)), chart.X0[:, 0]
-    assert np.isclose(ChaplyginMultiplier.of({"special": A}, n, 1).value(chart.X0), np.sqrt(np.prod(A) / (A @ q**2)), rtol=1e-12)
+    assert np.isclose(
+        ChaplyginMultiplier.of({"special": A}, n, 1).value(chart.X0),
+        np.sqrt(np.prod(A) / (A @ q**2)),
+        rtol=1e-12,
+    )
     assert multiplier.obstruction(chart.X0) < 1e-12
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_with_two_degrees_of_freedom_every_measure_is_a_multiplier(kind: str, rng: np.random.Generator) -> None:
-    """Item 2 of Theorem Th_reduce: n = 3, r = 1, any inertia tensor and a potential that is no special one."""
+def test_with_two_degrees_of_freedom_every_measure_is_a_multiplier(
+    kind: str, rng: np.random.Generator
+) -> None:
+    """Item 2 of Theorem Th_reduce: n = 3, r = 1, any inertia tensor and a potential that is no
+    special one.
+    """
     value, gradient = clebsch(rng.normal(size=3))
     chart, z = drawn_chart(rng, 3, 1, kind, value, gradient)
     multiplier = ChaplyginMultiplier(chart.inertia, 1, value)
-    assert np.allclose(in_new_time(chart, multiplier, z), of_hamiltonian(chart, multiplier, z), atol=ROUGH)
+    assert np.allclose(
+        in_new_time(chart, multiplier, z), of_hamiltonian(chart, multiplier, z), atol=ROUGH
+    )
     assert multiplier.obstruction(chart.X0) < 1e-12
 
 
-def test_a_density_that_depends_on_momenta_gives_one_that_does_not_and_holds_with_potentials(rng: np.random.Generator) -> None:
-    """Remark after Theorem Th_reduce: f(q,p) solves (x7) with V = 0, so does f(q,0), and with V ≠ 0 only that one."""
+def test_a_density_that_depends_on_momenta_gives_one_that_does_not_and_holds_with_potentials(
+    rng: np.random.Generator,
+) -> None:
+    """Remark after Theorem Th_reduce: f(q,p) solves (x7) with V = 0, so does f(q,0), and with V ≠ 0
+    only that one.
+    """
     inertia, X0 = operator(rng, 4, "matrix"), random_columns(rng, 4, 2)
     plain, forced = Chart(inertia, X0), Chart(inertia, X0, *clebsch(rng.normal(size=4)))
     z = np.concatenate([0.3 * rng.normal(size=plain.N), rng.normal(size=plain.N)])
 
     def general(y: Any) -> float:
         u, p = y[: plain.N], y[plain.N :]
-        return invariant_density(inertia, plain.point(u)[0]) * float(1 + np.sum(plain.momentum(u, p) ** 2))
+        return invariant_density(inertia, plain.point(u)[0]) * float(
+            1 + np.sum(plain.momentum(u, p) ** 2)
+        )
 
     def at_rest(y: Any) -> float:
         return general(np.concatenate([y[: plain.N], np.zeros(plain.N)]))
@@ -177,14 +238,25 @@ def test_a_density_that_depends_on_momenta_gives_one_that_does_not_and_holds_wit
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(4, 1), (4, 2), (5, 3), (4, 3)])
-def test_the_obstruction_is_the_distance_from_a_hamiltonian_flow(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
-    """The field in τ against that of H*: their difference is the traceless part of Π, and so is what makes Ω not invariant."""
+def test_the_obstruction_is_the_distance_from_a_hamiltonian_flow(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
+    """The field in τ against that of H*: their difference is the traceless part of Π, and so is
+    what makes Ω not invariant.
+    """
     chart, z = drawn_chart(rng, n, r, kind)
     multiplier = ChaplyginMultiplier(chart.inertia, r)
     X = chart.point(z[: chart.N])[0]
-    distance = np.linalg.norm(in_new_time(chart, multiplier, z) - of_hamiltonian(chart, multiplier, z))
+    distance = np.linalg.norm(
+        in_new_time(chart, multiplier, z) - of_hamiltonian(chart, multiplier, z)
+    )
     jacobian = slopes(lambda y: in_new_time(chart, multiplier, y), z).T
-    J = np.block([[np.zeros((chart.N, chart.N)), np.eye(chart.N)], [-np.eye(chart.N), np.zeros((chart.N, chart.N))]])
+    J = np.block(
+        [
+            [np.zeros((chart.N, chart.N)), np.eye(chart.N)],
+            [-np.eye(chart.N), np.zeros((chart.N, chart.N))],
+        ]
+    )
     form = J @ jacobian  # symmetric where the field is Hamiltonian
     asymmetry = np.linalg.norm(form - form.T) / np.linalg.norm(form)
     reducible = r == n - 1 or (kind == "special" and r == 1)
@@ -194,7 +266,9 @@ def test_the_obstruction_is_the_distance_from_a_hamiltonian_flow(n: int, r: int,
     assert 0 <= multiplier.obstruction(X) <= 1
 
 
-def test_for_higher_rank_no_multiplier_is_nearer_than_that_of_the_measure(rng: np.random.Generator) -> None:
+def test_for_higher_rank_no_multiplier_is_nearer_than_that_of_the_measure(
+    rng: np.random.Generator,
+) -> None:
     inertia, X = operator(rng, 5, "special"), random_columns(rng, 5, 2)
     tensor, basis = gyroscopic_tensor(inertia, X)
     multiplier = ChaplyginMultiplier(inertia, 2)
@@ -211,7 +285,9 @@ def test_for_higher_rank_no_multiplier_is_nearer_than_that_of_the_measure(rng: n
 def test_near_a_special_inertia_only_four_forms_keep_the_multiplier_of_rank_one(
     n: int, extra: int, rng: np.random.Generator
 ) -> None:
-    """The directions in which the obstruction vanishes to first order: symmetric A, n(n+1)/2, and Λ⁴, which q∧q̇ does not see."""
+    """The directions in which the obstruction vanishes to first order: symmetric A, n(n+1)/2, and
+    Λ⁴, which q∧q̇ does not see.
+    """
     m, step = n * (n - 1) // 2, 1e-5
     base = operator(rng, n, "special").matrix
     points = [random_columns(rng, n, 1) for _ in range(2 * n)]
@@ -221,7 +297,9 @@ def test_near_a_special_inertia_only_four_forms_keep_the_multiplier_of_rank_one(
         inertia, parts = MatrixInertia(n, matrix, 0), []
         for X in points:
             tensor, basis = gyroscopic_tensor(inertia, X)
-            once = np.multiply.outer(ChaplyginMultiplier(inertia, 1).slopes(X, basis), np.eye(n - 1))
+            once = np.multiply.outer(
+                ChaplyginMultiplier(inertia, 1).slopes(X, basis), np.eye(n - 1)
+            )
             traceless = tensor - once.transpose(1, 2, 0) + (once + once.transpose(1, 0, 2)) / 2
             back = np.linalg.inv(product(admissible_basis(X)[:, None], basis[None]))
             parts.append(np.einsum("abc,ai,bj,ck->ijk", traceless, back, back, back).ravel())
@@ -252,9 +330,14 @@ def test_the_new_hamiltonian_is_the_legendre_transform_of_the_new_lagrangian(
 
 
 @pytest.mark.parametrize("n", [3, 4])
-def test_chaplygins_time_is_neumanns_over_the_root_of_twice_the_energy(n: int, rng: np.random.Generator) -> None:
+def test_chaplygins_time_is_neumanns_over_the_root_of_twice_the_energy(
+    n: int, rng: np.random.Generator
+) -> None:
     A, q, q_dot = np.exp(rng.uniform(0, 1.5, n)), random_columns(rng, n, 1), rng.normal(size=(n, 1))
-    problem, body = StiefelFlow({"special": A}, q, X_dot=q_dot, normalize=True), Veselova(A, q[:, 0], q_dot[:, 0], normalize=True)
+    problem, body = (
+        StiefelFlow({"special": A}, q, X_dot=q_dot, normalize=True),
+        Veselova(A, q[:, 0], q_dot[:, 0], normalize=True),
+    )
     times = [-2.0, 0.5, 6.0]
     tau = ChaplyginMultiplier(problem.inertia, 1).time(solve(problem, times))
     assert np.allclose(tau, solve(body, times).tau1 / np.sqrt(2 * body.energy), atol=1e-11)
@@ -263,7 +346,10 @@ def test_chaplygins_time_is_neumanns_over_the_root_of_twice_the_energy(n: int, r
 def test_the_energy_of_the_motion_in_the_new_time_is_the_same(rng: np.random.Generator) -> None:
     problem = random_flow(rng, 4, 2, "special")
     multiplier, found = ChaplyginMultiplier(problem.inertia, 2), solve(problem, [0.0, 3.0, 7.0])
-    values = [multiplier.hamiltonian(X, multiplier.momentum(X, P)) for X, P in zip(found.X, found.P, strict=True)]
+    values = [
+        multiplier.hamiltonian(X, multiplier.momentum(X, P))
+        for X, P in zip(found.X, found.P, strict=True)
+    ]
     assert np.allclose(values, problem.energy, rtol=1e-11)
 
 
@@ -271,7 +357,11 @@ def test_momenta_and_velocities_correspond(rng: np.random.Generator) -> None:
     inertia, X = operator(rng, 4, "matrix"), random_columns(rng, 4, 2)
     velocity = tangent_part(X, rng.normal(size=(4, 2)))
     omega = angular_velocity(X, velocity)
-    assert np.isclose(np.sum(cotangent(X, inertia.apply(omega)) * velocity), product(inertia.apply(omega), omega), rtol=1e-12)
+    assert np.isclose(
+        np.sum(cotangent(X, inertia.apply(omega)) * velocity),
+        product(inertia.apply(omega), omega),
+        rtol=1e-12,
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""Names that are none: refused at once at every door, with the one that may have been meant, and with all other faults."""
+"""Names that are none: refused at once at every door, with the one that may have been meant, and
+with all other faults.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,15 @@ NAMES = [
 
 @pytest.mark.parametrize("path", ["/v1/trajectories", "/v1/sweeps"])
 @pytest.mark.parametrize(("change", "pointer", "meant"), NAMES)
-def test_an_unknown_name_is_refused_at_once(server: Server, path: str, change: Any, pointer: str, meant: str | None) -> None:
-    body = {"problem": BODY4_PROBLEM, "times": [0, 1], **({"vary": VARY} if path == "/v1/sweeps" else {}), **change}
+def test_an_unknown_name_is_refused_at_once(
+    server: Server, path: str, change: Any, pointer: str, meant: str | None
+) -> None:
+    body = {
+        "problem": BODY4_PROBLEM,
+        "times": [0, 1],
+        **({"vary": VARY} if path == "/v1/sweeps" else {}),
+        **change,
+    }
     document = is_problem(post(server, path, body), 422, "invalid-input")
     assert [error["pointer"] for error in document["errors"]] == [pointer]
     assert (f"(did you mean {meant}?)" in document["detail"]) == (meant is not None)
@@ -40,30 +49,49 @@ def test_an_unknown_name_is_refused_at_once(server: Server, path: str, change: A
 def test_a_comparison_takes_methods_of_integration_alone(server: Server) -> None:
     for method in ("theta", "tailor"):
         document = is_problem(
-            post(server, "/v1/comparisons", {"problem": BODY4_PROBLEM, "times": [0, 1], "method": method}), 422, "invalid-input"
+            post(
+                server,
+                "/v1/comparisons",
+                {"problem": BODY4_PROBLEM, "times": [0, 1], "method": method},
+            ),
+            422,
+            "invalid-input",
         )
         assert document["errors"][0]["pointer"] == "/method"
 
 
 def test_all_faults_of_a_body_come_back_together(server: Server) -> None:
     bad = {**BODY4_PROBLEM, "A": ["x", 2, 1, 1]}
-    body = {"problem": bad, "times": ["x", 0], "engine": "numeric", "method": "tailor", "digits": 30, "outputs": ["Q"]}
+    body = {
+        "problem": bad,
+        "times": ["x", 0],
+        "engine": "numeric",
+        "method": "tailor",
+        "digits": 30,
+        "outputs": ["Q"],
+    }
     document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
     pointers = {error["pointer"] for error in document["errors"]}
     assert pointers == {"/problem/A/0", "/times/0", "/method", "/digits", "/outputs/0"}
-    document = is_problem(post(server, "/v1/trajectories", {"problem": bad, "times": ["x", 0]}), 422, "invalid-input")
+    document = is_problem(
+        post(server, "/v1/trajectories", {"problem": bad, "times": ["x", 0]}), 422, "invalid-input"
+    )
     assert {error["pointer"] for error in document["errors"]} == {"/problem/A/0", "/times/0"}
 
 
 def test_times_without_end_are_not_made_for_the_sake_of_further_faults() -> None:
     times = {"start": 0, "stop": 1, "count": 10**12}
     with pytest.raises(vs.InvalidInput) as caught:
-        read_request(TrajectoryRequest, {"problem": BODY4_PROBLEM, "times": times, "method": "none"})
+        read_request(
+            TrajectoryRequest, {"problem": BODY4_PROBLEM, "times": times, "method": "none"}
+        )
     assert [fault.field for fault in caught.value.faults] == ["method"]
 
 
 def test_attributes_that_are_none_name_the_nearest() -> None:
-    with pytest.raises(AttributeError, match=r"no attribute 'Veselovaa' \(did you mean Veselova\?\)$"):
+    with pytest.raises(
+        AttributeError, match=r"no attribute 'Veselovaa' \(did you mean Veselova\?\)$"
+    ):
         _ = vs.Veselovaa
     trajectory = vs.solve(vs.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1]), [0, 1])
     with pytest.raises(AttributeError, match=r"has no 'omga' \(did you mean omega\?\)$"):
@@ -78,7 +106,9 @@ def test_python_names_all_faults_of_its_options() -> None:
     with pytest.raises(vs.InvalidRequest) as caught:
         vs.solve(problem, [0, 1], "numeric", "tailor", digits=30, formulation="redced")
     assert [fault.field for fault in caught.value.faults] == ["method", "formulation", "digits"]
-    with pytest.raises(vs.InvalidInput, match=r"engine: .*given analitic \(did you mean analytic\?\)"):
+    with pytest.raises(
+        vs.InvalidInput, match=r"engine: .*given analitic \(did you mean analytic\?\)"
+    ):
         vs.solve(problem, [0, 1], "analitic")
 
 

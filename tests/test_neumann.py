@@ -31,7 +31,9 @@ SPECIAL: dict[str, tuple[Any, Any, Any]] = {
 def drawn(rng: Generator, n: int) -> NeumannSystem:
     """Velocities from slow to fast: c_1 < I_1, c_1 > I_1 and c_1 < 0 all occur."""
     A = np.exp(rng.uniform(0, np.log(5), n))
-    return NeumannSystem(A, rng.normal(size=n), rng.normal(size=n) * rng.choice([0.1, 0.6, 3.0]), normalize=True)
+    return NeumannSystem(
+        A, rng.normal(size=n), rng.normal(size=n) * rng.choice([0.1, 0.6, 3.0]), normalize=True
+    )
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, *map(slow, range(5, 8))])
@@ -39,7 +41,10 @@ def drawn(rng: Generator, n: int) -> NeumannSystem:
 def test_the_closed_form_agrees_with_integration(n: int, method: str, rng: Generator) -> None:
     for _ in range(5):
         problem = drawn(rng, n)
-        closed, found = solve(problem, TIMES, method=method), solve(problem, TIMES, "numeric", "taylor")
+        closed, found = (
+            solve(problem, TIMES, method=method),
+            solve(problem, TIMES, "numeric", "taylor"),
+        )
         difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
         assert np.all(difference <= closed.error + found.error)
         assert np.max(closed.error) <= 1e-11 * max(1.0, problem.turning)
@@ -52,14 +57,19 @@ def test_special_starts_are_served(name: str) -> None:
     A, q, v = SPECIAL[name]
     problem = NeumannSystem(A, q, v, normalize=True)
     closed, found = solve(problem, TIMES / 3), solve(problem, TIMES / 3, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.frame - found.frame), axis=(1, 2)) <= closed.error + found.error)
+    assert np.all(
+        np.max(np.abs(closed.frame - found.frame), axis=(1, 2)) <= closed.error + found.error
+    )
     assert np.max(closed.error) < 1e-11
 
 
 def test_a_pendulum_on_its_separatrix_climbs_for_as_long_as_the_data_tell() -> None:
-    """U = ½(A⁻¹q,q), n = 2: with the energy of the top, sin of the angle to it falls like 1/cosh."""
+    """U = ½(A⁻¹q,q), n = 2: with the energy of the top, sin of the angle to it falls
+    like 1/cosh.
+    """
     top, gap = NeumannSystem(["1", "1/2"], ["1", "0"], ["0", "1"]), 1.0
-    assert top.integrals({**top.start})["energy"][0] == 1.0  # ½(1 + 1) against ½·2 at the top: the separatrix
+    # ½(1 + 1) against ½·2 at the top: the separatrix
+    assert top.integrals({**top.start})["energy"][0] == 1.0
     found = solve(top, [0.0, 1.0, 5.0])
     assert found.provenance.details["regime"] == "separatrix"
     assert np.allclose(found.q[:, 0], 1 / np.cosh(gap * found.times), atol=np.max(found.error))
@@ -114,10 +124,14 @@ def test_bad_neumann_starts_are_refused_by_field(fields: dict[str, Any], path: s
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_a_far_time_beside_it_does_not_change_a_near_one(n: int) -> None:
-    """Beyond 200 cycles frequencies have guard digits; c_1 may be negative here, and had lost its sign on the way to them."""
+    """Beyond 200 cycles frequencies have guard digits; c_1 may be negative here, and had lost its
+    sign on the way to them.
+    """
     rng = np.random.default_rng(n)
     for _ in range(4):
-        problem = NeumannSystem(rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n), normalize=True)
+        problem = NeumannSystem(
+            rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n), normalize=True
+        )
         far, near = solve(problem, [10.0, 1e4]), solve(problem, [10.0])
         assert np.max(np.abs(far.q[0] - near.q[0])) <= far.error[0] + near.error[0]
         integrated = solve(problem, [10.0], engine="numeric")

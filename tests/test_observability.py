@@ -1,4 +1,6 @@
-"""What a server tells of itself: lines of the log, request ids, metrics, traces, readiness, through real requests."""
+"""What a server tells of itself: lines of the log, request ids, metrics, traces, readiness, through
+real requests.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
 @pytest.fixture(scope="module")
 def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server of these tests alone, so that what it counts is known."""
-    with running_server(tmp_path_factory.mktemp("observed"), workers="1", max_waiting="1") as running:
+    with running_server(
+        tmp_path_factory.mktemp("observed"), workers="1", max_waiting="1"
+    ) as running:
         yield running
 
 
@@ -54,7 +58,11 @@ def line_of(server: Server, response: httpx2.Response) -> dict[str, Any]:
     """Return the one line that the server wrote of a request, once it is there."""
 
     def found() -> list[dict[str, Any]]:
-        return [line for line in lines(server) if line.get("request_id") == response.headers["x-request-id"]]
+        return [
+            line
+            for line in lines(server)
+            if line.get("request_id") == response.headers["x-request-id"]
+        ]
 
     wait_until(found)
     (line,) = found()
@@ -79,18 +87,41 @@ def in_process(app: FastAPI, path: str, **headers: str) -> httpx2.Response:
 @pytest.mark.parametrize(
     ("path", "change", "expected"),
     [
-        ("/v1/trajectories", {}, {"status": 200, "system": "veselova", "engine": "analytic", "outcome": "solved"}),
-        ("/v1/trajectories", {"engine": "numeric"}, {"status": 200, "engine": "numeric", "outcome": "solved"}),
+        (
+            "/v1/trajectories",
+            {},
+            {"status": 200, "system": "veselova", "engine": "analytic", "outcome": "solved"},
+        ),
+        (
+            "/v1/trajectories",
+            {"engine": "numeric"},
+            {"status": 200, "engine": "numeric", "outcome": "solved"},
+        ),
         ("/v1/comparisons", {}, {"status": 200, "engine": "both", "outcome": "solved"}),
-        ("/v1/trajectories", {"times": [1e40]}, {"status": 422, "engine": "analytic", "outcome": "too-far"}),
+        (
+            "/v1/trajectories",
+            {"times": [1e40]},
+            {"status": 422, "engine": "analytic", "outcome": "too-far"},
+        ),
         ("/v1/trajectories", {"engine": "magic"}, {"status": 422, "outcome": "invalid-input"}),
-        ("/v1/trajectories", {**ENDLESS, "budget_s": 0.2}, {"status": 504, "engine": "numeric", "outcome": "over-budget"}),
+        (
+            "/v1/trajectories",
+            {**ENDLESS, "budget_s": 0.2},
+            {"status": 504, "engine": "numeric", "outcome": "over-budget"},
+        ),
     ],
 )
-def test_each_request_is_one_line(own: Server, path: str, change: dict[str, Any], expected: dict[str, Any]) -> None:
+def test_each_request_is_one_line(
+    own: Server, path: str, change: dict[str, Any], expected: dict[str, Any]
+) -> None:
     line = line_of(own, post(own, path, {**GOOD, **change}))
     assert expected.items() <= line.items()
-    assert (line["event"], line["level"], line["method"], line["route"]) == ("request", "info", "POST", path)
+    assert (line["event"], line["level"], line["method"], line["route"]) == (
+        "request",
+        "info",
+        "POST",
+        path,
+    )
     assert line["client"] == "127.0.0.1"
     assert 0 < line["seconds"] < 60
     assert line["timestamp"].endswith("Z")
@@ -109,7 +140,9 @@ def test_ids_of_clients_are_echoed_and_others_are_made(own: Server) -> None:
     assert len(made) == 3
 
 
-@pytest.mark.parametrize("given", ["two words", "x" * 65, '"}{', "<script>", "é".encode("latin-1"), "a,b"])
+@pytest.mark.parametrize(
+    "given", ["two words", "x" * 65, '"}{', "<script>", "é".encode("latin-1"), "a,b"]
+)
 def test_an_id_that_could_harm_a_log_is_replaced(own: Server, given: Any) -> None:
     answer = own.get("/v1/systems", headers={"x-request-id": given})
     assert answer.status_code == 200
@@ -156,7 +189,9 @@ def test_an_exception_that_quotes_a_key_is_logged_without_it(text: bool) -> None
 
 
 def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: Path) -> None:
-    assert not [line for line in lines(own) if line.get("route") in ("/readyz", "/healthz", "/metrics")]
+    assert not [
+        line for line in lines(own) if line.get("route") in ("/readyz", "/healthz", "/metrics")
+    ]
     with running_server(tmp_path, "--log-format", "text", "--log-level", "debug") as talkative:
         pass
     log = talkative.log.read_text()
@@ -173,7 +208,11 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
     post(own, "/v1/tori", b"{", accept="text/html")
     own.get(f"/nowhere-{time.time()}")
     after = numbers(own)
-    grown = {name: after[name] - before.get(name, 0) for name in after if after[name] != before.get(name, 0)}
+    grown = {
+        name: after[name] - before.get(name, 0)
+        for name in after
+        if after[name] != before.get(name, 0)
+    }
     assert grown[("veselova_outcomes_total", "analytic", "trajectory", "solved")] == 1
     assert grown[("veselova_outcomes_total", "analytic", "trajectory", "too-far")] == 1
     assert grown[("veselova_outcomes_total", "analytic", "torus", "solved")] == 1
@@ -193,7 +232,10 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
 def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     assert numbers(own)[("veselova_workers",)] == 1
     before = numbers(own)
-    works, waits = (threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": s})) for s in (60, 3))
+    works, waits = (
+        threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": s}))
+        for s in (60, 3)
+    )
     works.start()
     wait_until(lambda: own.at_work() == (1, 0))
     waits.start()
@@ -208,7 +250,10 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
 
 
 def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
-    row = "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', NULL, '', 1)"
+    row = (
+        "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', "
+        "NULL, '', 1)"
+    )
     with sqlite3.connect(own.log.parent / "data" / "veselova.db") as database:
         database.execute(row)
     assert numbers(own)[("veselova_jobs", "failed")] == 1
@@ -239,7 +284,9 @@ def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
     assert shown[("veselova_cache_total", "miss")] == 1
 
 
-def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     app = create_app(Settings(data_dir=tmp_path, cors_origins="https://a.example"), loopback=True)
 
     @app.get("/failing")
@@ -247,7 +294,9 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, c
         raise RuntimeError("the reason, which is nobody's business")
 
     with caplog.at_level(logging.INFO, "veselova"):
-        response = in_process(app, "/failing", **{"x-request-id": "case-1", "origin": "https://a.example"})
+        response = in_process(
+            app, "/failing", **{"x-request-id": "case-1", "origin": "https://a.example"}
+        )
     document = is_problem(response, 500, "internal-error")
     assert "business" not in document["detail"]
     assert response.headers["x-request-id"] == "case-1"
@@ -255,22 +304,33 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(tmp_path: Path, c
     assert response.headers["access-control-allow-origin"] == "https://a.example"
     record = next(record for record in caplog.records if record.name == "veselova.service.requests")
     assert (record.__dict__["outcome"], record.__dict__["status"]) == ("internal-error", 500)
-    assert samples(in_process(app, "/metrics").text)[("http_requests_total", "/failing", "GET", "500")] == 1
+    assert (
+        samples(in_process(app, "/metrics").text)[("http_requests_total", "/failing", "GET", "500")]
+        == 1
+    )
 
 
 def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
     cold = create_app(Settings(data_dir=tmp_path), loopback=True)
-    assert is_problem(in_process(cold, "/readyz"), 503, "not-ready")["detail"] == "No worker is warm yet."
+    assert (
+        is_problem(in_process(cold, "/readyz"), 503, "not-ready")["detail"]
+        == "No worker is warm yet."
+    )
     broken = create_app(Settings(data_dir=tmp_path), loopback=False)
     with sqlite3.connect(tmp_path / "veselova.db") as database:
         database.execute("DROP TABLE api_keys")
     detail = is_problem(in_process(broken, "/readyz"), 503, "not-ready")["detail"]
     parts = ("No worker is warm yet.", "Jobs cannot be stored or read at present.")
-    assert detail == f"{' '.join(parts)} The keys cannot be read: the database does not answer (OperationalError)."
+    assert (
+        detail == f"{' '.join(parts)} The keys cannot be read: the database does not answer "
+        "(OperationalError)."
+    )
 
 
 @pytest.mark.parametrize("busy", [True, False])
-def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(busy: bool, tmp_path: Path) -> None:
+def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(
+    busy: bool, tmp_path: Path
+) -> None:
     """It is killed when its budget is over, or dies while it has nothing to do."""
     workers = Workers(Settings(data_dir=tmp_path, workers=1, max_waiting=0), Metrics())
 
@@ -292,7 +352,8 @@ def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(busy: bool, tm
                     await anyio.sleep(0.02)
             assert not workers.ready()
             await anyio.sleep(0.2)
-            assert await workers.run(os.getpid, budget_s=PATIENCE) != first  # it waits, although no request may
+            # it waits, although no request may
+            assert await workers.run(os.getpid, budget_s=PATIENCE) != first
             second = await ready()
             assert second != first
             with anyio.move_on_after(0.2):  # its client has gone
@@ -324,7 +385,8 @@ async def ask():
     transport = httpx2.ASGITransport(create_app(Settings(), loopback=True))
     async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
         parent = "00-" + "a" * 32 + "-" + "b" * 16 + "-01"
-        await client.get("/v1/systems", headers={"traceparent": parent, "authorization": "Bearer SSSS"})
+        headers = {"traceparent": parent, "authorization": "Bearer SSSS"}
+        await client.get("/v1/systems", headers=headers)
         await client.get("/healthz")
 
 asyncio.run(ask())
@@ -333,7 +395,9 @@ assert {f"{span.context.trace_id:x}" for span in spans} == {"a" * 32}, spans
 assert "GET /v1/systems" in {span.name for span in spans}, [span.name for span in spans]
 assert not any("SSSS" in span.to_json() for span in spans)
 """
-    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE)
+    answer = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert answer.returncode == 0, answer.stderr
 
 
@@ -361,7 +425,9 @@ def fail_with_what_cannot_be_made() -> None:
 
 
 def test_a_worker_says_what_happened_whatever_the_exception_is() -> None:
-    succeeded, error = pickle.loads(answer(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :])
+    succeeded, error = pickle.loads(
+        answer(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :]
+    )
     assert not succeeded
     assert isinstance(error, RuntimeError)
     assert str(error) == "Unmakeable: what happened"

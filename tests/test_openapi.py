@@ -15,7 +15,8 @@ from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
 
-#: Names of functions in generated clients: programs of users call them, so that none may change or go.
+#: Names of functions in generated clients: programs of users call them, so that none may change or
+#: go.
 OPERATIONS = {
     "cancel_job",
     "check_health",
@@ -47,7 +48,13 @@ def parts(value: Any, place: str = "#") -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield all objects within a document and where they stand."""
     if isinstance(value, dict):
         yield place, value
-    children = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    children = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for name, child in children:
         yield from parts(child, f"{place}/{str(name).replace('~', '~0').replace('/', '~1')}")
 
@@ -59,7 +66,11 @@ def test_every_array_says_what_it_holds(document: dict[str, Any]) -> None:
 
 
 def test_every_operation_has_its_own_name_for_good(document: dict[str, Any]) -> None:
-    names = [operation["operationId"] for operations in document["paths"].values() for operation in operations.values()]
+    names = [
+        operation["operationId"]
+        for operations in document["paths"].values()
+        for operation in operations.values()
+    ]
     assert len(names) == len(set(names))
     assert set(names) == OPERATIONS
 
@@ -67,14 +78,20 @@ def test_every_operation_has_its_own_name_for_good(document: dict[str, Any]) -> 
 def test_every_reference_resolves_and_every_schema_is_referred_to(document: dict[str, Any]) -> None:
     known = {place for place, _ in parts(document)}
     found = {part["$ref"] for _, part in parts(document) if isinstance(part.get("$ref"), str)}
-    targets = {target for _, part in parts(document) for target in part.get("discriminator", {}).get("mapping", {}).values()}
+    targets = {
+        target
+        for _, part in parts(document)
+        for target in part.get("discriminator", {}).get("mapping", {}).values()
+    }
     assert found | targets <= known
     assert found == {PREFIX + name for name in document["components"]["schemas"]}
 
 
 def test_bodies_and_parameters_can_be_refused(document: dict[str, Any]) -> None:
     for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori", "/v1/sweeps"):
-        assert {"400", "413", "415", "422"} < set(document["paths"][path]["post"]["responses"]), path
+        assert {"400", "413", "415", "422"} < set(document["paths"][path]["post"]["responses"]), (
+            path
+        )
 
 
 def test_all_refusals_are_problem_documents(document: dict[str, Any]) -> None:
@@ -82,7 +99,11 @@ def test_all_refusals_are_problem_documents(document: dict[str, Any]) -> None:
         for method, operation in operations.items():
             for status, response in operation["responses"].items():
                 if status >= "400" and method != "head":
-                    assert list(response["content"]) == ["application/problem+json"], (path, method, status)
+                    assert list(response["content"]) == ["application/problem+json"], (
+                        path,
+                        method,
+                        status,
+                    )
 
 
 @pytest.mark.parametrize("name", schema_names())
@@ -110,7 +131,9 @@ def test_schemas_tell_requests_from_what_is_none() -> None:
 def test_the_server_gives_its_schemas(server: Server) -> None:
     listed = server.get("/v1/schemas").json()["schemas"]
     assert {item["name"] for item in listed} == set(schema_names())
-    assert {"TrajectoryRequest", "ComparisonRequest", "TorusRequest", "SweepRequest"} < {item["name"] for item in listed}
+    assert {"TrajectoryRequest", "ComparisonRequest", "TorusRequest", "SweepRequest"} < {
+        item["name"] for item in listed
+    }
     for item in listed:
         answer = server.get(item["link"])
         assert answer.headers["content-type"] == "application/schema+json"

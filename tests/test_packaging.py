@@ -1,4 +1,6 @@
-"""The package as it is built and installed: the same files everywhere, every import declared, the core by itself."""
+"""The package as it is built and installed: the same files everywhere, every import declared, the
+core by itself.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def _libraries(extra: str | None) -> set[str]:
 
 
 def _files(folder: Path) -> set[str]:
-    paths = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    paths = (
+        path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    )
     return {str(path.relative_to(folder)) for path in paths}
 
 
@@ -51,7 +55,9 @@ def _third_party(path: Path) -> set[str]:
     checking = [
         node
         for statement in ast.walk(tree)
-        if isinstance(statement, ast.If) and isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
+        if isinstance(statement, ast.If)
+        and isinstance(statement.test, ast.Name)
+        and statement.test.id == "TYPE_CHECKING"
         for node in ast.walk(statement)
     ]
     names: set[str] = set()
@@ -88,7 +94,9 @@ def wheel(sdist: Path) -> Path:
 
 @in_the_repository
 def test_the_sdist_is_the_repository(sdist: Path) -> None:
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\0")
     tracked = {name for name in listed if name and (ROOT / name).is_file()}
     assert _files(sdist) - {"PKG-INFO"} >= tracked
     assert all(os.access(sdist / name, os.X_OK) for name in ("run", "check", ".ci/run", ".ci/lock"))
@@ -100,28 +108,55 @@ def test_the_wheel_made_of_the_sdist_has_every_file_of_the_source(wheel: Path) -
         texts = {name: files.read(name) for name in names}
     assert names == {f"veselova/{name}" for name in _files(SOURCE)}
     assert all(text == (SOURCE.parent / name).read_bytes() for name, text in texts.items())
-    assert {name.split("/")[1] for name in names} >= {"analytic", "numeric", "service", "mechanics", "migrations"}
+    assert {name.split("/")[1] for name in names} >= {
+        "analytic",
+        "numeric",
+        "service",
+        "mechanics",
+        "migrations",
+    }
 
 
 #: Folder of the source → the extra that brings what it imports at module level; None is the core.
-CHAPTERS = {"": None, "mechanics": None, "analytic": None, "numeric": None, "service": "service", "migrations": "service"}
+CHAPTERS = {
+    "": None,
+    "mechanics": None,
+    "analytic": None,
+    "numeric": None,
+    "service": "service",
+    "migrations": "service",
+}
 
 
 @pytest.mark.parametrize("folder", sorted(CHAPTERS))
 def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
-    # What is imported at a call may be of any extra, or is named by the error that says that it is missing.
+    # What is imported at a call may be of any extra, or is named by the error that says that it is
+    # missing.
     declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"finufft", "sympy"}
     for path in sorted((SOURCE / folder).rglob("*.py")):
         for module in _third_party(path):
             names = {_name(name) for name in distributions.get(module, [module])}
-            assert names & declared, f"{path.name} imports {module}, which no extra of pyproject.toml declares"
+            assert names & declared, (
+                f"{path.name} imports {module}, which no extra of pyproject.toml declares"
+            )
 
 
 def test_the_core_is_the_two_engines_alone() -> None:
     assert _libraries(None) == {"numpy", "scipy", "mpmath", "python-flint", "orjson"}
-    assert set(EXTRAS) == {"all", "client", "fast", "plot", "service", "sweeps", "telemetry", "test"}
-    assert _libraries("all") == set.union(*(_libraries(extra) for extra in EXTRAS if extra not in ("all", "test")))
+    assert set(EXTRAS) == {
+        "all",
+        "client",
+        "fast",
+        "plot",
+        "service",
+        "sweeps",
+        "telemetry",
+        "test",
+    }
+    assert _libraries("all") == set.union(
+        *(_libraries(extra) for extra in EXTRAS if extra not in ("all", "test"))
+    )
 
 
 def test_no_message_names_a_package_that_no_index_has() -> None:
@@ -130,12 +165,27 @@ def test_no_message_names_a_package_that_no_index_has() -> None:
         assert not re.search(r"pip install ['\"]?veselova", path.read_text()), path
 
 
-#: Names of hosts that serve packages or images; written in two parts, since this file is searched too.
+#: Names of hosts that serve packages or images; written in two parts, since this file is searched
+#: too.
 HOSTS = [
-    *(f"{name}.{top}" for name, top in [("pypi", "org"), ("pythonhosted", "org"), ("npmjs", "org"), ("docker", "io")]),
     *(
         f"{name}.{top}"
-        for name, top in [("debian", "org"), ("ghcr", "io"), ("quay", "io"), ("crates", "io"), ("anaconda", "org")]
+        for name, top in [
+            ("pypi", "org"),
+            ("pythonhosted", "org"),
+            ("npmjs", "org"),
+            ("docker", "io"),
+        ]
+    ),
+    *(
+        f"{name}.{top}"
+        for name, top in [
+            ("debian", "org"),
+            ("ghcr", "io"),
+            ("quay", "io"),
+            ("crates", "io"),
+            ("anaconda", "org"),
+        ]
     ),
     *(f"{name}.{top}" for name, top in [("ubuntu", "com"), ("conda", "io"), ("gcr", "io")]),
 ]
@@ -143,7 +193,9 @@ HOSTS = [
 
 @in_the_repository
 def test_no_file_names_the_host_of_a_registry() -> None:
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\0")
     pattern = re.compile("|".join(rf"\b{re.escape(host)}\b" for host in HOSTS), re.IGNORECASE)
     for name in listed:
         if name and (ROOT / name).is_file():
@@ -166,12 +218,18 @@ def _without(extra: str | None, statement: str) -> subprocess.CompletedProcess[s
     """Run a statement where nothing is installed but the core, with an extra."""
     kept = _libraries(extra)
     everything = packages_distributions()
-    missing = {module for module, names in everything.items() if not {_name(name) for name in names} & kept}
+    missing = {
+        module for module, names in everything.items() if not {_name(name) for name in names} & kept
+    }
     # What the libraries that are kept need themselves stays.
     declared = _libraries("all") | {"finufft", "sympy"}
-    missing = {module for module in missing if {_name(name) for name in everything[module]} & declared}
+    missing = {
+        module for module in missing if {_name(name) for name in everything[module]} & declared
+    }
     source = _WITHOUT.format(missing=missing) + statement
-    return subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, timeout=120
+    )
 
 
 BODY = "problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])\n"
@@ -182,7 +240,8 @@ def test_the_core_solves_by_both_engines() -> None:
 {BODY}
 trajectory = vs.solve(problem, [0, 1, 1e6])
 trajectory.to_csv("{os.devnull}")
-print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, vs.solve(problem, ["0.1"], digits=30).decimals.strings("q"))
+many = vs.solve(problem, ["0.1"], digits=30).decimals
+print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, many.strings("q"))
 """
     answer = _without(None, statement)
     assert answer.returncode == 0, answer.stderr
@@ -202,7 +261,9 @@ print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, vs.solve(problem,
         ("vs.solve(problem, [1], method='nufft')", "finufft", "finufft"),
     ],
 )
-def test_a_missing_library_is_named_with_what_installs_it(statement: str, library: str, advice: str, tmp_path: Path) -> None:
+def test_a_missing_library_is_named_with_what_installs_it(
+    statement: str, library: str, advice: str, tmp_path: Path
+) -> None:
     caught = f"""import os, veselova as vs
 os.chdir({str(tmp_path)!r})
 {BODY}
@@ -221,7 +282,9 @@ except vs.BackendMissing as error:
 
 def test_the_command_line_says_what_it_needs() -> None:
     for extra in (None, "client"):
-        answer = _without(extra, "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()")
+        answer = _without(
+            extra, "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()"
+        )
         assert answer.returncode == 1
         assert answer.stderr.startswith("veselova: the command line needs ")
         assert "pip install '.[service]'" in answer.stderr
@@ -235,14 +298,17 @@ def test_the_client_needs_its_own_extra_alone() -> None:
 
 def test_the_server_needs_no_sweeps() -> None:
     statement = (
-        "from veselova.service.http.app import create_app\nfrom veselova.service.api.settings import Settings\nprint(create_app)"
+        "from veselova.service.http.app import create_app\nfrom "
+        "veselova.service.api.settings import Settings\nprint(create_app)"
     )
     answer = _without("service", statement)
     assert answer.returncode == 0, answer.stderr
 
 
 def test_the_demo_needs_the_service_alone() -> None:
-    answer = _without("service", "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()")
+    answer = _without(
+        "service", "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()"
+    )
     assert answer.returncode == 0, answer.stderr
     assert "agree" in answer.stdout or "difference" in answer.stdout
 
@@ -263,13 +329,19 @@ def test_the_wheel_works_in_an_empty_environment(wheel: Path, tmp_path: Path) ->
     python = environment / "bin" / "python"
 
     def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(command, cwd=tmp_path, env=_CLEAN, capture_output=True, text=True, timeout=300)
+        return subprocess.run(
+            command, cwd=tmp_path, env=_CLEAN, capture_output=True, text=True, timeout=300
+        )
 
     _pip(environment, str(wheel))
-    solved = run(python, "-c", f"import veselova as vs\n{BODY}print(vs.compare(problem, range(5)).agrees)")
+    solved = run(
+        python, "-c", f"import veselova as vs\n{BODY}print(vs.compare(problem, range(5)).agrees)"
+    )
     assert solved.stdout.strip() == "True", solved.stderr
     installed = run(python, "-m", "pip", "list", "--format=freeze").stdout.splitlines()
-    assert {_name(line) for line in installed} - {"pip", "setuptools", "veselova"} == _libraries(None)
+    assert {_name(line) for line in installed} - {"pip", "setuptools", "veselova"} == _libraries(
+        None
+    )
     assert "pip install '.[service]'" in run(environment / "bin" / "veselova", "demo").stderr
 
     _pip(environment, f"{wheel}[service]")
@@ -278,7 +350,10 @@ def test_the_wheel_works_in_an_empty_environment(wheel: Path, tmp_path: Path) ->
 
 
 def _locked(name: str) -> set[str]:
-    return {package.lower() for package in re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), re.MULTILINE)}
+    return {
+        package.lower()
+        for package in re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), re.MULTILINE)
+    }
 
 
 def test_licences_of_all_locked_packages_are_listed() -> None:
@@ -286,10 +361,13 @@ def test_licences_of_all_locked_packages_are_listed() -> None:
     rows = re.findall(r"^\| ([\w.-]+) \| (.+?) \| (runtime|tests) \| (.*) \|$", table, re.MULTILINE)
     runtime = _locked("requirements.lock")
     listed = {package: where == "runtime" for package, _, where, _ in rows}
-    assert listed == {package: package in runtime for package in runtime | _locked("requirements-check.lock")}
+    assert listed == {
+        package: package in runtime for package in runtime | _locked("requirements-check.lock")
+    }
     for package, licence, where, remark in rows:
         assert licence != "not stated", package
-        # The container is given away: nothing in it may be under the GPL, which binds what it is combined with.
+        # The container is given away: nothing in it may be under the GPL, which binds what it is
+        # combined with.
         assert where == "tests" or not re.search(r"\bA?GPL", licence + remark), package
 
 

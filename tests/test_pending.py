@@ -45,7 +45,9 @@ def test_an_entry_is_there_while_it_is_being_written_and_after(tmp_path: Path) -
         pending = WriteBehind(cache)
         async with pending.writing():
             assert await pending.keep("first", b"1")
-            assert pending.find("first") is None, "the first is written before its answer leaves: nobody knows whether that works"
+            assert pending.find("first") is None, (
+                "the first is written before its answer leaves: nobody knows whether that works"
+            )
             assert content_of(cache, "first") == b"1"
             cache.goes.clear()
             for name in ("a", "b", "a"):
@@ -59,7 +61,9 @@ def test_an_entry_is_there_while_it_is_being_written_and_after(tmp_path: Path) -
     anyio.run(run)
 
 
-def test_an_entry_is_written_before_its_answer_where_too_many_are_on_their_way(tmp_path: Path) -> None:
+def test_an_entry_is_written_before_its_answer_where_too_many_are_on_their_way(
+    tmp_path: Path,
+) -> None:
     async def run() -> None:
         cache = SlowCache(tmp_path / "cache")
         pending = WriteBehind(cache, most=10)
@@ -89,7 +93,9 @@ def test_an_entry_is_written_before_its_answer_where_too_many_are_on_their_way(t
     anyio.run(run)
 
 
-def test_an_entry_that_cannot_be_written_stays_and_those_after_it_are_not_promised(tmp_path: Path, caplog: Any) -> None:
+def test_an_entry_that_cannot_be_written_stays_and_those_after_it_are_not_promised(
+    tmp_path: Path, caplog: Any
+) -> None:
     async def run() -> None:
         folder = tmp_path / "cache"
         cache = SlowCache(folder)

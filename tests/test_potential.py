@@ -27,13 +27,19 @@ def random_terms(rng: np.random.Generator) -> list[tuple[float, tuple[int, int, 
 
 def test_a_laurent_polynomial_has_the_values_of_its_terms(rng: np.random.Generator) -> None:
     terms, gamma = random_terms(rng), points(rng)
-    expected = sum(c * gamma[:, 0] ** a * gamma[:, 1] ** b * gamma[:, 2] ** d for c, (a, b, d) in terms)
+    expected = sum(
+        c * gamma[:, 0] ** a * gamma[:, 1] ** b * gamma[:, 2] ** d for c, (a, b, d) in terms
+    )
     assert np.allclose(LaurentPolynomial.of(terms).value(gamma), expected, rtol=1e-13)
     assert np.isclose(LaurentPolynomial.of(terms).value(gamma[2]), expected[2], rtol=1e-13)
 
 
 def test_sums_products_and_multiples_are_those_of_the_values(rng: np.random.Generator) -> None:
-    f, g, gamma = LaurentPolynomial.of(random_terms(rng)), LaurentPolynomial.of(random_terms(rng)), points(rng)
+    f, g, gamma = (
+        LaurentPolynomial.of(random_terms(rng)),
+        LaurentPolynomial.of(random_terms(rng)),
+        points(rng),
+    )
     assert np.allclose((f + g).value(gamma), f.value(gamma) + g.value(gamma), rtol=1e-12)
     assert np.allclose((f * g).value(gamma), f.value(gamma) * g.value(gamma), rtol=1e-11)
     assert np.allclose(f.times(-2.5).value(gamma), -2.5 * f.value(gamma), rtol=1e-13)
@@ -52,8 +58,14 @@ def test_symbols_and_numbers_give_the_same_monomials(rng: np.random.Generator) -
     f = LaurentPolynomial.of(random_terms(rng))
     exact = np.array([Fraction(3, 7), Fraction(-2, 3), Fraction(5, 4)], dtype=object)
     expected = [exact[0] ** a * exact[1] ** b * exact[2] ** c for a, b, c in f.powers]
-    assert np.allclose(np.array(monomials(f.exponents, exact), dtype=float), np.array(expected, dtype=float), rtol=1e-14)
-    assert np.allclose(monomials(f.exponents, exact.astype(float)), np.array(expected, dtype=float), rtol=1e-13)
+    assert np.allclose(
+        np.array(monomials(f.exponents, exact), dtype=float),
+        np.array(expected, dtype=float),
+        rtol=1e-14,
+    )
+    assert np.allclose(
+        monomials(f.exponents, exact.astype(float)), np.array(expected, dtype=float), rtol=1e-13
+    )
 
 
 def test_a_variable_without_negative_powers_may_vanish() -> None:
@@ -63,7 +75,9 @@ def test_a_variable_without_negative_powers_may_vanish() -> None:
     assert f.singular_part(0).powers == ((-1, 2, 0),)
 
 
-def test_the_clebsch_potential_is_the_quadratic_form_of_the_inertia(rng: np.random.Generator) -> None:
+def test_the_clebsch_potential_is_the_quadratic_form_of_the_inertia(
+    rng: np.random.Generator,
+) -> None:
     gamma = points(rng)
     V = Potential.of({"clebsch": "7/10"}, INERTIA, INVERSE)
     assert np.allclose(V.terms.value(gamma), 0.7 * np.sum(gamma**2 * MOMENTS, axis=1), rtol=1e-14)
@@ -74,20 +88,30 @@ def test_the_family_is_equation_3_5(rng: np.random.Generator) -> None:
     gamma, alphas = points(rng), rng.normal(size=5)
     V = Potential.of({"family": alphas}, INERTIA, INVERSE)
     form, square = np.sum(gamma**2 * MOMENTS, axis=1), np.sum(gamma**2 * MOMENTS**2, axis=1)
-    expected = alphas[0] * (square - form**2) + alphas[1] * form + np.sum(alphas[2:] / gamma**2, axis=1)
+    expected = (
+        alphas[0] * (square - form**2) + alphas[1] * form + np.sum(alphas[2:] / gamma**2, axis=1)
+    )
     assert np.allclose(V.terms.value(gamma), expected, rtol=1e-12)
     assert not V.unconditional
 
 
 def test_parts_of_a_potential_add_up(rng: np.random.Generator) -> None:
     gamma, linear = points(rng), [{"coefficient": 2, "powers": [0, 0, 1]}]
-    V = Potential.of({"clebsch": 0.5, "family": [0, 0.25, 0, 0, 0], "polynomial": linear}, INERTIA, INVERSE)
-    assert np.allclose(V.terms.value(gamma), 0.75 * np.sum(gamma**2 * MOMENTS, axis=1) + 2 * gamma[:, 2], rtol=1e-13)
+    V = Potential.of(
+        {"clebsch": 0.5, "family": [0, 0.25, 0, 0, 0], "polynomial": linear}, INERTIA, INVERSE
+    )
+    assert np.allclose(
+        V.terms.value(gamma),
+        0.75 * np.sum(gamma**2 * MOMENTS, axis=1) + 2 * gamma[:, 2],
+        rtol=1e-13,
+    )
     assert V.companion is None
 
 
 @pytest.mark.parametrize("member", range(5))
-def test_every_member_of_the_family_has_its_companion(member: int, rng: np.random.Generator) -> None:
+def test_every_member_of_the_family_has_its_companion(
+    member: int, rng: np.random.Generator
+) -> None:
     V, F = family(np.eye(5)[member], INERTIA, INVERSE)
     gamma = points(rng, 20)
     size = np.max(np.abs(F.gradient(gamma)))
@@ -106,7 +130,9 @@ def test_quadratic_and_quartic_members_take_any_tensor(rng: np.random.Generator)
 
 
 def test_a_companion_of_a_polynomial_is_taken_when_it_is_one() -> None:
-    terms = [{"coefficient": m, "powers": list(p)} for m, p in zip(MOMENTS, 2 * np.eye(3, dtype=int))]
+    terms = [
+        {"coefficient": m, "powers": list(p)} for m, p in zip(MOMENTS, 2 * np.eye(3, dtype=int))
+    ]
     det = float(np.prod(MOMENTS))
     right = [{"coefficient": -det / m, "powers": p["powers"]} for m, p in zip(MOMENTS, terms)]
     V = Potential.of({"polynomial": terms, "companion": right}, INERTIA, INVERSE)
@@ -126,23 +152,65 @@ BAD: list[tuple[str, Any, str]] = [
     ("short family", {"family": [1, 2]}, "potential.family: required a list of 5 numbers"),
     ("infinite family", {"family": [0, 0, 0, 0, float("inf")]}, r"potential.family\[4\]: required"),
     ("no terms", {"polynomial": []}, "potential.polynomial: required 1 to 64 terms; given 0"),
-    ("too many terms", {"polynomial": [{"coefficient": 1, "powers": [1, 1, 1]}] * 65}, "potential.polynomial: required 1 to"),
+    (
+        "too many terms",
+        {"polynomial": [{"coefficient": 1, "powers": [1, 1, 1]}] * 65},
+        "potential.polynomial: required 1 to",
+    ),
     ("polynomial is text", {"polynomial": "x"}, "potential.polynomial: required a list of terms"),
     ("a term is a number", {"polynomial": [1]}, r"potential.polynomial\[0\]: required a term"),
-    ("a term with more", {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0], "x": 1}]}, "required a term"),
-    ("two powers", {"polynomial": [{"coefficient": 1, "powers": [1, 0]}]}, r"\[0\].powers: required a list of 3 whole"),
-    ("fraction", {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0.5]}]}, r"powers\[2\]: required a whole number"),
-    ("boolean power", {"polynomial": [{"coefficient": 1, "powers": [True, 0, 0]}]}, r"powers\[0\]: required a whole"),
-    ("large power", {"polynomial": [{"coefficient": 1, "powers": [25, 0, 0]}]}, r"powers\[0\]: required a whole"),
-    ("text coefficient", {"polynomial": [{"coefficient": "x", "powers": [1, 0, 0]}]}, r"\[0\].coefficient: required"),
-    ("companion alone", {"companion": [{"coefficient": 1, "powers": [1, 0, 0]}]}, "potential.companion: required a poly"),
-    ("infinite", {"family": [0, 0, 1, 0, 0]}, r"finite at the start; given a negative power of gamma\[0\]"),
-    ("infinite polynomial", {"polynomial": [{"coefficient": 1, "powers": [-1, 3, 0]}]}, "finite at the start"),
+    (
+        "a term with more",
+        {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0], "x": 1}]},
+        "required a term",
+    ),
+    (
+        "two powers",
+        {"polynomial": [{"coefficient": 1, "powers": [1, 0]}]},
+        r"\[0\].powers: required a list of 3 whole",
+    ),
+    (
+        "fraction",
+        {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0.5]}]},
+        r"powers\[2\]: required a whole number",
+    ),
+    (
+        "boolean power",
+        {"polynomial": [{"coefficient": 1, "powers": [True, 0, 0]}]},
+        r"powers\[0\]: required a whole",
+    ),
+    (
+        "large power",
+        {"polynomial": [{"coefficient": 1, "powers": [25, 0, 0]}]},
+        r"powers\[0\]: required a whole",
+    ),
+    (
+        "text coefficient",
+        {"polynomial": [{"coefficient": "x", "powers": [1, 0, 0]}]},
+        r"\[0\].coefficient: required",
+    ),
+    (
+        "companion alone",
+        {"companion": [{"coefficient": 1, "powers": [1, 0, 0]}]},
+        "potential.companion: required a poly",
+    ),
+    (
+        "infinite",
+        {"family": [0, 0, 1, 0, 0]},
+        r"finite at the start; given a negative power of gamma\[0\]",
+    ),
+    (
+        "infinite polynomial",
+        {"polynomial": [{"coefficient": 1, "powers": [-1, 3, 0]}]},
+        "finite at the start",
+    ),
     ("overflow", {"clebsch": 1e308}, "finite at the start; given a value beyond"),
 ]
 
 
-@pytest.mark.parametrize(("given", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD])
+@pytest.mark.parametrize(
+    ("given", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD]
+)
 @pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
 def test_what_is_no_potential_is_refused_by_name(system: Any, given: Any, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):

@@ -1,4 +1,6 @@
-"""Theorem recon0: every motion over one q(t), the rotation ℜ that tells them apart, and the integrals on the distribution D."""
+"""Theorem recon0: every motion over one q(t), the rotation ℜ that tells them apart, and the
+integrals on the distribution D.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,13 @@ from draws import random_problem
 from veselova import InvalidInput, NeumannSystem, Veselova, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.natural_frame import natural_frame
-from veselova.mechanics.paper.reconstruction import frames_over, linear_integrals, natural_frames, rotation, with_rotation
+from veselova.mechanics.paper.reconstruction import (
+    frames_over,
+    linear_integrals,
+    natural_frames,
+    rotation,
+    with_rotation,
+)
 
 DIMENSIONS = range(2, 8)
 TIMES = np.array([-7.0, -0.5, 0.0, 2.0, 9.0])
@@ -23,8 +31,12 @@ def random_rotation(rng: np.random.Generator, size: int) -> Any:
 
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
 @pytest.mark.parametrize("n", range(2, 6))
-def test_every_motion_over_a_trajectory_solves_the_poisson_equations(n: int, engine: str, rng: np.random.Generator) -> None:
-    """(orth): the turned frames are what either engine finds when it starts from the turned frame, determinant −1 included."""
+def test_every_motion_over_a_trajectory_solves_the_poisson_equations(
+    n: int, engine: str, rng: np.random.Generator
+) -> None:
+    """(orth): the turned frames are what either engine finds when it starts from the turned frame,
+    determinant −1 included.
+    """
     problem, matrix = random_problem(rng, n, 10.0), random_rotation(rng, n - 1)
     for R in (matrix, matrix @ np.diag([-1.0] + [1.0] * (n - 2))):
         found = frames_over(solve(problem, TIMES), R)
@@ -45,8 +57,12 @@ def test_the_rotation_of_a_frame_leads_back_to_it(n: int, rng: np.random.Generat
 
 
 @pytest.mark.parametrize("n", range(2, 6))
-def test_the_natural_frame_is_carried_on_and_is_that_of_the_state_up_to_signs(n: int, rng: np.random.Generator) -> None:
-    """Theorem recon0 itself: the eigenvectors of A⁻¹ − q'q'ᵀ on q⊥ at any time, and (norms) ṅ_k = −ωn_k."""
+def test_the_natural_frame_is_carried_on_and_is_that_of_the_state_up_to_signs(
+    n: int, rng: np.random.Generator
+) -> None:
+    """Theorem recon0 itself: the eigenvectors of A⁻¹ − q'q'ᵀ on q⊥ at any time, and (norms) ṅ_k =
+    −ωn_k.
+    """
     problem = random_problem(rng, n, 10.0)
     trajectory = solve(problem, TIMES)
     carried = natural_frames(trajectory)
@@ -76,13 +92,19 @@ def test_linear_integrals_are_constant_and_their_squares_add_up_to_those_of_the_
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])
-def test_the_distribution_has_as_many_independent_integrals_as_its_tori_leave(n: int, rng: np.random.Generator) -> None:
-    """dim D = n−1 + n(n−1)/2. h, c_k: n−1. With ℜ: n(n−1)/2 in all, so tori of dimension n−1. With l_k alone: n−2 more."""
+def test_the_distribution_has_as_many_independent_integrals_as_its_tori_leave(
+    n: int, rng: np.random.Generator
+) -> None:
+    """dim D = n−1 + n(n−1)/2. h, c_k: n−1. With ℜ: n(n−1)/2 in all, so tori of dimension n−1. With
+    l_k alone: n−2 more.
+    """
     problem, step = random_problem(rng, n, 5.0), 1e-6
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
 
     def values(x: Any) -> tuple[Any, Any, Any]:
-        """Integrals at the state turned by the n(n−1)/2 first and moved along q̇ by the n−1 last components of x."""
+        """Integrals at the state turned by the n(n−1)/2 first and moved along q̇ by the n−1 last
+        components of x.
+        """
         skew = np.zeros((n, n))
         for value, (i, j) in zip(x, pairs, strict=False):
             skew[i, j], skew[j, i] = value, -value
@@ -94,7 +116,10 @@ def test_the_distribution_has_as_many_independent_integrals_as_its_tori_leave(n:
         return reduced, E[:, 1:].T @ p, rotation(moved).ravel()
 
     columns = np.eye(len(pairs) + n - 1)
-    slopes = [[(a - b) / (2 * step) for a, b in zip(values(step * e), values(-step * e), strict=True)] for e in columns]
+    slopes = [
+        [(a - b) / (2 * step) for a, b in zip(values(step * e), values(-step * e), strict=True)]
+        for e in columns
+    ]
     reduced, linear, turned = (np.array([row[k] for row in slopes]) for k in range(3))
 
     def rank(*parts: Any) -> int:
@@ -108,17 +133,28 @@ def test_the_distribution_has_as_many_independent_integrals_as_its_tori_leave(n:
 
 def test_a_matrix_of_inertia_keeps_the_body_axes(rng: np.random.Generator) -> None:
     axes = random_rotation(rng, 4)
-    A, q, q_dot = axes @ np.diag([4.0, 3.0, 2.0, 1.0]) @ axes.T, axes[:, 0] + axes[:, 2], axes[:, 1] - axes[:, 3]
+    A, q, q_dot = (
+        axes @ np.diag([4.0, 3.0, 2.0, 1.0]) @ axes.T,
+        axes[:, 0] + axes[:, 2],
+        axes[:, 1] - axes[:, 3],
+    )
     problem, R = Veselova((A + A.T) / 2, q, q_dot, normalize=True), random_rotation(rng, 3)
     turned = with_rotation(problem, R)
-    assert np.max(np.abs(frames_over(solve(problem, TIMES), R) - solve(turned, TIMES).frame)) < 1e-11
+    assert (
+        np.max(np.abs(frames_over(solve(problem, TIMES), R) - solve(turned, TIMES).frame)) < 1e-11
+    )
     assert np.allclose(rotation(turned), R, atol=1e-12)
 
 
 def test_what_is_no_rotation_and_no_motion_of_a_body_is_refused() -> None:
     problem = Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])
     trajectory = solve(problem, [1.0])
-    cases = [([[1, 0], [0, 2]], "matrix"), ([[1, 0]], "matrix"), ([[1, 0], [0, "nan"]], "matrix[1][1]"), (None, "matrix")]
+    cases = [
+        ([[1, 0], [0, 2]], "matrix"),
+        ([[1, 0]], "matrix"),
+        ([[1, 0], [0, "nan"]], "matrix[1][1]"),
+        (None, "matrix"),
+    ]
     for matrix, field in cases:
         for call in (lambda m: frames_over(trajectory, m), lambda m: with_rotation(problem, m)):
             with pytest.raises(InvalidInput) as raised:

@@ -1,4 +1,6 @@
-"""Generalized Chaplygin reduction: Proposition pro, the momentum equation and the invariants 𝒜, along motions of LR systems."""
+"""Generalized Chaplygin reduction: Proposition pro, the momentum equation and the invariants 𝒜,
+along motions of LR systems.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +18,40 @@ from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 #: A potential of e_1 alone, invariant under every H of (4.1).
-OF_E1 = [{"coefficient": 0.2, "powers": [[1, 1, 2]]}, {"coefficient": -0.1, "powers": [[1, 2, 1], [1, 3, 1]]}]
+OF_E1 = [
+    {"coefficient": 0.2, "powers": [[1, 1, 2]]},
+    {"coefficient": -0.1, "powers": [[1, 2, 1], [1, 3, 1]]},
+]
 
 
 def su3_over_u2(rng: np.random.Generator, *, turning: bool = True) -> LRSystem:
-    """A system on SU(3) with 𝔥 = u(2), so that Q is the complex projective plane, or su(2), so that it is a five-sphere."""
+    """A system on SU(3) with 𝔥 = u(2), so that Q is the complex projective plane, or su(2), so that
+    it is a five-sphere.
+    """
     group = MatrixGroup.su(3)
-    h: list[Any] = [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, 0], [0, 0, 1j], [0, 1j, 0]], np.diag([0, 1j, -1j])]
+    h: list[Any] = [
+        [[0, 0, 0], [0, 0, 1], [0, -1, 0]],
+        [[0, 0, 0], [0, 0, 1j], [0, 1j, 0]],
+        np.diag([0, 1j, -1j]),
+    ]
     h += [np.diag([2j, -1j, -1j])] if turning else []
     omega = group.element(rng.normal(size=8))
     system = LRSystem.on(group, random_operator(rng, 8), h, None, omega)
     free, _ = system.distribution.components(np.eye(6), system.omega)
-    omega = group.element(system.distribution.body(np.eye(6), free, np.zeros(system.distribution.constraints)))
+    omega = group.element(
+        system.distribution.body(np.eye(6), free, np.zeros(system.distribution.constraints))
+    )
     return LRSystem.on(group, system.inertia.matrix, h, None, omega, homogeneous=True)
 
 
 def systems(rng: np.random.Generator) -> list[LRSystem]:
     found = [random_lr(rng, n, r) for n, r in RANKS if n > 2]
-    return [*found, random_lr(rng, 4, 2, potential=OF_E1), su3_over_u2(rng), su3_over_u2(rng, turning=False)]
+    return [
+        *found,
+        random_lr(rng, 4, 2, potential=OF_E1),
+        su3_over_u2(rng),
+        su3_over_u2(rng, turning=False),
+    ]
 
 
 def velocity(system: LRSystem) -> Any:
@@ -41,7 +59,9 @@ def velocity(system: LRSystem) -> Any:
 
 
 def rate(system: LRSystem, function: Any) -> Any:
-    """The derivative of a function of (g, ω) along the motion, by a complex step along the field with multipliers."""
+    """The derivative of a function of (g, ω) along the motion, by a complex step along the field
+    with multipliers.
+    """
     flow, D = system.flow("multipliers"), system.distribution.group.dimension
     step = flow.initial + 1e-30j * flow.field(flow.initial, flow.parameters, FLOATS)
     g, omega = step[D:].reshape(system.g.shape), step[:D] / flow.time_unit
@@ -61,11 +81,18 @@ def test_the_reduced_equations_are_those_of_the_motion(rng: np.random.Generator)
 
 
 @pytest.mark.parametrize(("n", "rank"), [(3, 1), (4, 2), (5, 2)])
-def test_the_left_side_of_the_reduced_equations_is_lagrange_s(n: int, rank: int, rng: np.random.Generator) -> None:
-    """In the chart x ↦ H exp(Σ x_k w_k)g: ∂L/∂x − d/dt ∂L/∂ẋ by differences of L is the curvature term of (1.2)."""
+def test_the_left_side_of_the_reduced_equations_is_lagrange_s(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """In the chart x ↦ H exp(Σ x_k w_k)g: ∂L/∂x − d/dt ∂L/∂ẋ by differences of L is the curvature
+    term of (1.2).
+    """
     system = random_lr(rng, n, rank, potential=OF_E1)
     reduction, group = ChaplyginReduction(system), system.distribution.group
-    w, u = system.distribution.space[: system.distribution.rank], system.distribution.components(system.g, system.omega)[0]
+    w, u = (
+        system.distribution.space[: system.distribution.rank],
+        system.distribution.components(system.g, system.omega)[0],
+    )
     acceleration, step = reduction.acceleration(system.g, velocity(system)), 1e-3
     variations = system.g @ group.element(system.distribution.seen(system.g)[0])
     forces = reduction.constraint_force(system.g, velocity(system), variations)
@@ -75,7 +102,9 @@ def test_the_left_side_of_the_reduced_equations_is_lagrange_s(n: int, rank: int,
         return float(reduction.lagrangian(point @ system.g, tangent @ system.g))
 
     def slope(function: Any, e: Any) -> float:
-        return float(8 * (function(e) - function(-e)) - function(2 * e) + function(-2 * e)) / (12 * step)
+        return float(8 * (function(e) - function(-e)) - function(2 * e) + function(-2 * e)) / (
+            12 * step
+        )
 
     for l, e in enumerate(step * np.eye(u.size)):
         position = slope(lambda d: L(d, u), e)
@@ -86,7 +115,9 @@ def test_the_left_side_of_the_reduced_equations_is_lagrange_s(n: int, rank: int,
 
         left = position - slope(momentum, step)
         force = reduction.constraint_force(
-            system.g, velocity(system), system.g @ group.element(system.distribution.seen(system.g)[0][l])
+            system.g,
+            velocity(system),
+            system.g @ group.element(system.distribution.seen(system.g)[0][l]),
         )
         assert abs(left - force) < 1e-7
     forces = reduction.constraint_force(
@@ -100,7 +131,11 @@ def test_the_reduced_momentum_equation_holds_along_motions(rng: np.random.Genera
     for system in systems(rng):
         if system.potential:
             continue
-        reduction, distribution, inertia = ChaplyginReduction(system), system.distribution, system.inertia
+        reduction, distribution, inertia = (
+            ChaplyginReduction(system),
+            system.distribution,
+            system.inertia,
+        )
         group = distribution.group
 
         def projected(g: Any, omega: Any) -> Any:
@@ -108,15 +143,25 @@ def test_the_reduced_momentum_equation_holds_along_motions(rng: np.random.Genera
             return (W @ inertia(omega)) @ W  # noqa: B023
 
         phi_star = reduction.momentum(system.g, velocity(system))
-        assert np.allclose(group.coordinates(phi_star), projected(system.g, system.omega), atol=1e-12)
-        assert np.allclose(reduction.velocity(system.g, phi_star), group.element(system.omega), atol=1e-11)
-        assert np.allclose(group.coordinates(reduction.momentum_rate(system.g, phi_star)), rate(system, projected), atol=1e-10)
+        assert np.allclose(
+            group.coordinates(phi_star), projected(system.g, system.omega), atol=1e-12
+        )
+        assert np.allclose(
+            reduction.velocity(system.g, phi_star), group.element(system.omega), atol=1e-11
+        )
+        assert np.allclose(
+            group.coordinates(reduction.momentum_rate(system.g, phi_star)),
+            rate(system, projected),
+            atol=1e-10,
+        )
         M = system.derive("momentum", system.start)[0]
         assert np.allclose(phi_star, M, atol=1e-12)  # on D all of 𝓜 is its 𝔡-part
 
 
 def test_everything_depends_on_the_orbit_alone(rng: np.random.Generator) -> None:
-    """g and hg, h ∈ H, have the same 𝒳, Φ, L, E, Φ*, forces; and a velocity along the orbit is none."""
+    """g and hg, h ∈ H, have the same 𝒳, Φ, L, E, Φ*, forces; and a velocity along the orbit is
+    none.
+    """
     for system in systems(rng):
         reduction, distribution = ChaplyginReduction(system), system.distribution
         group, g = distribution.group, system.g
@@ -127,18 +172,26 @@ def test_everything_depends_on_the_orbit_alone(rng: np.random.Generator) -> None
         names = ("momentum_map", "lagrangian", "energy", "momentum")
         for name in names:
             function = getattr(reduction, name)
-            assert np.allclose(function(h @ g, h @ g @ omega), function(g, g @ omega + along), atol=1e-11), name
+            assert np.allclose(
+                function(h @ g, h @ g @ omega), function(g, g @ omega + along), atol=1e-11
+            ), name
         assert np.allclose(reduction.coordinates(h @ g), reduction.coordinates(g), atol=1e-12)
         assert np.allclose(reduction.projector(h @ g), reduction.projector(g), atol=1e-12)
         assert np.isclose(np.trace(reduction.projector(g)), distribution.rank)
         force = reduction.constraint_force(g, g @ omega, g @ xi)
-        assert np.isclose(force, reduction.constraint_force(h @ g, h @ g @ omega + h @ along, h @ g @ xi), atol=1e-10)
+        assert np.isclose(
+            force,
+            reduction.constraint_force(h @ g, h @ g @ omega + h @ along, h @ g @ xi),
+            atol=1e-10,
+        )
         phi = reduction.momentum_map(g, g @ omega)
         assert np.allclose(reduction.momentum_map(g, g @ phi), phi, atol=1e-12)
 
 
 def test_the_curvature_is_the_vertical_part_of_brackets_in_space(rng: np.random.Generator) -> None:
-    """B(X_1, X_2) = g pr_{g⁻¹𝔥g}[φ(X_1^h), φ(X_2^h)]: in space, the same two-form of 𝔡 everywhere."""
+    """B(X_1, X_2) = g pr_{g⁻¹𝔥g}[φ(X_1^h), φ(X_2^h)]: in space, the same two-form of
+    𝔡 everywhere.
+    """
     for system in systems(rng):
         reduction, distribution = ChaplyginReduction(system), system.distribution
         u, v = rng.normal(size=(2, distribution.rank)) @ distribution.space[: distribution.rank]
@@ -151,11 +204,24 @@ def test_the_curvature_is_the_vertical_part_of_brackets_in_space(rng: np.random.
 
 
 @pytest.mark.parametrize(("n", "rank"), [(3, 1), (4, 2), (5, 1)])
-def test_the_reduced_equations_integrated_are_the_projected_motion(n: int, rank: int, rng: np.random.Generator) -> None:
-    """(1.2) as a second-order equation on H\\G, from any g over q: 𝒳 = (e_1 … e_r) comes out as in the full system."""
+def test_the_reduced_equations_integrated_are_the_projected_motion(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """(1.2) as a second-order equation on H\\G, from any g over q: 𝒳 = (e_1 … e_r) comes out as in
+    the full system.
+    """
     system = random_lr(rng, n, rank)
-    reduction, group, distribution = ChaplyginReduction(system), system.distribution.group, system.distribution
-    h = expm(group.element(rng.normal(size=group.dimension - distribution.rank) @ distribution.space[distribution.rank :]))
+    reduction, group, distribution = (
+        ChaplyginReduction(system),
+        system.distribution.group,
+        system.distribution,
+    )
+    h = expm(
+        group.element(
+            rng.normal(size=group.dimension - distribution.rank)
+            @ distribution.space[distribution.rank :]
+        )
+    )
     start = h @ system.g  # another representative of the same point
 
     def field(_t: float, state: Any) -> Any:
@@ -164,17 +230,27 @@ def test_the_reduced_equations_integrated_are_the_projected_motion(n: int, rank:
         return np.concatenate([g_dot.ravel(), reduction.acceleration(g, g_dot)])
 
     u = distribution.components(start, system.omega)[0]
-    answer = solve_ivp(field, (0, 3), np.concatenate([start.ravel(), u]), method="DOP853", rtol=1e-11, atol=1e-12)
+    answer = solve_ivp(
+        field, (0, 3), np.concatenate([start.ravel(), u]), method="DOP853", rtol=1e-11, atol=1e-12
+    )
     X = reduction.coordinates(answer.y[: n * n, -1].reshape(n, n))
     assert X.shape == (n, rank)
     assert np.max(np.abs(X - solve(system, [3.0]).frame[0][:, :rank])) < 1e-9
 
 
 @pytest.mark.parametrize(("n", "rank"), [row if row[0] < 5 else slow(*row) for row in RANKS])
-def test_ad_invariants_of_the_momentum_are_integrals(n: int, rank: int, rng: np.random.Generator) -> None:
-    """The algebra 𝒜 has dim pr_𝔡(ann ξ) independent functions, the rank of the differentials of the traces on 𝔡."""
+def test_ad_invariants_of_the_momentum_are_integrals(
+    n: int, rank: int, rng: np.random.Generator
+) -> None:
+    """The algebra 𝒜 has dim pr_𝔡(ann ξ) independent functions, the rank of the differentials of the
+    traces on 𝔡.
+    """
     system = random_lr(rng, n, rank)
-    reduction, distribution, group = ChaplyginReduction(system), system.distribution, system.distribution.group
+    reduction, distribution, group = (
+        ChaplyginReduction(system),
+        system.distribution,
+        system.distribution.group,
+    )
     trajectory = solve(system, np.linspace(0, 8, 5), method="taylor")
     g, omega = np.swapaxes(trajectory.frame, 1, 2), trajectory.omega
     momenta = np.array([reduction.momentum(a, a @ b) for a, b in zip(g, omega, strict=True)])
@@ -183,7 +259,10 @@ def test_ad_invariants_of_the_momentum_are_integrals(n: int, rank: int, rng: np.
     assert np.max(np.abs(values - values[0])) < 1e-12 * max(1.0, np.max(np.abs(values)))
     assert np.ptp(momenta[:, 0, 1]) > 1e-3 or n == 2
     xi = group.element(rng.normal(size=distribution.rank) @ distribution.space[: distribution.rank])
-    slopes = [group.coordinates(np.linalg.matrix_power(xi, 2 * k - 1))[: distribution.rank] for k in range(1, n // 2 + 1)]
+    slopes = [
+        group.coordinates(np.linalg.matrix_power(xi, 2 * k - 1))[: distribution.rank]
+        for k in range(1, n // 2 + 1)
+    ]
     slopes = [slope / np.linalg.norm(slope) for slope in slopes]
     assert np.linalg.matrix_rank(np.array(slopes), tol=1e-7) == reduction.independent_invariants
     assert reduction.independent_invariants == (min(rank, n // 2) if rank < n - 1 else n // 2)
@@ -204,4 +283,5 @@ def test_what_is_no_generalized_chaplygin_system_is_named(rng: np.random.Generat
         with pytest.raises(InvalidInput, match=words) as raised:
             ChaplyginReduction(system)
         assert raised.value.field == field
-    assert ChaplyginReduction(random_lr(rng, 4, 3)).fixed_vectors.shape == (4, 4)  # H = 1: Q is the group
+    # H = 1: Q is the group
+    assert ChaplyginReduction(random_lr(rng, 4, 3)).fixed_vectors.shape == (4, 4)

@@ -1,4 +1,6 @@
-"""Motions near a resonance, where some combination m·f of the frequencies nearly vanishes and the clock swings far and slowly."""
+"""Motions near a resonance, where some combination m·f of the frequencies nearly vanishes and the
+clock swings far and slowly.
+"""
 
 from __future__ import annotations
 
@@ -20,28 +22,43 @@ RESONANT = 2.584309800104662
 
 
 def beside(distance: float) -> Veselova:
-    return Veselova([1.0, 1.6 * (RESONANT + distance), 30.0], [0.5, 0.6, 0.62], [0.9, -0.5, -0.24], normalize=True)
+    return Veselova(
+        [1.0, 1.6 * (RESONANT + distance), 30.0],
+        [0.5, 0.6, 0.62],
+        [0.9, -0.5, -0.24],
+        normalize=True,
+    )
 
 
-def true_error(problem: Veselova, times: np.ndarray, clock: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+def true_error(
+    problem: Veselova, times: np.ndarray, clock: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     found, truth = solve_analytic(problem, times, time_map=clock), solve(problem, times, digits=25)
     return np.max(np.abs(found.frame - truth.frame), axis=(1, 2)), found.error
 
 
 def test_times_far_apart_beside_a_resonance() -> None:
-    """Phases of nearly commensurable frequencies make the clock swing by thousands of cycles, and its values rough."""
+    """Phases of nearly commensurable frequencies make the clock swing by thousands of cycles, and
+    its values rough.
+    """
     body = beside(1e-5)
     together, times = solve(body, [-1e7, 2e7]), (-1e7, 2e7)
     for k, time in enumerate(times):
         alone = solve(body, [time])
-        assert np.max(np.abs(alone.frame[0] - together.frame[k])) <= alone.error[0] + together.error[k]
+        assert (
+            np.max(np.abs(alone.frame[0] - together.frame[k])) <= alone.error[0] + together.error[k]
+        )
     assert np.max(together.error) < 1e-8
 
 
 @pytest.mark.parametrize(("distance", "far"), [(1e-4, 1e3), (1e-4, 1e6), (2e-7, 1e3), (2e-7, 4e7)])
 def test_slow_phases_keep_their_digits(distance: float, far: float) -> None:
-    """Sums of modes whose m·f and m·z were rounded with the other phases were off by 1e-4 at the last of these."""
-    error, reported = true_error(beside(distance), far * np.array([-0.9, -0.3, 0.11, 0.97]), "fourier")
+    """Sums of modes whose m·f and m·z were rounded with the other phases were off by 1e-4 at the
+    last of these.
+    """
+    error, reported = true_error(
+        beside(distance), far * np.array([-0.9, -0.3, 0.11, 0.97]), "fourier"
+    )
     assert np.all(error <= reported)
     assert np.max(error) < 3e-12 * max(1, 1e-4 / distance) * max(1, far / 1e4) ** 0.25
 
@@ -65,7 +82,9 @@ def test_they_are_in_four_dimensions(seed: int) -> None:
 
 
 def test_resonant_modes_next_to_those_kept_are_in_the_error() -> None:
-    """Here (11, −3) is left out, with F_m of 1e-16 of the mean, but m·f is 5e-4 of the fastest: it moves τ₁ by 4e-13."""
+    """Here (11, −3) is left out, with F_m of 1e-16 of the mean, but m·f is 5e-4 of the fastest: it
+    moves τ₁ by 4e-13.
+    """
     rng = np.random.default_rng(80)
     problem = [(random_problem(rng, 3), rng.uniform(size=6))[0] for _ in range(16)][-1]
     error, reported = true_error(problem, np.linspace(300, 1000, 8))
@@ -84,8 +103,14 @@ def test_the_body_that_is_integrated_in_angles_has_honest_errors_too() -> None:
 def test_rates_of_combinations_do_not_cancel(rng: np.random.Generator) -> None:
     rates = np.array([1.0, 1 / 3, 0.1])
     rests = rng.uniform(-1e-17, 1e-17, 3)
-    flow, orders = LinearFlow(rng.uniform(size=3), rates, rests), np.array([[1, -3, 0], [1, 0, -10], [-1, 1, 7], [2, 5, -3]])
-    exact = [sum(int(k) * (Fraction(x) + Fraction(r)) for k, x, r in zip(m, rates, rests, strict=True)) for m in orders]
+    flow, orders = (
+        LinearFlow(rng.uniform(size=3), rates, rests),
+        np.array([[1, -3, 0], [1, 0, -10], [-1, 1, 7], [2, 5, -3]]),
+    )
+    exact = [
+        sum(int(k) * (Fraction(x) + Fraction(r)) for k, x, r in zip(m, rates, rests, strict=True))
+        for m in orders
+    ]
     assert np.max(np.abs(flow.rates_of(orders) - np.array([float(x) for x in exact]))) < 1e-16
     assert abs(flow.rates_of(orders)[0] / float(exact[0]) - 1) < 1e-6
     longer = flow.with_combinations(orders)
@@ -93,17 +118,29 @@ def test_rates_of_combinations_do_not_cancel(rng: np.random.Generator) -> None:
         assert abs(Fraction(longer.rates[3 + k]) + Fraction(longer.rests[3 + k]) - x) < 1e-31
     slower = longer.per(0.7)
     for x, r, y, s in zip(longer.rates, longer.rests, slower.rates, slower.rests, strict=True):
-        assert abs((Fraction(y) + Fraction(s)) * Fraction(0.7) / (Fraction(x) + Fraction(r)) - 1) < 1e-30
-    still = LinearFlow(np.zeros(2), np.array([1.0, 0.5]), np.zeros(2)).with_combinations(np.array([[1, -2]]))
+        assert (
+            abs((Fraction(y) + Fraction(s)) * Fraction(0.7) / (Fraction(x) + Fraction(r)) - 1)
+            < 1e-30
+        )
+    still = LinearFlow(np.zeros(2), np.array([1.0, 0.5]), np.zeros(2)).with_combinations(
+        np.array([[1, -2]])
+    )
     assert 0 < still.rates[2] < 1e-50
 
 
 def test_exact_resonances_are_served() -> None:
-    """Frequencies that are commensurable to the last bit: then m·z stands still, and its mode is a part of the mean rate."""
+    """Frequencies that are commensurable to the last bit: then m·z stands still, and its mode is a
+    part of the mean rate.
+    """
     solution = Solution(beside(0.0))
     rates = solution.in_tau1.rates.copy()
     rates[0] = rates[1] * np.rint(64 * rates[0] / rates[1]) / 64
     flow = LinearFlow(solution.in_tau1.start, rates, np.zeros(2))
-    clock = FourierTimeMap(solution.rate, flow, LinearFlow.of(flow.start, rates / solution.mean_rate), solution.mean_rate)
+    clock = FourierTimeMap(
+        solution.rate,
+        flow,
+        LinearFlow.of(flow.start, rates / solution.mean_rate),
+        solution.mean_rate,
+    )
     tau1 = np.linspace(-50, 50, 11)
     assert np.allclose(clock.tau1(clock.time(tau1))[0], tau1, atol=1e-12)

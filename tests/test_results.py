@@ -15,8 +15,18 @@ import pytest
 import veselova
 from problems import tagged
 from test_engines import METHODS
-from veselova import BackendMissing, Comparison, InvalidInput, StiefelFlow, Trajectory, Unsolved, compare, solve, torus
-from veselova.mechanics.results.trajectory import Provenance
+from veselova import (
+    BackendMissing,
+    Comparison,
+    InvalidInput,
+    StiefelFlow,
+    Trajectory,
+    Unsolved,
+    compare,
+    solve,
+    torus,
+)
+from veselova.mechanics.results.provenance import Provenance
 
 TIMES = np.linspace(0, 5, 11)
 
@@ -33,13 +43,22 @@ def comparison() -> Comparison:
 
 def test_series_have_the_promised_shapes(trajectory: Trajectory) -> None:
     N, n = TIMES.size, 4
-    shapes = {"q": (N, n), "q_dot": (N, n), "frame": (N, n, n), "omega": (N, n, n), "spheroconic": (N, n - 1), "tau1": (N,)}
+    shapes = {
+        "q": (N, n),
+        "q_dot": (N, n),
+        "frame": (N, n, n),
+        "omega": (N, n, n),
+        "spheroconic": (N, n - 1),
+        "tau1": (N,),
+    }
     assert {name: trajectory.series(name).shape for name in trajectory.problem.outputs} == shapes
     assert trajectory.times.shape == trajectory.error.shape == (N,)
     assert np.array_equal(trajectory.omega, -np.swapaxes(trajectory.omega, 1, 2))
 
 
-def test_results_are_short_to_read_and_survive_pickling(trajectory: Trajectory, comparison: Comparison) -> None:
+def test_results_are_short_to_read_and_survive_pickling(
+    trajectory: Trajectory, comparison: Comparison
+) -> None:
     assert len(repr(trajectory)) < 150
     assert len(repr(comparison)) < 400
     assert len(repr(trajectory.problem)) < 200
@@ -59,7 +78,14 @@ def test_a_trajectory_cannot_be_changed(trajectory: Trajectory) -> None:
 
 
 def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
-    assert list(trajectory.integrals) == ["energy", "q_norm", "q_p", "neumann", "linear", "constants"]
+    assert list(trajectory.integrals) == [
+        "energy",
+        "q_norm",
+        "q_p",
+        "neumann",
+        "linear",
+        "constants",
+    ]
     assert all(values.shape[0] == TIMES.size for values in trajectory.integrals.values())
     assert max(trajectory.drift.values()) < 1e-13
     assert np.allclose(trajectory.integrals["energy"], trajectory.problem.energy, rtol=1e-13)
@@ -75,7 +101,9 @@ def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -
 
 
 def test_a_trajectory_without_a_dense_answer_says_so(trajectory: Trajectory) -> None:
-    bare = Trajectory(**{f: getattr(trajectory, f) for f in trajectory.__dataclass_fields__ if f != "dense"})
+    bare = Trajectory(
+        **{f: getattr(trajectory, f) for f in trajectory.__dataclass_fields__ if f != "dense"}
+    )
     with pytest.raises(Unsolved) as raised:
         bare.at([1.0])
     assert raised.value.outcome == "no-dense-answer"
@@ -112,9 +140,17 @@ def test_csv_loses_no_digit(trajectory: Trajectory, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "library"), [("to_parquet", "pyarrow"), ("to_arrow", "pyarrow"), ("to_xarray", "xarray"), ("plot", "matplotlib")]
+    ("method", "library"),
+    [
+        ("to_parquet", "pyarrow"),
+        ("to_arrow", "pyarrow"),
+        ("to_xarray", "xarray"),
+        ("plot", "matplotlib"),
+    ],
 )
-def test_a_missing_library_is_named(trajectory: Trajectory, method: str, library: str, monkeypatch: Any, tmp_path: Path) -> None:
+def test_a_missing_library_is_named(
+    trajectory: Trajectory, method: str, library: str, monkeypatch: Any, tmp_path: Path
+) -> None:
     real = builtins.__import__
 
     def without(name: str, *args: Any, **kwargs: Any) -> Any:
@@ -147,10 +183,18 @@ def test_a_dataset_is_written_to_netcdf_and_read_again(case: str, tmp_path: Path
     if case == "separable":
         problem = veselova.SeparableVeselova([3, 2, 1], *start, {"quadratic": 0.5})
     elif case == "lr":
-        problem = veselova.LRSystem(3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]])
+        problem = veselova.LRSystem(
+            3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]]
+        )
     elif case == "stiefel":
         problem = veselova.StiefelFlow({"special": [1, 2, 3]}, [[1], [0], [0]], [[0], [1], [0.5]])
-    options: dict[str, Any] = {"engine": "numeric"} if case == "numeric" else {"certified": True} if case == "certified" else {}
+    options: dict[str, Any] = (
+        {"engine": "numeric"}
+        if case == "numeric"
+        else {"certified": True}
+        if case == "certified"
+        else {}
+    )
     dataset = veselova.solve(problem, [0, 0.5, 1], **options).to_xarray()
     dataset.to_netcdf(tmp_path / "motion.nc", engine="scipy")
     again = xarray.load_dataset(tmp_path / "motion.nc", engine="scipy")
@@ -170,14 +214,18 @@ def test_parquet_arrow_and_xarray_hold_the_series(trajectory: Trajectory, tmp_pa
         tables = parquet.read_table(tmp_path / "motion.parquet"), ipc.open_stream(file).read_all()
     for table in tables:
         assert table.column_names == list(trajectory.columns())
-        assert all(np.array_equal(table[name], values) for name, values in trajectory.columns().items())
+        assert all(
+            np.array_equal(table[name], values) for name, values in trajectory.columns().items()
+        )
         assert json.loads(table.schema.metadata[b"provenance"]) == trajectory.provenance.as_dict()
     dataset = trajectory.to_xarray()
     assert dataset["frame"].dims == ("time", "axis", "vector")
 
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "arrow"])
-def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(kind: str, monkeypatch: Any) -> None:
+def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(
+    kind: str, monkeypatch: Any
+) -> None:
     from pyarrow import ipc, parquet
 
     motion = solve(tagged("generic")[3].problem(), TIMES)
@@ -206,7 +254,9 @@ def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_pat
 
 
 @pytest.mark.parametrize("write", ["to_csv", "to_npz", "to_parquet", "to_arrow"])
-def test_files_of_what_is_no_output_are_refused_before_anything_is_written(trajectory: Trajectory, write: str) -> None:
+def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
+    trajectory: Trajectory, write: str
+) -> None:
     for outputs, field in ((["tau1", "tau"], "outputs[1]"), ([], "outputs"), ("tau1", "outputs")):
         stream = io.BytesIO()
         with pytest.raises(InvalidInput, match="tau1") as raised:
@@ -242,7 +292,9 @@ def test_a_comparison_summarises_deviation_drift_and_seconds(comparison: Compari
     assert set(summary["seconds"]) == {"analytic", "numeric"}
     assert summary["conditioning_floor"] > 0
     assert json.loads(json.dumps(summary)) == summary
-    assert np.all(comparison.difference("frame") <= comparison.analytic.error + comparison.numeric.error)
+    assert np.all(
+        comparison.difference("frame") <= comparison.analytic.error + comparison.numeric.error
+    )
 
 
 def test_disagreement_is_seen(comparison: Comparison) -> None:

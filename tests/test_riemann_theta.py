@@ -1,4 +1,6 @@
-"""Theta functions of any matrix: against ball arithmetic, identities, and differential equations."""
+"""Theta functions of any matrix: against ball arithmetic, identities, and
+differential equations.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def all_halves(genus: int) -> list[Any]:
 
 
 def in_balls(z: Any, tau: Any) -> Any:
-    """Return θ of all half-integer characteristics by python-flint, in the order of ``all_halves``."""
+    """Return θ of all half-integer characteristics by python-flint, in the order of
+    ``all_halves``.
+    """
     ctx.prec = 120
     columns = acb_mat([[acb(x.real, x.imag)] for x in np.asarray(z, dtype=complex).tolist()])
     values = acb_mat([[acb(x.real, x.imag) for x in row] for row in tau.tolist()]).theta(columns)
@@ -37,7 +41,10 @@ def in_balls(z: Any, tau: Any) -> Any:
 def test_values_are_those_of_ball_arithmetic(genus: int) -> None:
     random = np.random.default_rng([1, genus])
     for _ in range(12 if genus < 4 else 3):
-        tau, z = random_tau(random, genus), random.normal(size=genus) + 0.2j * random.normal(size=genus)
+        tau, z = (
+            random_tau(random, genus),
+            random.normal(size=genus) + 0.2j * random.normal(size=genus),
+        )
         exact = in_balls(z, tau)
         found = theta.scaled_riemann_theta(z, tau, all_halves(genus))
         ours = found.mantissa * np.exp(found.exponent)
@@ -51,7 +58,10 @@ def test_derivatives_are_those_of_a_contour(genus: int) -> None:
     random = np.random.default_rng([2, genus])
     turns = np.exp(2j * np.pi * np.arange(16) / 16)
     for _ in range(4):
-        tau, halves = random_tau(random, genus).real + 1j * np.eye(genus), random.uniform(-1, 1, (2, genus))
+        tau, halves = (
+            random_tau(random, genus).real + 1j * np.eye(genus),
+            random.uniform(-1, 1, (2, genus)),
+        )
         z = random.normal(size=genus) + 0.2j * random.normal(size=genus)
         gradient, second = (theta.riemann_theta(z, tau, halves, order) for order in (1, 2))
         for i in range(genus):
@@ -67,7 +77,10 @@ def test_derivatives_are_those_of_a_contour(genus: int) -> None:
 
 def test_the_heat_equation_ties_second_derivatives_to_tau() -> None:
     """∂θ/∂τ_jj = (1/4πi) ∂²θ/∂z_j², and twice that off the diagonal."""
-    tau, z = np.array([[0.3 + 0.9j, 0.2 + 0.1j], [0.2 + 0.1j, -0.4 + 0.8j]]), np.array([0.3 + 0.2j, -0.1])
+    tau, z = (
+        np.array([[0.3 + 0.9j, 0.2 + 0.1j], [0.2 + 0.1j, -0.4 + 0.8j]]),
+        np.array([0.3 + 0.2j, -0.1]),
+    )
     second, h = theta.riemann_theta(z, tau, derivatives=2), 1e-4
     for i, j in ((0, 0), (1, 1), (0, 1)):
         step = np.zeros((2, 2))
@@ -80,11 +93,16 @@ def test_the_heat_equation_ties_second_derivatives_to_tau() -> None:
 def test_translations_by_the_lattice(genus: int) -> None:
     random = np.random.default_rng([3, genus])
     tau = random_tau(random, genus).real + 1j * (0.4 * np.eye(genus) + 0.1)
-    z, halves = random.normal(size=genus) + 0.1j * random.normal(size=genus), random.uniform(-1, 1, (2, genus))
+    z, halves = (
+        random.normal(size=genus) + 0.1j * random.normal(size=genus),
+        random.uniform(-1, 1, (2, genus)),
+    )
     n, m = random.integers(-5, 6, genus), random.integers(-2, 3, genus)
     epsilon, delta = halves
     there, here = (theta.scaled_riemann_theta(point, tau, halves) for point in (z + n + tau @ m, z))
-    logarithm = 2j * np.pi * (epsilon @ n) - 1j * np.pi * (m @ tau @ m) - 2j * np.pi * m @ (z + delta)
+    logarithm = (
+        2j * np.pi * (epsilon @ n) - 1j * np.pi * (m @ tau @ m) - 2j * np.pi * m @ (z + delta)
+    )
     ratio = there.mantissa / here.mantissa * np.exp(there.exponent - here.exponent - logarithm)
     assert ratio == pytest.approx(1, abs=1e-10)
 
@@ -95,10 +113,19 @@ def test_reduction_is_symplectic_and_reduces(genus: int) -> None:
     for _ in range(5):
         tau = random_tau(random, genus)
         reduced, matrix = theta.siegel_reduce(tau)
-        A, B, C, D = matrix[:genus, :genus], matrix[:genus, genus:], matrix[genus:, :genus], matrix[genus:, genus:]
-        J = np.block([[np.zeros((genus, genus)), np.eye(genus)], [-np.eye(genus), np.zeros((genus, genus))]])
+        A, B, C, D = (
+            matrix[:genus, :genus],
+            matrix[:genus, genus:],
+            matrix[genus:, :genus],
+            matrix[genus:, genus:],
+        )
+        J = np.block(
+            [[np.zeros((genus, genus)), np.eye(genus)], [-np.eye(genus), np.zeros((genus, genus))]]
+        )
         assert (matrix @ J @ matrix.T == J).all()
-        assert np.max(np.abs((A @ tau + B) @ np.linalg.inv(C @ tau + D) - reduced)) < 1e-6 * np.max(np.abs(reduced))
+        assert np.max(np.abs((A @ tau + B) @ np.linalg.inv(C @ tau + D) - reduced)) < 1e-6 * np.max(
+            np.abs(reduced)
+        )
         assert abs(reduced[0, 0]) >= 1 - 1e-9
         assert np.max(np.abs(reduced.real)) <= 0.5 + 1e-12
         assert (reduce_lattice(reduced.imag) == np.eye(genus)).all()
@@ -166,9 +193,13 @@ def test_a_form_that_is_not_positive_is_refused_with_its_least_eigenvalue() -> N
 
 @pytest.mark.slow
 def test_a_kdv_solution_of_two_phases_solves_its_equation() -> None:
-    """Kept in the fast tests of the curve; here genus 1, the cnoidal wave: u = −2 (log θ)'' + c solves u''' − 6uu' = const·u'."""
+    """Kept in the fast tests of the curve; here genus 1, the cnoidal wave: u = −2 (log θ)'' + c
+    solves u''' − 6uu' = const·u'.
+    """
     tau, x = [[0.9j]], np.linspace(0, 1, 64, endpoint=False)
-    values, first, second = (theta.riemann_theta(x[:, None], tau, derivatives=k).reshape(64) for k in range(3))
+    values, first, second = (
+        theta.riemann_theta(x[:, None], tau, derivatives=k).reshape(64) for k in range(3)
+    )
     u = -2 * (second / values - (first / values) ** 2).real
     k = 2j * np.pi * np.fft.fftfreq(64, 1 / 64)
     du, d3u = (np.fft.ifft(k**order * np.fft.fft(u)).real for order in (1, 3))

@@ -22,7 +22,9 @@ TIMES = [-3.0, 1.0, 10.0]
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
 @pytest.mark.parametrize("exponent", [-1000, -500, 500, 1000])
 def test_the_motion_does_not_depend_on_the_scale_of_A(engine: str, exponent: int) -> None:
-    scaled, plain = (vs.solve(vs.Veselova(a, Q, Q_DOT), TIMES, engine) for a in (np.ldexp(A, exponent), A))
+    scaled, plain = (
+        vs.solve(vs.Veselova(a, Q, Q_DOT), TIMES, engine) for a in (np.ldexp(A, exponent), A)
+    )
     assert (scaled.frame == plain.frame).all()
     assert (scaled.error == plain.error).all()
     assert np.array_equal(scaled.q_dot, plain.q_dot)
@@ -46,14 +48,20 @@ def test_what_det_A_takes_out_of_range_is_left_out_of_the_integrals() -> None:
     integrals = vs.solve(problem, TIMES).integrals
     assert set(integrals) == {"q_norm", "q_p", "neumann", "constants"}
     assert np.max(np.abs(integrals["q_p"])) < 1e-15
-    assert set(vs.solve(vs.Veselova(A, Q, Q_DOT), TIMES).integrals) == {*integrals, "energy", "linear"}
+    assert set(vs.solve(vs.Veselova(A, Q, Q_DOT), TIMES).integrals) == {
+        *integrals,
+        "energy",
+        "linear",
+    }
 
 
 def test_two_hundred_dimensions_are_a_problem_like_another() -> None:
     n, rng = 200, np.random.default_rng(3)
     q, q_dot = rng.normal(size=(2, n))
     problem = vs.Veselova(list(range(1, n + 1)), q, q_dot / np.linalg.norm(q_dot), normalize=True)
-    halved = vs.Veselova([a / 128 for a in range(1, n + 1)], q, q_dot / np.linalg.norm(q_dot), normalize=True)
+    halved = vs.Veselova(
+        [a / 128 for a in range(1, n + 1)], q, q_dot / np.linalg.norm(q_dot), normalize=True
+    )
     assert problem.energy == 0
     assert halved.energy > 0
     found, other = (vs.solve(p, [0.5], "numeric") for p in (problem, halved))
@@ -65,7 +73,9 @@ def test_two_hundred_dimensions_are_a_problem_like_another() -> None:
 def test_two_hundred_dimensions_in_closed_form() -> None:
     n, rng = 200, np.random.default_rng(3)
     q, q_dot = rng.normal(size=(2, n))
-    assert vs.compare(vs.Veselova(list(range(1, n + 1)), q, q_dot / 14, normalize=True), [0.5]).agrees
+    assert vs.compare(
+        vs.Veselova(list(range(1, n + 1)), q, q_dot / 14, normalize=True), [0.5]
+    ).agrees
 
 
 @pytest.mark.parametrize("factor", [1e200, 1e-200])
@@ -76,7 +86,18 @@ def test_a_velocity_whose_square_is_no_float_is_refused_as_one(factor: float) ->
 
 def test_the_command_line_says_null(tmp_path: Path) -> None:
     path = tmp_path / "large.json"
-    path.write_text(json.dumps({"problem": {"system": "veselova", "A": np.ldexp(A, 1000).tolist(), "q": Q, "q_dot": Q_DOT}}))
+    path.write_text(
+        json.dumps(
+            {
+                "problem": {
+                    "system": "veselova",
+                    "A": np.ldexp(A, 1000).tolist(),
+                    "q": Q,
+                    "q_dot": Q_DOT,
+                }
+            }
+        )
+    )
     document = json.loads(CliRunner().invoke(app, ["torus", str(path), "--json"]).stdout)
     assert document["energy"] is None
     assert document["periods"] is None

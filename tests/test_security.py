@@ -64,12 +64,17 @@ def longest_wait(server: Server, path: str, body: bytes) -> tuple[float, httpx2.
     return max(waits), answer
 
 
-BODIES = [("/v1/trajectories", *row) for row in hostile_bodies()] + [("/v1/sweeps", *row) for row in hostile_sweeps()]
+BODIES = [("/v1/trajectories", *row) for row in hostile_bodies()] + [
+    ("/v1/sweeps", *row) for row in hostile_sweeps()
+]
 
 
-@pytest.mark.parametrize(("path", "body"), [(path, body) for path, _, body in BODIES], ids=[row[1] for row in BODIES])
+@pytest.mark.parametrize(
+    ("path", "body"), [(path, body) for path, _, body in BODIES], ids=[row[1] for row in BODIES]
+)
 def test_no_body_keeps_others_waiting(small: Server, path: str, body: bytes) -> None:
-    for _ in range(5):  # other processes may take the processors; the loop is held every time or never
+    # other processes may take the processors; the loop is held every time or never
+    for _ in range(5):
         wait, answer = longest_wait(small, path, body)
         assert answer.status_code in (200, 202, 400, 422), answer.text[:300]
         if wait < LONGEST_WAIT:
@@ -93,22 +98,36 @@ def test_repeated_names_are_found_in_linear_time() -> None:
 
 def test_repeated_names_have_their_pointers(small: Server) -> None:
     text = json.dumps(GOOD)
-    inner = text.replace('"A": [3, 2, 1]', '"A": [3, 2, 1], "A": [{"b": 1, "b": 2}], "q": [1, 0, 0]')
+    inner = text.replace(
+        '"A": [3, 2, 1]', '"A": [3, 2, 1], "A": [{"b": 1, "b": 2}], "q": [1, 0, 0]'
+    )
     document = is_problem(post(small, "/v1/trajectories", inner), 422, "invalid-input")
-    assert [fault["pointer"] for fault in document["errors"]] == ["/problem/A", "/problem/q", "/problem/A/0/b"]
+    assert [fault["pointer"] for fault in document["errors"]] == [
+        "/problem/A",
+        "/problem/q",
+        "/problem/A/0/b",
+    ]
 
 
 def test_halves_of_surrogate_pairs_are_spelled_out(small: Server) -> None:
-    document = is_problem(post(small, "/v1/tori", b'{"\\ud800":1,"\\ud800":2}'), 422, "invalid-input")
+    document = is_problem(
+        post(small, "/v1/tori", b'{"\\ud800":1,"\\ud800":2}'), 422, "invalid-input"
+    )
     assert document["errors"][0]["pointer"] == "/\\ud800"
     for path in ("/v1/trajectories", "/v1/tori", "/v1/sweeps"):
         for field in ("\ud800", "x\udfff"):
-            is_problem(post(small, path, {**GOOD, field: field, "method": field, "engine": field}), 422, "invalid-input")
+            is_problem(
+                post(small, path, {**GOOD, field: field, "method": field, "engine": field}),
+                422,
+                "invalid-input",
+            )
 
 
 @pytest.mark.parametrize("numeral", ["1e400", "-1e400", "1.5E+999", "NaN", "Infinity", "-Infinity"])
 @pytest.mark.parametrize("field", ["A", "times", "budget_s"])
-def test_numbers_beyond_the_range_are_shown_as_they_were_given(small: Server, numeral: str, field: str) -> None:
+def test_numbers_beyond_the_range_are_shown_as_they_were_given(
+    small: Server, numeral: str, field: str
+) -> None:
     changed: dict[str, Any] = {**GOOD, "problem": {**GOOD["problem"]}}
     if field == "budget_s":
         changed[field] = "HERE"
@@ -128,7 +147,9 @@ def connected(server: Server) -> Iterator[socket.socket]:
 
 
 def everything(connection: socket.socket) -> tuple[int, str, dict[str, Any]]:
-    """Return status, Connection and document of the last answer on a connection, which ends after it."""
+    """Return status, Connection and document of the last answer on a connection, which ends after
+    it.
+    """
     received = b""
     with suppress(ConnectionError):
         while piece := connection.recv(65536):
@@ -206,7 +227,9 @@ def test_a_body_must_end_in_time_however_fast_it_is(strict: Server) -> None:
 
 
 def test_an_answer_that_is_not_read_ends_its_connection(strict: Server) -> None:
-    body = json.dumps({**GOOD, "engine": "numeric", "times": {"start": 0, "stop": 10, "count": 40_000}}).encode()
+    body = json.dumps(
+        {**GOOD, "engine": "numeric", "times": {"start": 0, "stop": 10, "count": 40_000}}
+    ).encode()
     before = open_sockets(strict)
     with connected(strict) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -228,7 +251,11 @@ def test_one_address_has_so_many_connections_and_no_more(strict: Server) -> None
         held = [stack.enter_context(connected(strict)) for _ in range(20)]
         with connected(strict) as further:
             status, name, document = everything(further)
-        assert (status, name, document["type"]) == (503, "close", "urn:veselova:problem:too-many-connections")
+        assert (status, name, document["type"]) == (
+            503,
+            "close",
+            "urn:veselova:problem:too-many-connections",
+        )
         held[0].sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
         assert everything(held[0])[0] == 200
     wait_until(lambda: strict.get("/healthz").status_code == 200)
@@ -248,7 +275,9 @@ def test_connections_are_limited_in_all() -> None:
 
 
 def test_descriptors_that_run_out_are_logged_once(tmp_path: Path) -> None:
-    with running_server(tmp_path, max_connections_per_address="0", head_timeout_s="2", log_format="json") as own:
+    with running_server(
+        tmp_path, max_connections_per_address="0", head_timeout_s="2", log_format="json"
+    ) as own:
         resource.prlimit(own.process.pid, resource.RLIMIT_NOFILE, (30, 30))
         with ExitStack() as stack:
             for _ in range(60):
@@ -264,25 +293,36 @@ def test_descriptors_that_run_out_are_logged_once(tmp_path: Path) -> None:
 def test_length_and_chunks_together_end_the_connection(strict: Server) -> None:
     with connected(strict) as both:
         both.sendall(
-            HEAD + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n\r\nGET /healthz HTTP/1.1\r\n\r\n"
+            HEAD
+            + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n\r\nGET "
+            b"/healthz HTTP/1.1\r\n\r\n"
         )
         status, name, document = everything(both)
     assert (status, name, document["type"]) == (400, "close", "urn:veselova:problem:malformed-http")
 
 
 @pytest.mark.parametrize("field", [b"Content-Length: 5000000", b"Transfer-Encoding: chunked"])
-def test_a_body_too_large_ends_the_connection_and_its_refusal_is_read(strict: Server, field: bytes) -> None:
+def test_a_body_too_large_ends_the_connection_and_its_refusal_is_read(
+    strict: Server, field: bytes
+) -> None:
     with connected(strict) as large, suppress(ConnectionError):
         large.sendall(HEAD + field + b"\r\n\r\n")
         with suppress(ConnectionError):
             for _ in range(300):
                 large.sendall((b"1388\r\n" if b"chunked" in field else b"") + b" " * 5000 + b"\r\n")
         status, name, document = everything(large)
-        assert (status, name, document["type"]) == (413, "close", "urn:veselova:problem:body-too-large")
+        assert (status, name, document["type"]) == (
+            413,
+            "close",
+            "urn:veselova:problem:body-too-large",
+        )
 
 
 def test_events_of_a_job_are_sent_for_longer_than_other_answers(strict: Server) -> None:
-    sweep = {"problem": GOOD["problem"], "vary": {"/A/0": {"start": 3, "stop": 4, "count": 200_000}}}
+    sweep = {
+        "problem": GOOD["problem"],
+        "vary": {"/A/0": {"start": 3, "stop": 4, "count": 200_000}},
+    }
     here = f"/v1/jobs/{post(strict, '/v1/sweeps', sweep).json()['id']}"
     began, seen = time.monotonic(), 0
     with httpx2.stream("GET", f"{strict.url}{here}/events", timeout=PATIENCE) as events:
@@ -296,7 +336,14 @@ def test_events_of_a_job_are_sent_for_longer_than_other_answers(strict: Server) 
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "localhost.evil.example", "10.0.0.1"]
+    "host",
+    [
+        "evil.example",
+        "evil.example:8000",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "10.0.0.1",
+    ],
 )
 def test_a_server_on_loopback_answers_under_no_name_of_others(small: Server, host: str) -> None:
     for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
@@ -304,20 +351,29 @@ def test_a_server_on_loopback_answers_under_no_name_of_others(small: Server, hos
         assert "evil" not in document["detail"]
 
 
-@pytest.mark.parametrize("host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost", "127.9.9.9"])
-def test_a_server_on_loopback_answers_under_every_name_of_loopback(small: Server, host: str) -> None:
+@pytest.mark.parametrize(
+    "host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost", "127.9.9.9"]
+)
+def test_a_server_on_loopback_answers_under_every_name_of_loopback(
+    small: Server, host: str
+) -> None:
     assert small.get("/healthz", headers={"Host": host}).status_code == 200
 
 
 def test_further_hosts_are_a_setting() -> None:
     assert allowed_hosts(Settings(), loopback=False) is None
     assert allowed_hosts(Settings(allowed_hosts="*"), loopback=True) is None
-    assert allowed_hosts(Settings(allowed_hosts="A.example, [::2]"), loopback=False) == {"a.example", "::2"}
+    assert allowed_hosts(Settings(allowed_hosts="A.example, [::2]"), loopback=False) == {
+        "a.example",
+        "::2",
+    }
     with pytest.raises(ValueError, match="without ports"):
         Settings(allowed_hosts="a.example:80")
 
 
-@pytest.mark.parametrize("path", ["/healthz/", "/v1/tori/", "/v1/jobs/", "//evil.example/v1/systems", "/docs/"])
+@pytest.mark.parametrize(
+    "path", ["/healthz/", "/v1/tori/", "/v1/jobs/", "//evil.example/v1/systems", "/docs/"]
+)
 def test_nothing_is_redirected(small: Server, path: str) -> None:
     answer = small.get(path)
     assert answer.status_code in (404, 405)
@@ -333,10 +389,14 @@ def test_readiness_names_no_address_port_or_role(tmp_path: Path) -> None:
 
 
 def logged(server: Server, outcome: str) -> dict[str, Any]:
-    """Return the line of the last request with an outcome, once it is there; nothing has failed with a traceback by then."""
+    """Return the line of the last request with an outcome, once it is there; nothing has failed
+    with a traceback by then.
+    """
 
     def lines() -> list[dict[str, Any]]:
-        found = [json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{")]
+        found = [
+            json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{")
+        ]
         return [line for line in found if line.get("outcome") == outcome]
 
     wait_until(lines)
@@ -345,7 +405,9 @@ def logged(server: Server, outcome: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("path", ["/v1/tori", "/v1/sweeps"])
-def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(strict: Server, path: str) -> None:
+def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(
+    strict: Server, path: str
+) -> None:
     with connected(strict) as leaving:
         leaving.sendall(HEAD.replace(b"/v1/tori", path.encode()) + b"Content-Length: 1000\r\n\r\n{")
         time.sleep(0.2)
@@ -361,16 +423,22 @@ def test_broken_chunks_are_malformed(strict: Server) -> None:
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
-def test_a_server_that_ends_answers_what_it_has_not_read(tmp_path: Path, sent: signal.Signals) -> None:
+def test_a_server_that_ends_answers_what_it_has_not_read(
+    tmp_path: Path, sent: signal.Signals
+) -> None:
     with running_server(tmp_path, workers="1", shutdown_grace_s=str(int(PATIENCE))) as own:
         answers: list[httpx2.Response] = []
         slow = {**GOOD, "engine": "numeric", "times": [0, 500]}
-        thread = threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", slow)))
+        thread = threading.Thread(
+            target=lambda: answers.append(post(own, "/v1/trajectories", slow))
+        )
         with connected(own) as upload:
             upload.sendall(HEAD + b"Content-Length: 1000\r\n\r\n{")
             thread.start()
             wait_until(lambda: own.at_work()[0] == 1)
-            os.killpg(own.process.pid, sent) if sent is signal.SIGHUP else own.process.send_signal(sent)
+            os.killpg(own.process.pid, sent) if sent is signal.SIGHUP else own.process.send_signal(
+                sent
+            )
             status, name, document = everything(upload)
         thread.join(PATIENCE)
         assert own.process.wait(PATIENCE) == 0

@@ -1,4 +1,6 @@
-"""What the service keeps: its first start, damage, whose it is, how much there may be, for how long, who else may touch it."""
+"""What the service keeps: its first start, damage, whose it is, how much there may be, for how
+long, who else may touch it.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,14 @@ from test_access import keys, new_key
 from test_http import ENDLESS, JSON, is_problem
 from test_sweeps import request as sweep_request
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import api_keys, connect, idempotency_keys, jobs, schema_differences, writing
+from veselova.service.access.database import (
+    api_keys,
+    connect,
+    idempotency_keys,
+    jobs,
+    schema_differences,
+    writing,
+)
 from veselova.service.access.keys import open_keys
 from veselova.service.access.sqlite_wal import wal_is_damaged
 from veselova.service.answers import spool
@@ -81,7 +90,9 @@ def together(call: Callable[[int], Any], count: int) -> list[Any]:
 
 
 def in_a_child(call: Callable[[], Any]) -> int:
-    """Return the status of a process of its own that makes a call: 0 where it returns, 1 where it raises."""
+    """Return the status of a process of its own that makes a call: 0 where it returns, 1 where it
+    raises.
+    """
     child = os.fork()
     if child == 0:
         with suppress(BaseException):
@@ -94,9 +105,16 @@ def in_a_child(call: Callable[[], Any]) -> int:
 def scripted(body: str, folder: Path) -> list[str]:
     """Return the lines that a process without threads prints, which may therefore fork."""
     script = (
-        f"import sys; sys.path[:0] = {sys.path!r}\nfrom test_security_storage import *\nfolder = Path({str(folder)!r})\n{body}"
+        f"import sys; sys.path[:0] = {sys.path!r}\nfrom test_security_storage import "
+        f"*\nfolder = Path({str(folder)!r})\n{body}"
     )
-    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE, check=False)
+    answer = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
     assert answer.returncode == 0, answer.stderr
     return answer.stdout.splitlines()
 
@@ -156,7 +174,8 @@ for size in range(0, 400_000, 8192):
 def test_first_starts_that_race_all_succeed(store: Settings, tmp_path: Path) -> None:
     body = f"""
 from pydantic import SecretStr
-settings = Settings(data_dir=folder, database_url=SecretStr({store.database_url.get_secret_value()!r}))
+address = {store.database_url.get_secret_value()!r}
+settings = Settings(data_dir=folder, database_url=SecretStr(address))
 begin = time.time() + 0.5
 def start():
     time.sleep(begin - time.time())
@@ -181,40 +200,54 @@ print(*[os.waitpid(child, 0)[1] for child in children])
 
 #: The tables of version 0.1.0.
 OLD_TABLES = (
-    "CREATE TABLE jobs (id VARCHAR(32) NOT NULL PRIMARY KEY, request TEXT NOT NULL, state VARCHAR(16) NOT NULL, "
+    "CREATE TABLE jobs (id VARCHAR(32) NOT NULL PRIMARY KEY, request TEXT NOT NULL, state "
+    "VARCHAR(16) NOT NULL, "
     "detail TEXT DEFAULT '' NOT NULL, total BIGINT NOT NULL, chunk_rows INTEGER NOT NULL, "
     "created_at TIMESTAMP WITH TIME ZONE NOT NULL, finished_at TIMESTAMP WITH TIME ZONE)",
     "CREATE INDEX ix_jobs_state ON jobs (state)",
-    "CREATE TABLE chunks (job_id VARCHAR(32) NOT NULL, position INTEGER NOT NULL, rows INTEGER NOT NULL, "
-    "sha256 VARCHAR(64) NOT NULL, PRIMARY KEY (job_id, position), FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE)",
-    "CREATE TABLE idempotency_keys (key VARCHAR(255) NOT NULL, job_id VARCHAR(32) NOT NULL, PRIMARY KEY (key), "
+    "CREATE TABLE chunks (job_id VARCHAR(32) NOT NULL, position INTEGER NOT NULL, rows "
+    "INTEGER NOT NULL, "
+    "sha256 VARCHAR(64) NOT NULL, PRIMARY KEY (job_id, position), FOREIGN KEY(job_id) "
+    "REFERENCES jobs (id) ON DELETE CASCADE)",
+    "CREATE TABLE idempotency_keys (key VARCHAR(255) NOT NULL, job_id VARCHAR(32) NOT NULL, "
+    "PRIMARY KEY (key), "
     "FOREIGN KEY(job_id) REFERENCES jobs (id) ON DELETE CASCADE)",
-    "CREATE TABLE api_keys (id VARCHAR(16) NOT NULL, name VARCHAR(100) NOT NULL, sha256 VARCHAR(64) NOT NULL, "
-    "created_at TIMESTAMP WITH TIME ZONE NOT NULL, revoked_at TIMESTAMP WITH TIME ZONE, PRIMARY KEY (id), UNIQUE (sha256))",
+    "CREATE TABLE api_keys (id VARCHAR(16) NOT NULL, name VARCHAR(100) NOT NULL, sha256 "
+    "VARCHAR(64) NOT NULL, "
+    "created_at TIMESTAMP WITH TIME ZONE NOT NULL, revoked_at TIMESTAMP WITH TIME ZONE, "
+    "PRIMARY KEY (id), UNIQUE (sha256))",
 )
 
 
 def old_database(store: Settings, statements: tuple[str, ...]) -> None:
     stated = store.database_url.get_secret_value()
     store.data_dir.mkdir(mode=0o700)
-    url = stated.replace("postgresql:", "postgresql+psycopg:") or f"sqlite:///{store.data_dir / 'veselova.db'}"
+    url = (
+        stated.replace("postgresql:", "postgresql+psycopg:")
+        or f"sqlite:///{store.data_dir / 'veselova.db'}"
+    )
     engine = sa.create_engine(url)
     with engine.begin() as connection:
         for statement in statements:
-            dated = statement if stated else statement.replace("TIMESTAMP WITH TIME ZONE", "DATETIME")
+            dated = (
+                statement if stated else statement.replace("TIMESTAMP WITH TIME ZONE", "DATETIME")
+            )
             connection.execute(sa.text(dated))
     engine.dispose()
 
 
-def test_a_database_of_the_first_version_is_brought_up_to_date_with_what_it_holds(store: Settings) -> None:
+def test_a_database_of_the_first_version_is_brought_up_to_date_with_what_it_holds(
+    store: Settings,
+) -> None:
     sweep = sweep_request()
     at = "2026-01-01 00:00:00.000000" + ("+00:00" if store.database_url.get_secret_value() else "")
+    job = f"('{sweep.id}', '{sweep.canonical.decode()}', 'finished', '', 15, 15, '{at}', '{at}')"
     rows = (
-        f"INSERT INTO jobs VALUES ('{sweep.id}', '{sweep.canonical.decode()}', 'finished', '', 15, 15, '{at}', '{at}')".replace(
+        f"INSERT INTO jobs VALUES {job}".replace(":", r"\:"),
+        f"INSERT INTO idempotency_keys VALUES ('mine', '{sweep.id}')",
+        rf"INSERT INTO api_keys VALUES ('0123456789ab', 'Ada', 'hash', '{at}', NULL)".replace(
             ":", r"\:"
         ),
-        f"INSERT INTO idempotency_keys VALUES ('mine', '{sweep.id}')",
-        rf"INSERT INTO api_keys VALUES ('0123456789ab', 'Ada', 'hash', '{at}', NULL)".replace(":", r"\:"),
         "CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)",
         "INSERT INTO alembic_version VALUES ('0001')",
     )
@@ -226,11 +259,15 @@ def test_a_database_of_the_first_version_is_brought_up_to_date_with_what_it_hold
         with pytest.raises(InvalidInput, match="another request"):
             opened.submit(sweep_request(seed=9), "mine")
     with closing(open_keys(store)) as known:
-        assert [(key.scope, key.owner, key.state) for key in known.list()] == [("solve", "0123456789ab", "valid")]
+        assert [(key.scope, key.owner, key.state) for key in known.list()] == [
+            ("solve", "0123456789ab", "valid")
+        ]
 
 
 @pytest.mark.parametrize("made", range(1, len(OLD_TABLES) + 1))
-def test_a_first_start_that_the_first_version_left_half_done_is_done_now(tmp_path: Path, made: int) -> None:
+def test_a_first_start_that_the_first_version_left_half_done_is_done_now(
+    tmp_path: Path, made: int
+) -> None:
     store = Settings(data_dir=tmp_path / "data")
     old_database(store, OLD_TABLES[:made])
     engine = connect(store)
@@ -255,7 +292,11 @@ def test_a_database_of_a_later_version_is_named(tmp_path: Path) -> None:
 def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder whose server was killed with five keys in its log."""
     folder = tmp_path_factory.mktemp("killed")
-    scripted("known = open_keys(Settings(data_dir=folder))\nfor i in range(5): known.create(f'n{i}')\nos._exit(0)", folder)
+    scripted(
+        "known = open_keys(Settings(data_dir=folder))\nfor i in range(5): "
+        "known.create(f'n{i}')\nos._exit(0)",
+        folder,
+    )
     return folder
 
 
@@ -269,7 +310,9 @@ def copied(killed: Path, folder: Path) -> tuple[Path, Path]:
 
 @pytest.mark.parametrize("start", [0, 1, 8, 32 + 20, 32 + 24 + 100, 32 + 4120 + 5], ids=str)
 @pytest.mark.parametrize("length", [1, 300, 5000])
-def test_a_damaged_log_ends_in_a_named_error_and_an_instruction(killed: Path, tmp_path: Path, start: int, length: int) -> None:
+def test_a_damaged_log_ends_in_a_named_error_and_an_instruction(
+    killed: Path, tmp_path: Path, start: int, length: int
+) -> None:
     """SQLite itself takes what comes before the damage, and forgets the rest without a word."""
     database, log = copied(killed, tmp_path)
     content = bytearray(log.read_bytes())
@@ -285,7 +328,9 @@ def test_a_damaged_log_ends_in_a_named_error_and_an_instruction(killed: Path, tm
 
 
 @pytest.mark.parametrize("content", [b"garbage" * 100, bytes(100) + b"x" * 5000])
-def test_what_is_no_log_is_named_on_the_command_line(killed: Path, tmp_path: Path, content: bytes) -> None:
+def test_what_is_no_log_is_named_on_the_command_line(
+    killed: Path, tmp_path: Path, content: bytes
+) -> None:
     copied(killed, tmp_path)[1].write_bytes(content)
     answer = keys(tmp_path, "list")
     assert answer.returncode == 2
@@ -293,21 +338,26 @@ def test_what_is_no_log_is_named_on_the_command_line(killed: Path, tmp_path: Pat
     assert answer.stderr.count("\n") == 1
 
 
-def test_a_log_that_ends_in_the_midst_of_a_transaction_is_not_damaged(killed: Path, tmp_path: Path) -> None:
+def test_a_log_that_ends_in_the_midst_of_a_transaction_is_not_damaged(
+    killed: Path, tmp_path: Path
+) -> None:
     log = copied(killed, tmp_path)[1]
     content = log.read_bytes()
     assert not wal_is_damaged(log)
     for left in (len(content) - 1, len(content) - 5000, len(content) // 2, 40, 32, 3, 0):
         log.write_bytes(content[:left])
         assert not wal_is_damaged(log)
-    log.write_bytes(bytes(len(content)))  # what some file systems leave of a file that was not yet on the disk
+    # what some file systems leave of a file that was not yet on the disk
+    log.write_bytes(bytes(len(content)))
     assert not wal_is_damaged(log)
     log.write_bytes(content)
     with closing(open_keys(Settings(data_dir=tmp_path / "data"))) as known:
         assert len(known.list()) == 5
 
 
-def test_the_tables_of_a_first_start_outlive_the_loss_of_the_log(killed: Path, tmp_path: Path) -> None:
+def test_the_tables_of_a_first_start_outlive_the_loss_of_the_log(
+    killed: Path, tmp_path: Path
+) -> None:
     database, log = copied(killed, tmp_path)
     log.unlink()
     with closing(sqlite3.connect(database)) as connection:
@@ -315,7 +365,9 @@ def test_the_tables_of_a_first_start_outlive_the_loss_of_the_log(killed: Path, t
 
 
 @pytest.mark.parametrize("place", ["start", "schema", "end"])
-def test_a_damaged_database_is_named_and_the_server_answers_the_rest(tmp_path: Path, place: str) -> None:
+def test_a_damaged_database_is_named_and_the_server_answers_the_rest(
+    tmp_path: Path, place: str
+) -> None:
     with closing(open_keys(Settings(data_dir=tmp_path / "data"))) as known:
         for i in range(200):
             known.create(f"a name of some length {i}")
@@ -332,7 +384,9 @@ def test_a_damaged_database_is_named_and_the_server_answers_the_rest(tmp_path: P
             document = is_problem(server.get("/v1/jobs"), 503, "storage-unavailable")
             assert "database-damaged" in document["detail"]
             assert str(path) not in document["detail"]
-            assert server.ask("POST", "/v1/tori", json={"problem": GOOD["problem"]}).status_code == 200
+            assert (
+                server.ask("POST", "/v1/tori", json={"problem": GOOD["problem"]}).status_code == 200
+            )
             log = server.log.read_text()
         assert "is damaged" in log
         assert "Traceback" not in log
@@ -354,12 +408,17 @@ def holders(shared: Path) -> dict[str, dict[str, str]]:
         made["reader"] = known.create("reader", "read", same_as=made["ada"][0].id)
         made["admin"] = known.create("admin", "admin")
         made["over"] = known.create("over", "solve", datetime.now(UTC) + timedelta(seconds=0.01))
-    return {name: {"authorization": f"Bearer {text}", "id": key.id} for name, (key, text) in made.items()}
+    return {
+        name: {"authorization": f"Bearer {text}", "id": key.id}
+        for name, (key, text) in made.items()
+    }
 
 
 @pytest.fixture(scope="module")
 def guarded(shared: Path, holders: dict[str, Any]) -> Iterator[Server]:
-    with running_server(shared, "--require-keys", workers="2", sweep_workers="1", max_jobs_per_key="3") as own:
+    with running_server(
+        shared, "--require-keys", workers="2", sweep_workers="1", max_jobs_per_key="3"
+    ) as own:
         yield own
 
 
@@ -367,7 +426,9 @@ def guarded(shared: Path, holders: dict[str, Any]) -> Iterator[Server]:
 def ask(guarded: Server, holders: dict[str, dict[str, str]]) -> Callable[..., httpx2.Response]:
     """Asks the guarded server with somebody's key."""
 
-    def asked(who: str, method: str, path: str, body: Any = None, **headers: str) -> httpx2.Response:
+    def asked(
+        who: str, method: str, path: str, body: Any = None, **headers: str
+    ) -> httpx2.Response:
         shown = {"authorization": holders[who]["authorization"], **headers}
         content = {} if body is None else {"content": json.dumps(body)}
         return guarded.ask(method, path, headers={**JSON, **shown}, **content)
@@ -377,10 +438,18 @@ def ask(guarded: Server, holders: dict[str, dict[str, str]]) -> Callable[..., ht
 
 def body_of(seed: int = 0, **changes: Any) -> dict[str, Any]:
     vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
-    return {"problem": {**GOOD["problem"], "normalize": True}, "vary": vary, "samples": 2, "seed": seed, **changes}
+    return {
+        "problem": {**GOOD["problem"], "normalize": True},
+        "vary": vary,
+        "samples": 2,
+        "seed": seed,
+        **changes,
+    }
 
 
-def test_a_job_is_absent_for_every_key_but_that_of_its_owner(ask: Callable[..., httpx2.Response]) -> None:
+def test_a_job_is_absent_for_every_key_but_that_of_its_owner(
+    ask: Callable[..., httpx2.Response],
+) -> None:
     made = ask("ada", "POST", "/v1/sweeps", body_of())
     assert made.status_code == 202
     link = made.headers["location"]
@@ -388,7 +457,9 @@ def test_a_job_is_absent_for_every_key_but_that_of_its_owner(ask: Callable[..., 
     wait_until(lambda: ask("ada", "GET", link).json()["state"] == "finished")
     for path in ("", "/events", "/result", "/trajectories"):
         refused = is_problem(ask("emmy", "GET", f"{link}{path}"), 404, "no-such-job")
-        absent = is_problem(ask("emmy", "GET", f"/v1/jobs/{job_id[::-1]}{path}"), 404, "no-such-job")
+        absent = is_problem(
+            ask("emmy", "GET", f"/v1/jobs/{job_id[::-1]}{path}"), 404, "no-such-job"
+        )
         assert refused["detail"].replace(job_id, "") == absent["detail"].replace(job_id[::-1], "")
     for query in ("", "?remove=true"):
         is_problem(ask("emmy", "DELETE", f"{link}{query}"), 404, "no-such-job")
@@ -402,7 +473,9 @@ def test_a_job_is_absent_for_every_key_but_that_of_its_owner(ask: Callable[..., 
     assert ask("emmy", "GET", other.headers["location"]).status_code == 200
 
 
-def test_a_key_of_the_same_owner_sees_the_same(ask: Callable[..., httpx2.Response], holders: dict[str, Any]) -> None:
+def test_a_key_of_the_same_owner_sees_the_same(
+    ask: Callable[..., httpx2.Response], holders: dict[str, Any]
+) -> None:
     link = ask("ada", "POST", "/v1/sweeps", body_of(1)).headers["location"]
     document = ask("reader", "GET", link).json()
     assert document["owner"] == holders["ada"]["id"]
@@ -411,10 +484,15 @@ def test_a_key_of_the_same_owner_sees_the_same(ask: Callable[..., httpx2.Respons
 
 def test_idempotency_keys_belong_to_an_owner(ask: Callable[..., httpx2.Response]) -> None:
     first, second = (
-        ask(who, "POST", "/v1/sweeps", body_of(seed), **{"idempotency-key": "mine"}) for who, seed in (("ada", 2), ("emmy", 3))
+        ask(who, "POST", "/v1/sweeps", body_of(seed), **{"idempotency-key": "mine"})
+        for who, seed in (("ada", 2), ("emmy", 3))
     )
     assert (first.status_code, second.status_code) == (202, 202)
-    is_problem(ask("emmy", "POST", "/v1/sweeps", body_of(2), **{"idempotency-key": "mine"}), 422, "invalid-input")
+    is_problem(
+        ask("emmy", "POST", "/v1/sweeps", body_of(2), **{"idempotency-key": "mine"}),
+        422,
+        "invalid-input",
+    )
 
 
 def test_kept_answers_belong_to_an_owner(ask: Callable[..., httpx2.Response]) -> None:
@@ -425,7 +503,9 @@ def test_kept_answers_belong_to_an_owner(ask: Callable[..., httpx2.Response]) ->
     for method in ("GET", "HEAD"):
         assert ask("emmy", method, place).status_code == 404
         assert ask("emmy", method, place, **{"if-none-match": "*"}).status_code == 404
-    assert ask("emmy", "POST", "/v1/trajectories", GOOD, **{"if-none-match": "*"}).status_code == 200
+    assert (
+        ask("emmy", "POST", "/v1/trajectories", GOOD, **{"if-none-match": "*"}).status_code == 200
+    )
     again = ask("admin", "POST", "/v1/trajectories", GOOD)
     assert "cache-status" not in again.headers  # which would tell that somebody asked before
     assert "hit" in ask("ada", "POST", "/v1/trajectories", GOOD).headers["cache-status"]
@@ -448,7 +528,9 @@ def test_a_scope_allows_what_it_says(
     refused = ask(who, method, path, GOOD if method == "POST" else None)
     is_problem(refused, 403, "insufficient-scope")
     if needed:
-        assert f'error="insufficient_scope", scope="{needed}"' in refused.headers["www-authenticate"]
+        assert (
+            f'error="insufficient_scope", scope="{needed}"' in refused.headers["www-authenticate"]
+        )
     allowed = ask("admin", method, path, GOOD if method == "POST" else None)
     assert allowed.status_code in (200, 404, 422)
 
@@ -462,7 +544,9 @@ def test_a_reader_reads_and_an_admin_sees_all(ask: Callable[..., httpx2.Response
     assert ask("admin", "DELETE", link).status_code == 200
 
 
-def test_an_expired_key_is_refused_and_listed_so(ask: Callable[..., httpx2.Response], shared: Path) -> None:
+def test_an_expired_key_is_refused_and_listed_so(
+    ask: Callable[..., httpx2.Response], shared: Path
+) -> None:
     refused = ask("over", "GET", "/v1/systems")
     assert "has expired" in is_problem(refused, 401, "unauthorized")["detail"]
     assert 'error="invalid_token"' in refused.headers["www-authenticate"]
@@ -487,14 +571,21 @@ def test_keys_are_made_with_scope_and_expiry(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "life"),
-    [("90d", timedelta(days=90)), ("12h", timedelta(hours=12)), ("4w", timedelta(weeks=4)), (None, None)],
+    [
+        ("90d", timedelta(days=90)),
+        ("12h", timedelta(hours=12)),
+        ("4w", timedelta(weeks=4)),
+        (None, None),
+    ],
 )
 def test_an_expiry_is_a_time_to_come(text: str | None, life: timedelta | None) -> None:
     assert expiry(text, NOW) == (None if life is None else NOW + life)
     assert expiry("2126-01-31", NOW) == datetime(2126, 1, 31, tzinfo=UTC)
 
 
-@pytest.mark.parametrize("text", ["", "90", "d", "0d", "-1d", "1.5d", "999999w", "2020-01-01", "2030-02-31", "tomorrow"])
+@pytest.mark.parametrize(
+    "text", ["", "90", "d", "0d", "-1d", "1.5d", "999999w", "2020-01-01", "2030-02-31", "tomorrow"]
+)
 def test_what_is_no_time_to_come_is_refused(text: str) -> None:
     with pytest.raises(InvalidInput, match="--expires"):
         expiry(text, NOW)
@@ -507,7 +598,9 @@ def test_of_two_sweeps_under_one_key_exactly_one_wins(store: Settings) -> None:
     with closing(Jobs(store)) as opened:
         for number in range(4):
             sweeps = [sweep_request(seed=10 * number + i) for i in range(8)]
-            found = together(lambda i, sweeps=sweeps, key=f"key {number}": opened.submit(sweeps[i], key), 8)
+            found = together(
+                lambda i, sweeps=sweeps, key=f"key {number}": opened.submit(sweeps[i], key), 8
+            )
             lost = [error for error in found if isinstance(error, Exception)]
             assert len(lost) == 7
             assert {type(error) for error in lost} == {InvalidInput}
@@ -542,12 +635,15 @@ def test_bytes_are_counted_when_they_are_promised(store: Settings) -> None:
         assert opened.get(job.id).bytes == len(job.request)
         assert opened.submit(sweep_request(seed=20)).state == "queued"
         with pytest.raises(Refused, match="take the room"):
-            opened.submit(sweep_request(seed=int(found.index(job))))  # a job that goes on is promised its room again
+            # a job that goes on is promised its room again
+            opened.submit(sweep_request(seed=int(found.index(job))))
 
 
 def test_an_owner_has_a_quota_and_so_many_jobs(store: Settings) -> None:
     size = promised_bytes(sweep_request(seed=5))
-    with closing(Jobs(changed(store, max_stored_bytes_per_key=int(2.5 * size), max_jobs_per_key=3))) as opened:
+    with closing(
+        Jobs(changed(store, max_stored_bytes_per_key=int(2.5 * size), max_jobs_per_key=3))
+    ) as opened:
         for seed in (1, 2):
             opened.submit(sweep_request(seed=seed), None, "ada")
         with pytest.raises(Refused, match="The jobs of this key take") as raised:
@@ -556,7 +652,10 @@ def test_an_owner_has_a_quota_and_so_many_jobs(store: Settings) -> None:
         assert opened.submit(sweep_request(seed=3), None, "emmy").owner == "emmy"
         for seed in range(3, 8):
             opened.submit(sweep_request(seed=seed))  # who shows no key has the room of all
-    with closing(Jobs(changed(store, max_jobs_per_key=2))) as opened, pytest.raises(Refused, match="2 jobs of this key"):
+    with (
+        closing(Jobs(changed(store, max_jobs_per_key=2))) as opened,
+        pytest.raises(Refused, match="2 jobs of this key"),
+    ):
         opened.submit(sweep_request(seed=3), None, "ada")
 
 
@@ -573,9 +672,15 @@ def test_old_jobs_and_idempotency_keys_go_with_their_room(store: Settings) -> No
         path = store.data_dir / "veselova.db"
         with writing(opened._engine) as connection:
             which = jobs.c.id == sweep_request(seed=1).id
-            connection.execute(sa.update(jobs).where(which).values(finished_at=NOW - timedelta(days=31), request="x" * 5_000_000))
+            connection.execute(
+                sa.update(jobs)
+                .where(which)
+                .values(finished_at=NOW - timedelta(days=31), request="x" * 5_000_000)
+            )
         assert opened.remove_old(NOW) == 1
-        assert {job.id for job in opened.newest()} == {sweep_request(seed=seed).id for seed in (2, 3)}
+        assert {job.id for job in opened.newest()} == {
+            sweep_request(seed=seed).id for seed in (2, 3)
+        }
         assert not (opened.folder / sweep_request(seed=1).id).exists()
         assert opened.chunk_path(sweep_request(seed=3).id, 0).exists()
         if path.exists():
@@ -587,7 +692,12 @@ def test_old_jobs_and_idempotency_keys_go_with_their_room(store: Settings) -> No
     with closing(Jobs(changed(store, retain_jobs_days=0, retain_idempotency_days=0))) as opened:
         assert opened.remove_old(NOW + timedelta(days=10_000)) == 0
         with opened._engine.connect() as connection:
-            assert connection.execute(sa.select(sa.func.count()).select_from(idempotency_keys)).scalar_one() == 1
+            assert (
+                connection.execute(
+                    sa.select(sa.func.count()).select_from(idempotency_keys)
+                ).scalar_one()
+                == 1
+            )
 
 
 # Fair shares
@@ -657,12 +767,20 @@ def test_one_caller_with_many_requests_does_not_keep_another_waiting(
 
     def endless(i: int) -> None:
         with suppress(httpx2.HTTPError):
-            codes.append(ask("ada", "POST", "/v1/trajectories", {**ENDLESS, "times": [0, 1e7 + i], "budget_s": 30}).status_code)
+            codes.append(
+                ask(
+                    "ada",
+                    "POST",
+                    "/v1/trajectories",
+                    {**ENDLESS, "times": [0, 1e7 + i], "budget_s": 30},
+                ).status_code
+            )
 
     flood = [threading.Thread(target=endless, args=(i,), daemon=True) for i in range(30)]
     for thread in flood:
         thread.start()
-    wait_until(lambda: codes.count(503) >= 10)  # of 30 one is at work, 16 wait, and the others are refused
+    # of 30 one is at work, 16 wait, and the others are refused
+    wait_until(lambda: codes.count(503) >= 10)
     began = time.monotonic()
     assert ask("emmy", "POST", "/v1/tori", {"problem": GOOD["problem"]}).status_code == 200
     assert time.monotonic() - began < 30
@@ -671,7 +789,9 @@ def test_one_caller_with_many_requests_does_not_keep_another_waiting(
         assert ask("admin", "GET", "/metrics").status_code == 200
 
 
-def test_the_first_sweep_of_an_owner_does_not_wait_for_those_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_sweep_of_an_owner_does_not_wait_for_those_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     began: list[str] = []
 
     async def endless(self: Sweeps, job_id: str) -> None:
@@ -707,7 +827,9 @@ def test_the_first_sweep_of_an_owner_does_not_wait_for_those_of_others(tmp_path:
 def serve(folder: Path) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder)}
     command = [sys.executable, "-m", "veselova", "serve", "--port", "0"]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    return subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=PATIENCE
+    )
 
 
 @pytest.mark.parametrize("kind", ["others write", "group writes", "not ours"])
@@ -723,7 +845,9 @@ def test_a_folder_that_others_may_write_or_own_is_refused(kind: str, tmp_path: P
     served, listed = serve(folder), keys(tmp_path, "list")
     for answer in (served, listed):
         assert answer.returncode == 2
-        assert answer.stderr.startswith("veselova: VESELOVA_DATA_DIR: required a folder of state that this account owns")
+        assert answer.stderr.startswith(
+            "veselova: VESELOVA_DATA_DIR: required a folder of state that this account owns"
+        )
         assert answer.stderr.count("\n") == 1
     assert ("account 12345" if kind == "not ours" else "chmod go-w") in served.stderr
     assert list(folder.iterdir()) == []
@@ -769,7 +893,9 @@ def test_what_another_made_in_its_place_is_refused(
         connect(Settings(data_dir=homeless))
 
 
-def test_a_spool_of_another_account_is_not_cleared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_spool_of_another_account_is_not_cleared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "veselova-spool-x").mkdir()
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "veselova-spool-y").symlink_to(tmp_path / "elsewhere")
@@ -791,7 +917,9 @@ def test_what_is_kept_is_readable_by_this_account_alone(tmp_path: Path) -> None:
         with closing(Jobs(Settings(data_dir=tmp_path / "data"))) as opened:
             job = opened.submit(sweep_request())
             opened.store(job.id, 0, 15, b"a table")
-            modes = {path.name: path.stat().st_mode & 0o777 for path in (tmp_path / "data").rglob("*")}
+            modes = {
+                path.name: path.stat().st_mode & 0o777 for path in (tmp_path / "data").rglob("*")
+            }
     finally:
         os.umask(before)
     assert {modes[f"veselova.db{end}"] for end in ("", "-wal", "-shm")} == {0o600}
@@ -846,6 +974,8 @@ def test_what_a_database_cannot_hold_is_no_outage(store: Settings) -> None:
             known.list()
 
 
-def test_ids_that_no_job_has_are_absent(guarded: Server, ask: Callable[..., httpx2.Response]) -> None:
+def test_ids_that_no_job_has_are_absent(
+    guarded: Server, ask: Callable[..., httpx2.Response]
+) -> None:
     for job_id in ("%00", "%ED%A0%80", "x" * 500, "%27"):
         is_problem(ask("ada", "GET", f"/v1/jobs/{job_id}"), 404, "no-such-job")

@@ -1,4 +1,6 @@
-"""Separable potentials in closed form: the family (3.5) on T SO(3), against integration and exact identities."""
+"""Separable potentials in closed form: the family (3.5) on T SO(3), against integration and exact
+identities.
+"""
 
 from __future__ import annotations
 
@@ -61,14 +63,22 @@ def test_tensors_equal_moments_and_special_starts_are_served(rng: Generator) -> 
     tensor = [[1, 0.1, 0.05], [0.1, 1.5, 0.2], [0.05, 0.2, 0.7]]
     agreement(VeselovaSO3(tensor, gamma, across, {"clebsch": 0.5}))
     agreement(VeselovaSO3([1, 1, 2], gamma, across, {"clebsch": 0.5}))
-    agreement(VeselovaSO3([2, "1/2", 1], gamma, [0, 0, 0], {"clebsch": 0.5}))  # starts at rest: every coordinate turns
-    agreement(VeselovaSO3([0.5, 1, 2], [1, 0, 0], [0, 0.3, 0.5], {"clebsch": 0.5}))  # through an axis
-    agreement(VeselovaSO3([0.5, 1, 2], gamma, across, {"family": [0, 0, 1e-6, 0, 0]}))  # a wall that is nearly reached
+    # starts at rest: every coordinate turns
+    agreement(VeselovaSO3([2, "1/2", 1], gamma, [0, 0, 0], {"clebsch": 0.5}))
+    # through an axis
+    agreement(VeselovaSO3([0.5, 1, 2], [1, 0, 0], [0, 0.3, 0.5], {"clebsch": 0.5}))
+    # a wall that is nearly reached
+    agreement(VeselovaSO3([0.5, 1, 2], gamma, across, {"family": [0, 0, 1e-6, 0, 0]}))
 
 
 @pytest.mark.slow
 def test_far_away_the_closed_form_keeps_its_digits(rng: Generator) -> None:
-    problem = VeselovaSO3([0.5, 1, 2], [0.6, 0.48, 0.64], np.cross([0.6, 0.48, 0.64], [0.1, 0.5, 0.2]), POTENTIALS["all"])
+    problem = VeselovaSO3(
+        [0.5, 1, 2],
+        [0.6, 0.48, 0.64],
+        np.cross([0.6, 0.48, 0.64], [0.1, 0.5, 0.2]),
+        POTENTIALS["all"],
+    )
     closed = agreement(problem, np.array([1000.0, 3000.0]))
     assert closed.provenance.details["time_map"] == "fourier"
     assert np.max(closed.error) < 1e-9
@@ -90,7 +100,9 @@ def test_a_thin_wall_turns_the_frame_within_a_millionth_of_a_cycle() -> None:
     """The rate of that turning is not known to more digits than the phases, and its integral is."""
     gamma = [0.7340915110161714, -0.17903651732263912, 0.6550233422703153]
     Omega = [-0.21550164995208362, 2.9910045927283826, 1.059041613713418]
-    body = VeselovaSO3([4, 5, 3], gamma, Omega, {"family": [0.664, 0, "3.45e-10", "0.0407", 0]}, normalize=True)
+    body = VeselovaSO3(
+        [4, 5, 3], gamma, Omega, {"family": [0.664, 0, "3.45e-10", "0.0407", 0]}, normalize=True
+    )
     agreement(body, [-0.01, 0.0, 0.03])
 
 
@@ -103,14 +115,30 @@ ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
         ({"Omega": [0.3, 0.1, 0.2]}, "not-separable"),
         ({"potential": {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0]}]}}, "not-separable"),
         ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),
-        ({"gamma": [0.6, 1e-30, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}}, "separatrix"),
+        (
+            {"gamma": [0.6, 1e-30, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}},
+            "separatrix",
+        ),
         # from q_2 = 0 towards a plane that attracts
-        ({"inertia": [1.2, 0.8, 0.4], "gamma": [0.6, 0, -0.8], "Omega": [0.4, 0.1, 0.3], "potential": ATTRACTING}, "collision"),
+        (
+            {
+                "inertia": [1.2, 0.8, 0.4],
+                "gamma": [0.6, 0, -0.8],
+                "Omega": [0.4, 0.1, 0.3],
+                "potential": ATTRACTING,
+            },
+            "collision",
+        ),
     ],
 )
 def test_what_has_no_closed_form_is_a_named_outcome(fields: dict[str, Any], outcome: str) -> None:
     gamma = np.array([0.6, 0.48, 0.64])
-    data = {"inertia": [0.5, 1, 2], "gamma": gamma, "Omega": np.cross(gamma, [0.1, 0.5, 0.2]), **fields}
+    data = {
+        "inertia": [0.5, 1, 2],
+        "gamma": gamma,
+        "Omega": np.cross(gamma, [0.1, 0.5, 0.2]),
+        **fields,
+    }
     with pytest.raises(Unsolved) as caught:
         solve(VeselovaSO3(**data), TIMES, "analytic")
     assert caught.value.outcome == outcome
@@ -131,8 +159,12 @@ def test_methods_and_digits_that_it_has_not_are_refused(rng: Generator) -> None:
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
-    """Position and velocity at the start, orthogonal coordinate lines, and q' as a difference along the torus."""
-    inverse = tuple(sorted(Fraction(int(x), 1000) for x in rng.choice(np.arange(300, 2000), n, replace=False)))
+    """Position and velocity at the start, orthogonal coordinate lines, and q' as a difference along
+    the torus.
+    """
+    inverse = tuple(
+        sorted(Fraction(int(x), 1000) for x in rng.choice(np.arange(300, 2000), n, replace=False))
+    )
     q = [Fraction(int(x), 1000) for x in rng.integers(200, 900, n)]
     v = [Fraction(int(x), 1000) for x in rng.integers(-900, 900, n)]
     along = sum(a * b for a, b in zip(q, v, strict=True)) / sum(a * a for a in q)
@@ -147,7 +179,11 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     frame = np.column_stack([at.q[0], at.normals[0]])
     assert np.allclose(frame.T @ frame, np.eye(n), atol=1e-12)
     rate = SeparatedRate(motion.inversion).at(motion.angles[None])[0]
-    assert np.allclose(at.normals[0] @ at.components[0] / rate, np.array([float(x) for x in v]) / length, atol=1e-12)
+    assert np.allclose(
+        at.normals[0] @ at.components[0] / rate,
+        np.array([float(x) for x in v]) / length,
+        atol=1e-12,
+    )
     # dq/dτ along the linear flow on the torus is q' itself: the whole inversion at once.
     origin, step = motion.inversion.map(motion.angles[None])[0], 1e-5
     z = origin + np.array([[0.7 - step], [0.7], [0.7 + step]]) * motion.periods.frequencies
@@ -166,9 +202,18 @@ PARTS: list[Any] = [
 
 
 def point(rng: Generator, n: int, parts: Any) -> SeparableVeselova:
-    q, walls = rng.uniform(0.3, 1, n), {"walls": rng.uniform(0.005, 0.02, n), "one": [0.01] + [0] * (n - 1)}
-    potential = None if parts is None else {name: walls.get(str(value), value) for name, value in parts.items()}
-    return SeparableVeselova(rng.uniform(0.6, 2.5, n), q, 0.6 * rng.normal(size=n), potential, normalize=True)
+    q, walls = (
+        rng.uniform(0.3, 1, n),
+        {"walls": rng.uniform(0.005, 0.02, n), "one": [0.01] + [0] * (n - 1)},
+    )
+    potential = (
+        None
+        if parts is None
+        else {name: walls.get(str(value), value) for name, value in parts.items()}
+    )
+    return SeparableVeselova(
+        rng.uniform(0.6, 2.5, n), q, 0.6 * rng.normal(size=n), potential, normalize=True
+    )
 
 
 def in_dimensions(count: int) -> list[Any]:
@@ -178,7 +223,9 @@ def in_dimensions(count: int) -> list[Any]:
 
 
 @pytest.mark.parametrize(("n", "part"), in_dimensions(len(PARTS)))
-def test_points_in_separable_potentials_are_served_in_any_dimension(n: int, part: int, rng: Generator) -> None:
+def test_points_in_separable_potentials_are_served_in_any_dimension(
+    n: int, part: int, rng: Generator
+) -> None:
     problem = point(rng, n, PARTS[part])
     closed, found = solve(problem, TIMES / 2), solve(problem, TIMES / 2, "numeric", "taylor")
     assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
@@ -189,7 +236,9 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(n: int, part
 
 @pytest.mark.parametrize("A", [(20, 1), (3, 1), (20, 3, 1), slow((300, 20, 3, 1))])
 @pytest.mark.parametrize("part", range(len(PARTS)))
-def test_far_points_of_wide_bodies_agree_with_integration(part: int, A: tuple[float, ...], rng: Generator) -> None:
+def test_far_points_of_wide_bodies_agree_with_integration(
+    part: int, A: tuple[float, ...], rng: Generator
+) -> None:
     """The form of n = 2 may be constant along its cut, while dt/dτ turns sharply there."""
     start = point(rng, len(A), PARTS[part])
     velocity = start.q_dot / np.linalg.norm(start.q_dot)
@@ -202,7 +251,10 @@ def test_far_points_of_wide_bodies_agree_with_integration(part: int, A: tuple[fl
 
 @pytest.mark.parametrize("n", [3, *map(slow, (2, 4, 5, 6))])
 def test_integrated_points_keep_their_integrals(n: int, rng: Generator) -> None:
-    assert max(solve(point(rng, n, PARTS[4]), np.linspace(0, 100, 11), "numeric").drift.values()) < 1e-11
+    assert (
+        max(solve(point(rng, n, PARTS[4]), np.linspace(0, 100, 11), "numeric").drift.values())
+        < 1e-11
+    )
 
 
 def test_without_a_potential_points_are_the_rank_one_problem(rng: Generator) -> None:
@@ -217,7 +269,11 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
     inertia = np.diag(body.inertia)
     # A = 𝓘⁻¹ has the inertia A_iA_j/det A = 𝓘_k, so that both count the same energy.
     problem = SeparableVeselova(
-        1 / inertia, body.gamma, velocity, {"quartic": -0.2, "quadratic": 0.5, "centrifugal": betas}, normalize=True
+        1 / inertia,
+        body.gamma,
+        velocity,
+        {"quartic": -0.2, "quadratic": 0.5, "centrifugal": betas},
+        normalize=True,
     )
     ours, theirs = solve(problem, TIMES), solve(body, TIMES, "analytic")
     assert np.all(np.abs(ours.q - theirs.gamma) <= (ours.error + theirs.error)[:, None])
@@ -231,13 +287,24 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
         ({"potential": {"cubic": 1}}, "potential"),
         ({"potential": {"quartic": "x"}}, "potential.quartic"),
         ({"potential": {"centrifugal": [1, 2]}}, "potential.centrifugal"),
-        ({"potential": {"centrifugal": [0, 1, 0]}, "q": [0.6, 0, 0.8], "q_dot": [0, 1, 0]}, "potential.centrifugal[1]"),
+        (
+            {"potential": {"centrifugal": [0, 1, 0]}, "q": [0.6, 0, 0.8], "q_dot": [0, 1, 0]},
+            "potential.centrifugal[1]",
+        ),
         ({"q_dot": [1, 0, 0]}, "q_dot"),
     ],
 )
 def test_bad_points_are_refused_by_field(change: dict[str, Any], path: str) -> None:
     with pytest.raises(InvalidInput) as caught:
-        SeparableVeselova(**{"A": [1, 2, 3], "q": [0.6, 0.8, 0], "q_dot": [0, 0, 1], "potential": {"quartic": 1}, **change})
+        SeparableVeselova(
+            **{
+                "A": [1, 2, 3],
+                "q": [0.6, 0.8, 0],
+                "q_dot": [0, 0, 1],
+                "potential": {"quartic": 1},
+                **change,
+            }
+        )
     assert caught.value.field == path
 
 
@@ -248,11 +315,18 @@ def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
 
 @pytest.mark.parametrize("distance", ["1e-18", "1e-25", "1e-34", "1e-60", "1e-110", "1e-300"])
 @pytest.mark.parametrize(("sign", "velocity"), [("", 1), ("", -1), ("-", 1), ("-", -1)])
-def test_a_start_next_to_a_plane_goes_where_its_velocity_says(sign: str, velocity: int, distance: str) -> None:
+def test_a_start_next_to_a_plane_goes_where_its_velocity_says(
+    sign: str, velocity: int, distance: str
+) -> None:
     """λ_s is I_i there to all its digits, so that the sign of q_i says nothing."""
     q = ["0.6", sign + distance, "0.8"]
     for A in ([3, 2, 1], [2, 3, 1], [2, 1, 3]):  # the plane at every place
-        served(SeparableVeselova(A, q, ["0.8", velocity, "-0.6"], {"quadratic": "0.3"}, normalize=True), [0.0, 5.0])
+        served(
+            SeparableVeselova(
+                A, q, ["0.8", velocity, "-0.6"], {"quadratic": "0.3"}, normalize=True
+            ),
+            [0.0, 5.0],
+        )
 
 
 IN_PLANES: list[Any] = [
@@ -261,7 +335,12 @@ IN_PLANES: list[Any] = [
     ([3, 2, 1], [0.6, 0.8, 0], [0.8, -0.6, 0], {"quadratic": 0.3, "quartic": -0.3}),
     ([3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6], None),  # across which motions are unstable
     ([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0], {"quadratic": 0.3, "centrifugal": [0.1, 0, 0.2]}),
-    ([7, 3, 2, 1, 5], [0.6, 0, 0.8, 0, 0], [0.8, 0, -0.6, 0, 0], {"quadratic": 0.3, "quartic": 0.2}),
+    (
+        [7, 3, 2, 1, 5],
+        [0.6, 0, 0.8, 0, 0],
+        [0.8, 0, -0.6, 0, 0],
+        {"quadratic": 0.3, "quartic": 0.2},
+    ),
     ([7, 3, 2, 1], [0.6, 0, 0, 0.8], [0, 0, 0.5, 0], {"quadratic": "1/3"}),
     ([3, 2, 1], [1e-70, 0.6, 0.8], [-1e-60, 0.8, -0.6], None),  # as good as in the plane
     ([3, 2, 1], [0.6, 0.8, 1e-72], [0.8, -0.6, 0], {"quadratic": 0.3}),
@@ -280,9 +359,19 @@ def test_motions_in_coordinate_planes_are_served(data: Any) -> None:
         ([1, 2, 3], [0, 0.6, 0.8], [1, 0, 0], None),
         ([1, 2, 3], [0.8, 0, -0.6], [0, 0.7, 0], {"family": [0.3, 0.2, 0.1, 0, 0]}),
         # equal moments: differences of I's and turning points that no double of theirs has
-        ([2, "2/5", "2/5"], [0.48, -0.6, 0.64], [0.6, 1.12, 0.6], {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]}),
+        (
+            [2, "2/5", "2/5"],
+            [0.48, -0.6, 0.64],
+            [0.6, 1.12, 0.6],
+            {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]},
+        ),
         ([0.5, 0.5, 0.4], [1, 0, 0], [0, 0.02, 0.9], {"family": [0.3, 0, 0.1, 0, 0]}),
-        ([4, 4, 4], [1, 0, 1e-20], [0, -1e-18, 0.8], {"clebsch": -0.5, "family": [-0.3, 0, 0.1, 0, 0]}),
+        (
+            [4, 4, 4],
+            [1, 0, 1e-20],
+            [0, -1e-18, 0.8],
+            {"clebsch": -0.5, "family": [-0.3, 0, 0.1, 0, 0]},
+        ),
         ([1, 1, 2], [1e-6, 0.6, 0.8], [0, 0.8, -0.6], {"clebsch": 0.5}),
     ],
 )
@@ -293,7 +382,9 @@ def test_bodies_in_coordinate_planes_and_with_equal_moments_are_served(data: Any
 def test_a_start_that_leaves_a_plane_too_slowly_is_a_separatrix() -> None:
     for problem in (
         SeparableVeselova([3, 2, 1], [0.6, 1e-72, 0.8], [0.8, 0, -0.6], normalize=True),
-        SeparableVeselova([3, 2, 1], [0.6, 0, 0.8], [0.8, "1e-150", -0.6], {"quadratic": 0.3}, normalize=True),
+        SeparableVeselova(
+            [3, 2, 1], [0.6, 0, 0.8], [0.8, "1e-150", -0.6], {"quadratic": 0.3}, normalize=True
+        ),
     ):
         with pytest.raises(Unsolved, match="separatrix"):
             solve(problem, [1.0])
@@ -310,13 +401,21 @@ def test_motions_below_the_range_of_a_float_are_a_named_outcome() -> None:
 def test_motions_whose_squares_are_no_floats_are_integrated(speed: str) -> None:
     """Without a potential the motion depends on speed times time alone."""
     slow_one, one = (SeparableVeselova([3, 2, 1], ["0.6", "0.8", 0], [0, 0, v]) for v in (speed, 1))
-    found, expected = (solve(p, [t], "numeric") for p, t in ((slow_one, 1e-5 / float(speed)), (one, 1e-5)))
+    found, expected = (
+        solve(p, [t], "numeric") for p, t in ((slow_one, 1e-5 / float(speed)), (one, 1e-5))
+    )
     assert np.max(np.abs(found.q - expected.q)) <= found.error[0] + expected.error[0]
-    assert np.allclose(found.q_dot, expected.q_dot * float(speed), rtol=1e-9, atol=1e-9 * float(speed))
+    assert np.allclose(
+        found.q_dot, expected.q_dot * float(speed), rtol=1e-9, atol=1e-9 * float(speed)
+    )
 
 
-def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two A's share ten digits and the cuts all but touch: angles lie in a bent valley 1e-6 wide."""
+def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two A's share ten digits and the cuts all but touch: angles lie in a bent
+    valley 1e-6 wide.
+    """
     tried: list[int] = []
     settled = AbelJacobi._iterate_newton
 
@@ -325,13 +424,20 @@ def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(monkeypatch: pyte
         return settled(self, psi, z)
 
     monkeypatch.setattr(AbelJacobi, "_settled", counted)
-    A, q = ["1.0638356722869833", "1.7260509725242217", "1.7260509724665165"], ["1.5432042772351", "0.34605385", "0.0802813117"]
-    served(SeparableVeselova(A, q, ["1.1121", 0, 0], normalize=True), [-50.0, -0.01, 0.0, 0.03, 50.0])
+    A, q = (
+        ["1.0638356722869833", "1.7260509725242217", "1.7260509724665165"],
+        ["1.5432042772351", "0.34605385", "0.0802813117"],
+    )
+    served(
+        SeparableVeselova(A, q, ["1.1121", 0, 0], normalize=True), [-50.0, -0.01, 0.0, 0.03, 50.0]
+    )
     assert 0 < len(tried) < 2000  # 40 a point; along tangents more than ten thousand a point
 
 
 def test_attracting_planes_end_a_motion_by_name() -> None:
-    problem = SeparableVeselova([1, 2, 3], [0.6, 0.48, 0.64], [0, 0.64, -0.48], {"centrifugal": [-0.1, 0, 0]})
+    problem = SeparableVeselova(
+        [1, 2, 3], [0.6, 0.48, 0.64], [0, 0.64, -0.48], {"centrifugal": [-0.1, 0, 0]}
+    )
     for options in ({}, {"engine": "numeric"}, {"engine": "numeric", "method": "taylor"}):
         with pytest.raises(Unsolved, match="collision"):
             solve(problem, [0.0, 50.0], **options)  # type: ignore[arg-type]
@@ -341,7 +447,9 @@ def test_the_point_and_the_body_run_into_a_plane_at_the_same_time() -> None:
     gamma = np.array([0.6, 0.48, 0.64])
     Omega = np.cross(gamma, [0.1, 0.5, 0.2])
     body = VeselovaSO3([0.5, 1, 2], gamma, Omega, {"family": [0, 0, -0.1, 0, 0]})
-    q = SeparableVeselova([2, 1, 0.5], gamma, np.cross(gamma, Omega), {"centrifugal": [-0.1, 0, 0]}, normalize=True)
+    q = SeparableVeselova(
+        [2, 1, 0.5], gamma, np.cross(gamma, Omega), {"centrifugal": [-0.1, 0, 0]}, normalize=True
+    )
     for problem in (body, q):
         for method in ("dop853", "taylor"):
             with pytest.raises(Unsolved, match=r"collision: .*\[0\] = 0 at about t = 1\.394818,"):
@@ -349,8 +457,12 @@ def test_the_point_and_the_body_run_into_a_plane_at_the_same_time() -> None:
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(n: int, rng: Generator) -> None:
-    """Without potential the same motion has digits that theta functions know: the error of far times holds against them."""
+def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(
+    n: int, rng: Generator
+) -> None:
+    """Without potential the same motion has digits that theta functions know: the error of far
+    times holds against them.
+    """
     A, q, v = np.linspace(0.7, 2.1, n) ** 1.1, rng.uniform(0.4, 1.0, n), rng.normal(size=n)
     times = [1e5, 1e7, 1e9]
     found = solve(SeparableVeselova(A, q, v, normalize=True), times)
@@ -368,14 +480,19 @@ def test_only_panels_limit_the_times_of_a_separable_motion() -> None:
     assert found.drift["energy"] < 1e-13
     with pytest.raises(Unsolved, match="no-digit-left"):
         solve(problem, [1e15])
-    body = VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6], {"clebsch": 0.4})  # whose frame turns by an integral in panels
+    # whose frame turns by an integral in panels
+    body = VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6], {"clebsch": 0.4})
     with pytest.raises(Unsolved, match=r"too-far: .* panels along the orbit"):
         solve(body, [1e7])
 
 
 def test_the_mean_of_a_turning_weighs_panels_by_their_length() -> None:
-    """Beside a pole panels of 1e-5 hold 5000 times the mean; counted like others they would make it 600 times too large."""
-    motion = BodyMotion(drawn(np.random.default_rng([20240517, 0]), POTENTIALS["clebsch-attracting"]))
+    """Beside a pole panels of 1e-5 hold 5000 times the mean; counted like others they would make it
+    600 times too large.
+    """
+    motion = BodyMotion(
+        drawn(np.random.default_rng([20240517, 0]), POTENTIALS["clebsch-attracting"])
+    )
     orbit = motion._orbit
 
     def turning(z: Any) -> Any:

@@ -48,7 +48,9 @@ def spheroconic_rates(A: Any, q: Any, v: Any) -> Any:
 
 def products(lam: Any) -> Any:
     """Π_{s≠k}(λ_k−λ_s)."""
-    return np.array([np.prod([x - y for j, y in enumerate(lam) if j != k]) for k, x in enumerate(lam)])
+    return np.array(
+        [np.prod([x - y for j, y in enumerate(lam) if j != k]) for k, x in enumerate(lam)]
+    )
 
 
 @pytest.mark.parametrize("n", range(2, 7))
@@ -57,16 +59,22 @@ def test_the_potential_is_the_staeckel_sum(n: int, rng: np.random.Generator) -> 
     (A, q, _), V = random_state(rng, n), random_potential(rng, n, n + 2)
     lam, I = to_spheroconic(A, q), 1 / A
     slopes = np.array([np.prod(I[i] - np.delete(I, i)) for i in range(n)])
-    v = [polynomial.polyval(x, V.polynomial) - np.sum(V.centrifugal * slopes / (x - I)) for x in lam]
+    v = [
+        polynomial.polyval(x, V.polynomial) - np.sum(V.centrifugal * slopes / (x - I)) for x in lam
+    ]
     assert np.isclose(V.value(A, q), np.sum(np.array(v) / products(lam)), rtol=1e-9)
 
 
 @pytest.mark.parametrize("n", range(3, 7))
-def test_the_first_of_the_hierarchy_is_clebsch_and_all_are_polynomials_in_the_moments(n: int, rng: np.random.Generator) -> None:
+def test_the_first_of_the_hierarchy_is_clebsch_and_all_are_polynomials_in_the_moments(
+    n: int, rng: np.random.Generator
+) -> None:
     A, q, _ = random_state(rng, n)
     a, b = (float(np.sum(q * q / A**j)) for j in (1, 2))
     s1, s2 = np.sum(1 / A), (np.sum(1 / A) ** 2 - np.sum(1 / A**2)) / 2
-    first, second = (SeparablePotential(np.eye(n + 1)[m], np.zeros(n)).value(A, q) for m in (n - 1, n))
+    first, second = (
+        SeparablePotential(np.eye(n + 1)[m], np.zeros(n)).value(A, q) for m in (n - 1, n)
+    )
     assert np.isclose(first, s1 - a, rtol=1e-12)
     assert np.isclose(second, a * a - b - s1 * a + s1 * s1 - s2, rtol=1e-12)
     assert np.isclose(SeparablePotential(np.eye(n + 1)[n - 2], np.zeros(n)).value(A, q), 1.0)
@@ -80,11 +88,15 @@ def test_the_family_3_5_is_separable(name: str, rng: np.random.Generator) -> Non
         q = rng.uniform(0.3, 1, 3)
         q /= np.linalg.norm(q)
         problem = VeselovaSO3(MOMENTS, q, [0, 0, 0], {"family": ALPHAS[name]}, normalize=True)
-        assert np.isclose(V.value(1 / MOMENTS, q), problem.potential.terms.value(q), rtol=1e-12, atol=1e-14)
+        assert np.isclose(
+            V.value(1 / MOMENTS, q), problem.potential.terms.value(q), rtol=1e-12, atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("n", range(2, 7))
-def test_the_constants_solve_the_separated_equations_at_every_state(n: int, rng: np.random.Generator) -> None:
+def test_the_constants_solve_the_separated_equations_at_every_state(
+    n: int, rng: np.random.Generator
+) -> None:
     """λ_k'² Π² = 4R(λ_k) with C of degree n−2 and leading coefficient the energy, T + V."""
     for _ in range(5):
         (A, q, v), V = random_state(rng, n), random_potential(rng, n, n + 1)
@@ -94,23 +106,34 @@ def test_the_constants_solve_the_separated_equations_at_every_state(n: int, rng:
         R, lam = separation.separation_polynomial(A, C, V), to_spheroconic(A, q)
         rates = spheroconic_rates(A, q, v) / np.sqrt(np.prod(A) / (q @ (A * q)))
         values = polynomial.polyval(lam, R)
-        assert np.allclose((rates * products(lam)) ** 2, 4 * values, rtol=1e-8, atol=1e-9 * np.max(np.abs(R)))
+        assert np.allclose(
+            (rates * products(lam)) ** 2, 4 * values, rtol=1e-8, atol=1e-9 * np.max(np.abs(R))
+        )
 
 
 @pytest.mark.parametrize("n", range(3, 7))
-def test_without_potential_the_polynomial_is_that_of_the_paper(n: int, rng: np.random.Generator) -> None:
+def test_without_potential_the_polynomial_is_that_of_the_paper(
+    n: int, rng: np.random.Generator
+) -> None:
     """R = 2h·(Rad): zeros 0, I_i and c_2 … c_{n−1}."""
     problem = random_problem(rng, n, 4.0)
     nothing = SeparablePotential(np.zeros(1), np.zeros(n))
     C = separation.separation_constants(problem.A, problem.q, problem.q_dot, nothing)
     R = separation.separation_polynomial(problem.A, C, nothing)
-    printed = -2 * problem.energy * polynomial.polyfromroots([0.0, *(1 / problem.A), *problem.constants])
+    printed = (
+        -2 * problem.energy * polynomial.polyfromroots([0.0, *(1 / problem.A), *problem.constants])
+    )
     assert len(R) == 2 * n
     assert np.allclose(R, printed, rtol=1e-9, atol=1e-11 * np.max(np.abs(printed)))
 
 
-@pytest.mark.parametrize(("name", "degree"), [("none", 5), ("centrifugal", 5), ("clebsch", 6), ("quartic", 7), ("all", 7)])
-def test_along_motions_in_the_family_the_quadratures_hold(name: str, degree: int, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(
+    ("name", "degree"),
+    [("none", 5), ("centrifugal", 5), ("clebsch", 6), ("quartic", 7), ("all", 7)],
+)
+def test_along_motions_in_the_family_the_quadratures_hold(
+    name: str, degree: int, rng: np.random.Generator
+) -> None:
     A, V = 1 / MOMENTS, separation.separated_family(1 / MOMENTS, ALPHAS[name])
     q = np.array([0.5, -0.6, 0.7]) / np.linalg.norm([0.5, -0.6, 0.7])
     problem = VeselovaSO3(MOMENTS, q, np.cross(q, rng.normal(size=3)), {"family": ALPHAS[name]})
@@ -136,12 +159,16 @@ def test_along_motions_in_the_family_the_quadratures_hold(name: str, degree: int
 
 
 @pytest.mark.parametrize("name", ["clebsch", "quartic", "centrifugal", "all"])
-def test_coordinates_reach_their_turning_points_and_no_farther(name: str, rng: np.random.Generator) -> None:
+def test_coordinates_reach_their_turning_points_and_no_farther(
+    name: str, rng: np.random.Generator
+) -> None:
     A, V = 1 / MOMENTS, separation.separated_family(1 / MOMENTS, ALPHAS[name])
     q = np.array([0.5, -0.6, 0.7]) / np.linalg.norm([0.5, -0.6, 0.7])
     problem = VeselovaSO3(MOMENTS, q, np.cross(q, rng.normal(size=3)), {"family": ALPHAS[name]})
     motion = solve(problem, np.linspace(0, 40, 3001), "numeric", "taylor")
-    R = separation.separation_polynomial(A, separation.separation_constants(A, q, np.cross(q, problem.Omega), V), V)
+    R = separation.separation_polynomial(
+        A, separation.separation_constants(A, q, np.cross(q, problem.Omega), V), V
+    )
     lam = to_spheroconic(A, motion.gamma)
     ends = separation.turning_points(A, R, lam[0])
     assert np.all(ends[:, 0] - 1e-10 <= np.min(lam, axis=0))
@@ -152,14 +179,20 @@ def test_coordinates_reach_their_turning_points_and_no_farther(name: str, rng: n
 
 def test_a_body_released_from_rest_has_constants() -> None:
     for start in ([0.6, 0, 0.8], [0.6, 0.48, 0.64]):
-        found = solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0], {"quadratic": 1}), [0, 1], "numeric")
+        found = solve(
+            SeparableVeselova([3, 2, 1], start, [0, 0, 0], {"quadratic": 1}), [0, 1], "numeric"
+        )
         assert max(found.drift.values()) < 1e-11
-    assert not solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0]), [1]).integrals["constants"].any()
+    assert (
+        not solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0]), [1]).integrals["constants"].any()
+    )
 
 
 @pytest.mark.parametrize("n", [3, slow(4), slow(5)])
 def test_constants_are_kept_in_any_dimension(n: int, rng: np.random.Generator) -> None:
-    """Hamilton's equations in τ, H* = ½(A⁻¹p,p) + V on T*Sⁿ⁻¹, with V's gradient by complex steps."""
+    """Hamilton's equations in τ, H* = ½(A⁻¹p,p) + V on T*Sⁿ⁻¹, with V's gradient by
+    complex steps.
+    """
     (A, q, v), V = random_state(rng, n), random_potential(rng, n, n + 1)
     v, det = v / np.sqrt(2 * integrals.energy(A, q, v)), np.prod(A)
 
@@ -167,17 +200,29 @@ def test_constants_are_kept_in_any_dimension(n: int, rng: np.random.Generator) -
         x, p = y[:n], y[n:]
         slope = np.array([np.imag(V.value(A, x + 1e-100j * e)) / 1e-100 for e in np.eye(n)])
         along = p @ (x / A)
-        return np.concatenate([p / A - along * x, along * p - (p @ (p / A)) * x - slope + (slope @ x) * x])
+        return np.concatenate(
+            [p / A - along * x, along * p - (p @ (p / A)) * x - slope + (slope @ x) * x]
+        )
 
     # Momentum of a given velocity: A⁻¹p − (p,A⁻¹q)q = dq/dτ with (p,q) = 0.
     p = A * v / np.sqrt(det / (q @ (A * q)))
     p = p - (p @ q) / (q @ (A * q)) * A * q
-    answer = solve_ivp(field, (0, 0.7), np.concatenate([q, p]), method="DOP853", rtol=1e-13, atol=1e-14, max_step=0.1)
+    answer = solve_ivp(
+        field,
+        (0, 0.7),
+        np.concatenate([q, p]),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-14,
+        max_step=0.1,
+    )
     constants = []
     for y in answer.y.T[::5]:
         x = y[:n] / np.linalg.norm(y[:n])
         x_tau = field(0.0, y)[:n]
-        constants.append(separation.separation_constants(A, x, x_tau * np.sqrt(det / (x @ (A * x))), V))
+        constants.append(
+            separation.separation_constants(A, x, x_tau * np.sqrt(det / (x @ (A * x))), V)
+        )
     change = np.max(np.abs(np.array(constants) - constants[0]))
     assert np.max(np.abs(answer.y[:n, -1] - q)) > 0.1
     assert change < 1e-10 * np.max(np.abs(constants[0]))
@@ -189,8 +234,12 @@ def test_a_centrifugal_term_bars_the_plane_and_an_attracting_one_opens_it() -> N
     for alpha in (0.1, 0.0, -0.1):
         alphas = [0, 0.1, alpha, 0, 0]
         V = separation.separated_family(A, alphas)
-        R = separation.separation_polynomial(A, separation.separation_constants(A, q, np.cross(q, Omega), V), V)
-        expected = -2 * MOMENTS[0] * alpha * ((MOMENTS[0] - MOMENTS[1]) * (MOMENTS[0] - MOMENTS[2])) ** 2
+        R = separation.separation_polynomial(
+            A, separation.separation_constants(A, q, np.cross(q, Omega), V), V
+        )
+        expected = (
+            -2 * MOMENTS[0] * alpha * ((MOMENTS[0] - MOMENTS[1]) * (MOMENTS[0] - MOMENTS[2])) ** 2
+        )
         assert np.isclose(polynomial.polyval(MOMENTS[0], R), expected, atol=1e-13)
         low = separation.turning_points(A, R, lam)[0, 0]
         assert (low > MOMENTS[0] + 1e-3) if alpha > 0 else np.isclose(low, MOMENTS[0], atol=1e-12)
@@ -207,6 +256,8 @@ def test_a_coordinate_at_rest_has_coinciding_ends() -> None:
     """A great circle in the plane of e_1, e_2: λ_2 rests at I_3."""
     A, q, v = 1 / MOMENTS, np.array([0.6, 0.8, 0.0]), np.array([0.8, -0.6, 0.0])
     nothing = SeparablePotential(np.zeros(1), np.zeros(3))
-    R = separation.separation_polynomial(A, separation.separation_constants(A, q, v, nothing), nothing)
+    R = separation.separation_polynomial(
+        A, separation.separation_constants(A, q, v, nothing), nothing
+    )
     ends = separation.turning_points(A, R, to_spheroconic(A, q))
     assert np.allclose(ends, [[MOMENTS[0], MOMENTS[1]], [MOMENTS[2], MOMENTS[2]]], atol=1e-7)

@@ -1,4 +1,6 @@
-"""On and beside a separatrix: what is lost stays lost, whatever other times are asked for; and what the data determine."""
+"""On and beside a separatrix: what is lost stays lost, whatever other times are asked for; and what
+the data determine.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def vs_fraction(number: Any) -> Any:
 
 
 def umbilic_geodesic(digits: int) -> vs.EllipsoidGeodesic:
-    """Return a geodesic through an umbilic of Σ x_i²/A_i = 1, A = (3, 2, 1), typed with so many digits."""
+    """Return a geodesic through an umbilic of Σ x_i²/A_i = 1, A = (3, 2, 1), typed with so many
+    digits.
+    """
     with mpmath.workdps(digits + 10):
         x, z = mpmath.sqrt(mpmath.mpf(3) / 2), mpmath.sqrt(mpmath.mpf(1) / 2)
         tangent = [z, mpmath.mpf("0.7"), -x / 3]
@@ -66,7 +70,9 @@ def test_the_pendulum_is_tanh_within_its_error() -> None:
     assert (np.abs(found.q[:, 0] - 1 / np.cosh(times)) <= found.error).all()
 
 
-@pytest.mark.parametrize("problem", [PENDULUM, umbilic(3, 1), umbilic(3, 2), umbilic(4, 1), umbilic(4, 2)])
+@pytest.mark.parametrize(
+    "problem", [PENDULUM, umbilic(3, 1), umbilic(3, 2), umbilic(4, 1), umbilic(4, 2)]
+)
 def test_the_error_never_falls_with_time_and_knows_no_other_time(problem: Any) -> None:
     assert vs.solve(problem, [0.25]).provenance.details["regime"] == "separatrix"
     for side in (1, -1):
@@ -77,7 +83,8 @@ def test_the_error_never_falls_with_time_and_knows_no_other_time(problem: Any) -
             assert not (lost and alone), radians
             lost = alone is None
             if alone is not None:
-                assert alone[1] >= largest / 2  # the engine's own error, in its place, is of the order of rounding
+                # the engine's own error, in its place, is of the order of rounding
+                assert alone[1] >= largest / 2
                 largest = max(largest, alone[1])
                 pair = sorted([scale * radians, scale * 0.3])
                 among = vs.solve(problem, pair)
@@ -101,12 +108,16 @@ def test_conditioning_of_a_regular_motion_grows_with_time() -> None:
 
 
 def test_conditioning_is_that_of_finite_differences() -> None:
-    """Data in doubles, moved by a millionth instead, at a time where that is still in proportion."""
+    """Data in doubles, moved by a millionth instead, at a time where that is still in
+    proportion.
+    """
     body = vs.Veselova([3.25, 2.125, 1.5], [0.6, 0, 0.8], [0.3, 1, -0.225])
     here = vs.solve(body, [50])
     largest = 0.0
     for sign in (1, -1):
-        moved = vs.Veselova([3.25 * (1 + sign * 1e-7), 2.125, 1.5], [0.6, 0, 0.8], [0.3, 1, -0.225], normalize=True)
+        moved = vs.Veselova(
+            [3.25 * (1 + sign * 1e-7), 2.125, 1.5], [0.6, 0, 0.8], [0.3, 1, -0.225], normalize=True
+        )
         largest = max(largest, float(np.max(np.abs(vs.solve(moved, [50]).frame - here.frame))))
     one_number = largest / 1e-7 * 2**-53
     assert one_number / 10 < here.conditioning[0] < 20 * one_number

@@ -1,4 +1,6 @@
-"""The closed form of the Veselova system on T SO(3) without potential: the default, exact data, many digits, tori, every door."""
+"""The closed form of the Veselova system on T SO(3) without potential: the default, exact data,
+many digits, tori, every door.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def test_the_closed_form_is_the_default_where_there_is_one(potential: dict[str, 
 
 
 @pytest.mark.parametrize(
-    ("Omega", "potential", "reason"), [([0.8, 1, -0.5], None, r"\(Ω,γ\) = 0, here 0.08"), (DOUBLES[2], USERS, "3.5")]
+    ("Omega", "potential", "reason"),
+    [([0.8, 1, -0.5], None, r"\(Ω,γ\) = 0, here 0.08"), (DOUBLES[2], USERS, "3.5")],
 )
 def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_name(
     Omega: Any, potential: Any, reason: str
@@ -43,7 +46,9 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
     problem = VeselovaSO3(DOUBLES[0], DOUBLES[1], Omega, potential)
     assert vs.solve(problem, [1.0]).provenance.engine == problem.default_engine == "numeric"
     for asked in ({"engine": "analytic"}, {"digits": 30}, {"certified": True}):
-        with pytest.raises((Unsolved, InvalidInput), match=f"not-separable: .*{reason}|digits: required 15"):
+        with pytest.raises(
+            (Unsolved, InvalidInput), match=f"not-separable: .*{reason}|digits: required 15"
+        ):
             vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
     with pytest.raises(Unsolved, match="not-rank-one"):
         vs.torus(problem)
@@ -72,9 +77,12 @@ def decimals_of(problem: Any, times: Any, digits: int, certified: bool = False) 
 
 
 def widest(problem: Any, decimals: Decimals, finer: Decimals) -> float:
-    """Return the largest difference to finer decimals over the radius that was reported, over all outputs."""
+    """Return the largest difference to finer decimals over the radius that was reported, over all
+    outputs.
+    """
     ratios = [
-        np.abs(decimals.midpoints[name] - finer.midpoints[name]) / (decimals.radii[name] + finer.radii[name])
+        np.abs(decimals.midpoints[name] - finer.midpoints[name])
+        / (decimals.radii[name] + finer.radii[name])
         for name in problem.outputs
     ]
     return max(float(np.max(ratio)) for ratio in ratios)
@@ -82,28 +90,41 @@ def widest(problem: Any, decimals: Decimals, finer: Decimals) -> float:
 
 @pytest.mark.parametrize("certified", [False, True])
 def test_every_output_has_the_digits_asked_for_and_radii_that_hold(certified: bool) -> None:
-    problem = VeselovaSO3(*TEXTS, frame=[["0.6", "0.8", "0"], ["0", "0", "1"], ["0.8", "-0.6", "0"]])
+    problem = VeselovaSO3(
+        *TEXTS, frame=[["0.6", "0.8", "0"], ["0", "0", "1"], ["0.8", "-0.6", "0"]]
+    )
     few, more = (decimals_of(problem, ["-70", 0.5], digits, certified) for digits in (30, 60))
     assert float(max(few.error)) < 1e-30
     assert widest(problem, few, more) <= 1
     double = vs.solve(problem, [-70.0, 0.5])
     for name in problem.outputs:
         assert np.max(np.abs(double.series(name) - few.midpoints[name].astype(float))) < 1e-12
-    assert np.all(np.max(np.abs(double.frame - few.midpoints["frame"].astype(float)), axis=(1, 2)) <= double.error)
+    assert np.all(
+        np.max(np.abs(double.frame - few.midpoints["frame"].astype(float)), axis=(1, 2))
+        <= double.error
+    )
 
 
 def test_decimals_obey_the_equations_that_define_them() -> None:
-    """Ω = γ̇×γ, 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ of constant length, and λ of (la), in exact rationals of the midpoints."""
+    """Ω = γ̇×γ, 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ of constant length, and λ of (la), in exact rationals of the
+    midpoints.
+    """
     problem, to_rational = VeselovaSO3(*TEXTS), np.vectorize(Fraction, otypes=[object])
     decimals = decimals_of(problem, [3.0], 50)
     found = {name: to_rational(decimals.midpoints[name])[0] for name in problem.outputs}
-    Omega, gamma, moments = found["Omega"], found["gamma"], np.array([Fraction(i) for i in (1, 2, 3)])
+    Omega, gamma, moments = (
+        found["Omega"],
+        found["gamma"],
+        np.array([Fraction(i) for i in (1, 2, 3)]),
+    )
     M = moments * Omega
     small = Fraction(1, 10**49)
     assert abs(Omega @ gamma) < small
     assert np.max(np.abs(M - (M @ gamma) * gamma - found["momentum"])) < small
     force = np.array([M[i - 2] * Omega[i - 1] - M[i - 1] * Omega[i - 2] for i in range(3)])
-    assert abs(found["multiplier"] * (gamma @ (gamma / moments)) + force @ (gamma / moments)) < small
+    assert (
+        abs(found["multiplier"] * (gamma @ (gamma / moments)) + force @ (gamma / moments)) < small
+    )
     assert abs(found["momentum"] @ found["momentum"] - Fraction("6.9584")) < 10 * small
 
 
@@ -135,7 +156,10 @@ def test_documents_give_every_decimal_back() -> None:
     assert found.decimals is not None
     assert back.decimals is not None
     for name in problem.outputs:
-        for mine, theirs in ((found.decimals.midpoints, back.decimals.midpoints), (found.decimals.radii, back.decimals.radii)):
+        for mine, theirs in (
+            (found.decimals.midpoints, back.decimals.midpoints),
+            (found.decimals.radii, back.decimals.radii),
+        ):
             assert np.array_equal(mine[name], theirs[name])
 
 

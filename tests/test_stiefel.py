@@ -1,4 +1,6 @@
-"""The reduced flow on T*V(r,n): the lemmas of section 5, the flow two ways, the full motion it is the shadow of, bad input."""
+"""The reduced flow on T*V(r,n): the lemmas of section 5, the flow two ways, the full motion it is
+the shadow of, bad input.
+"""
 
 from __future__ import annotations
 
@@ -54,35 +56,50 @@ def operator(rng: np.random.Generator, n: int, kind: str) -> BodyInertia:
 
 
 @pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_momentum_map_is_the_admissible_part_of_the_angular_velocity(n: int, r: int, rng: np.random.Generator) -> None:
-    """Lemma after (cond_X): Φ(X,−ωX) = pr_𝓓 ω for every ω, and (Poisson) holds for every tangent Ẋ."""
+def test_the_momentum_map_is_the_admissible_part_of_the_angular_velocity(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
+    """Lemma after (cond_X): Φ(X,−ωX) = pr_𝓓 ω for every ω, and (Poisson) holds for
+    every tangent Ẋ.
+    """
     X, omega = random_columns(rng, n, r), random_skew(rng, n)
     assert np.allclose(angular_velocity(X, -omega @ X), admissible_part(X, omega), atol=1e-14)
     gamma = X @ X.T
-    assert np.allclose(admissible_part(X, omega), gamma @ omega + omega @ gamma - gamma @ omega @ gamma, atol=1e-14)
+    assert np.allclose(
+        admissible_part(X, omega), gamma @ omega + omega @ gamma - gamma @ omega @ gamma, atol=1e-14
+    )
     X_dot = tangent_part(X, rng.normal(size=(n, r)))
     assert np.allclose(-angular_velocity(X, X_dot) @ X, X_dot, atol=1e-14)
     vectors = sum(wedge(X[:, a], X_dot[:, a]) for a in range(r))
     for a in range(r):
         for b in range(a + 1, r):
-            vectors = vectors + 0.5 * (X[:, a] @ X_dot[:, b] - X_dot[:, a] @ X[:, b]) * wedge(X[:, a], X[:, b])
+            vectors = vectors + 0.5 * (X[:, a] @ X_dot[:, b] - X_dot[:, a] @ X[:, b]) * wedge(
+                X[:, a], X[:, b]
+            )
     assert np.allclose(angular_velocity(X, X_dot), vectors, atol=1e-14)
 
 
 @pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_admissible_basis_spans_what_the_projection_keeps(n: int, r: int, rng: np.random.Generator) -> None:
+def test_the_admissible_basis_spans_what_the_projection_keeps(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
     X = random_columns(rng, n, r)
     basis = admissible_basis(X)
     assert len(basis) == dimension(n, r)
     assert np.allclose(product(basis[:, None], basis[None]), np.eye(len(basis)), atol=1e-14)
     assert np.allclose(admissible_part(X, basis), basis, atol=1e-14)
-    trace = sum(coefficients(admissible_part(X, skew(c, n)))[i] for i, c in enumerate(np.eye(n * (n - 1) // 2)))
+    trace = sum(
+        coefficients(admissible_part(X, skew(c, n)))[i]
+        for i, c in enumerate(np.eye(n * (n - 1) // 2))
+    )
     assert np.isclose(trace, dimension(n, r))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), RANKS)
-def test_the_momentum_is_the_derivative_of_the_reduced_lagrangian(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
+def test_the_momentum_is_the_derivative_of_the_reduced_lagrangian(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
     """P = ∂L/∂Ẋ in all nr directions, Φ* = pr_𝓓 𝓘ω, and ω(X,P) is the inverse."""
     inertia, X = operator(rng, n, kind), random_columns(rng, n, r)
     X_dot, xi = tangent_part(X, rng.normal(size=(n, r))), rng.normal(size=(n, r))
@@ -97,13 +114,19 @@ def test_the_momentum_is_the_derivative_of_the_reduced_lagrangian(n: int, r: int
     assert np.isclose(np.sum(P * xi), slope, rtol=1e-11, atol=1e-13)
     assert np.allclose(X.T @ P + P.T @ X, 0, atol=1e-13)
     assert np.allclose(momentum_map(X, P), admissible_part(X, inertia.apply(omega)), atol=1e-13)
-    assert np.allclose(inertia.angular_velocity(X, P, inertia.parameters, FLOATS), omega, atol=1e-12)
+    assert np.allclose(
+        inertia.angular_velocity(X, P, inertia.parameters, FLOATS), omega, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(n, r) for n, r in RANKS if n > 2])
-def test_the_flow_satisfies_the_lagrange_d_alembert_equation(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
-    """(1.2) with both sides evaluated: (∂L/∂X − d/dt ∂L/∂Ẋ, ξ) = ⟨𝓘Φ(Ẋ), pr_⊥[Φ(Ẋ),Φ(ξ)]⟩ for every tangent ξ."""
+def test_the_flow_satisfies_the_lagrange_d_alembert_equation(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
+    """(1.2) with both sides evaluated: (∂L/∂X − d/dt ∂L/∂Ẋ, ξ) = ⟨𝓘Φ(Ẋ), pr_⊥[Φ(Ẋ),Φ(ξ)]⟩ for every
+    tangent ξ.
+    """
     inertia, X = operator(rng, n, kind), random_columns(rng, n, r)
     omega = angular_velocity(X, tangent_part(X, rng.normal(size=(n, r))))
     P, step = cotangent(X, inertia.apply(omega)), 1e-6
@@ -114,7 +137,10 @@ def test_the_flow_satisfies_the_lagrange_d_alembert_equation(n: int, r: int, kin
         return float(product(inertia.apply(w), w)) / 2
 
     def gradient(X: Any, X_dot: Any, xi: Any, which: int) -> float:
-        moved = ((X + s * step * xi, X_dot) if which == 0 else (X, X_dot + s * step * xi) for s in (1, -1))
+        moved = (
+            (X + s * step * xi, X_dot) if which == 0 else (X, X_dot + s * step * xi)
+            for s in (1, -1)
+        )
         upper, lower = (lagrangian(*point) for point in moved)
         return (upper - lower) / (2 * step)
 
@@ -140,7 +166,9 @@ def test_the_flow_satisfies_the_lagrange_d_alembert_equation(n: int, r: int, kin
 
 
 @pytest.mark.parametrize(("n", "r"), [(4, 1), (4, 2), (5, 3)])
-def test_traces_are_those_of_the_matrix_polynomial(n: int, r: int, rng: np.random.Generator) -> None:
+def test_traces_are_those_of_the_matrix_polynomial(
+    n: int, r: int, rng: np.random.Generator
+) -> None:
     X, momentum = random_columns(rng, n, r), random_skew(rng, n)
     found = iter(trace_integrals(X, momentum))
     for k in range(2, n + 1):
@@ -149,19 +177,27 @@ def test_traces_are_those_of_the_matrix_polynomial(n: int, r: int, rng: np.rando
         polynomial = np.linalg.solve(np.vander(points, increasing=True), values)
         assert np.isclose(polynomial[k], r)
         for j in range(1, k + 1):  # degree in 𝓜
-            assert np.isclose(polynomial[k - j], next(found) if j % 2 == 0 else 0.0, rtol=1e-8, atol=1e-8)
+            assert np.isclose(
+                polynomial[k - j], next(found) if j % 2 == 0 else 0.0, rtol=1e-8, atol=1e-8
+            )
     assert next(found, None) is None
     powers = [np.trace(np.linalg.matrix_power(momentum, 2 * k)) for k in range(1, 4)]
-    assert np.allclose(powers, [2 * (-1) ** k * np.sum(ad_invariants(momentum) ** (2 * k)) for k in range(1, 4)])
+    assert np.allclose(
+        powers, [2 * (-1) ** k * np.sum(ad_invariants(momentum) ** (2 * k)) for k in range(1, 4)]
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), slow(4, 2), slow(5, 3), slow(6, 4)])
-def test_both_formulations_keep_the_integrals_and_agree(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
+def test_both_formulations_keep_the_integrals_and_agree(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
     problem, times = random_flow(rng, n, r, kind), np.linspace(-10, 10, 11)
     reduced, momentum = (solve(problem, times, formulation=name) for name in problem.formulations)
     assert np.max(np.abs(reduced.X - momentum.X)) < 1e-10
-    assert np.all(np.max(np.abs(reduced.X - momentum.X), axis=(1, 2)) <= reduced.error + momentum.error)
+    assert np.all(
+        np.max(np.abs(reduced.X - momentum.X), axis=(1, 2)) <= reduced.error + momentum.error
+    )
     for found in (reduced, momentum):
         assert max(found.drift.values()) < 1e-12
         assert found.provenance.details["formulation"] in problem.formulations
@@ -169,13 +205,19 @@ def test_both_formulations_keep_the_integrals_and_agree(n: int, r: int, kind: st
     assert np.max(np.abs(D_defect)) < 1e-13 * np.max(np.abs(reduced.omega))
 
 
-@pytest.mark.parametrize(("n", "r", "kind"), [(3, 2, "matrix"), (4, 2, "special"), (5, 2, "matrix"), (6, 3, "special")])
-def test_integrals_hold_to_1e_12_over_a_hundred_units_of_time(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(
+    ("n", "r", "kind"), [(3, 2, "matrix"), (4, 2, "special"), (5, 2, "matrix"), (6, 3, "special")]
+)
+def test_integrals_hold_to_1e_12_over_a_hundred_units_of_time(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
     found = solve(random_flow(rng, n, r, kind), np.linspace(0, 100, 21))
     assert max(found.drift.values()) < 1e-12
 
 
-@pytest.mark.parametrize(("n", "r", "kind"), [(3, 1, "special"), slow(4, 2, "special"), slow(4, 2, "matrix")])
+@pytest.mark.parametrize(
+    ("n", "r", "kind"), [(3, 1, "special"), slow(4, 2, "special"), slow(4, 2, "matrix")]
+)
 def test_taylor_series_keep_the_integrals_to_rounding_and_bound_the_other_error(
     n: int, r: int, kind: str, rng: np.random.Generator
 ) -> None:
@@ -188,8 +230,12 @@ def test_taylor_series_keep_the_integrals_to_rounding_and_bound_the_other_error(
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(3, 1), (4, 2), (5, 2), (5, 4)])
-def test_the_full_flow_on_the_group_projects_to_the_reduced_flow(n: int, r: int, kind: str, rng: np.random.Generator) -> None:
-    """Ė = −ωE with g𝓜g⁻¹ constant, 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω on all of SO(n) (mom), against X(t) of the reduced flow."""
+def test_the_full_flow_on_the_group_projects_to_the_reduced_flow(
+    n: int, r: int, kind: str, rng: np.random.Generator
+) -> None:
+    """Ė = −ωE with g𝓜g⁻¹ constant, 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω on all of SO(n) (mom), against X(t) of the
+    reduced flow.
+    """
     problem = random_flow(rng, n, r, kind)
     inertia, times = problem.inertia, np.linspace(0, 10, 6)
     frame = np.column_stack([problem.X, np.linalg.svd(problem.X)[0][:, r:]])
@@ -202,13 +248,17 @@ def test_the_full_flow_on_the_group_projects_to_the_reduced_flow(n: int, r: int,
         omega = skew(np.linalg.solve(images.T, coefficients(E @ in_space @ E.T)), n)
         return (-omega @ E).ravel()
 
-    full = solve_ivp(field, (0, 10), frame.ravel(), method="DOP853", t_eval=times, rtol=1e-12, atol=1e-13)
+    full = solve_ivp(
+        field, (0, 10), frame.ravel(), method="DOP853", t_eval=times, rtol=1e-12, atol=1e-13
+    )
     E = full.y.T.reshape(-1, n, n)
     assert np.max(np.abs(E[:, :, :r] - solve(problem, times).X)) < 1e-9
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])
-def test_rank_one_with_special_inertia_is_the_veselova_problem(n: int, rng: np.random.Generator) -> None:
+def test_rank_one_with_special_inertia_is_the_veselova_problem(
+    n: int, rng: np.random.Generator
+) -> None:
     A = np.exp(rng.uniform(0, 1.5, n))
     q, q_dot = random_columns(rng, n, 1), rng.normal(size=(n, 1)) / np.sqrt(n)
     problem = StiefelFlow({"special": A}, q, X_dot=q_dot, normalize=True)
@@ -231,7 +281,11 @@ def test_without_constraints_the_flow_is_that_of_the_free_body(rng: np.random.Ge
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_scales_of_inertia_and_time_do_not_matter(kind: str, rng: np.random.Generator) -> None:
-    inertia, X, X_dot = random_inertia(rng, 3, kind), random_columns(rng, 3, 2), rng.normal(size=(3, 2))
+    inertia, X, X_dot = (
+        random_inertia(rng, 3, kind),
+        random_columns(rng, 3, 2),
+        rng.normal(size=(3, 2)),
+    )
     plain = StiefelFlow(inertia, X, X_dot=X_dot, normalize=True)
     large = {name: (np.array(values) * 2.0**80).tolist() for name, values in inertia.items()}
     scaled = StiefelFlow(large, X, X_dot=X_dot * 2.0**60, normalize=True)
@@ -248,9 +302,17 @@ def test_a_state_beside_the_manifold_is_put_back_with_its_energy(rng: np.random.
     state = flow.project(flow.initial + 1e-6 * rng.normal(size=flow.initial.size))
     X, P = state.reshape(2, 5, 2)
     start = flow.initial.reshape(2, 5, 2)
-    assert np.allclose(np.hstack([X, P]).T @ np.hstack([X, P]), np.hstack(list(start)).T @ np.hstack(list(start)), atol=1e-14)
+    assert np.allclose(
+        np.hstack([X, P]).T @ np.hstack([X, P]),
+        np.hstack(list(start)).T @ np.hstack(list(start)),
+        atol=1e-14,
+    )
     energies = [
-        float(product(momentum_map(*pair), flow.inertia.angular_velocity(*pair, flow.parameters, FLOATS)))
+        float(
+            product(
+                momentum_map(*pair), flow.inertia.angular_velocity(*pair, flow.parameters, FLOATS)
+            )
+        )
         for pair in ((X, P), start)
     ]
     assert np.isclose(*energies, rtol=1e-9)
@@ -260,7 +322,9 @@ def test_a_state_beside_the_manifold_is_put_back_with_its_energy(rng: np.random.
 
 
 def test_at_rest_nothing_moves(rng: np.random.Generator) -> None:
-    problem = StiefelFlow(random_inertia(rng, 4, "matrix"), random_columns(rng, 4, 2), np.zeros((4, 2)))
+    problem = StiefelFlow(
+        random_inertia(rng, 4, "matrix"), random_columns(rng, 4, 2), np.zeros((4, 2))
+    )
     found = solve(problem, [0, 1e9])
     assert np.array_equal(found.X[1], problem.X)
     assert not found.omega.any()
@@ -280,7 +344,12 @@ def test_the_json_of_a_problem_gives_the_problem_back(rng: np.random.Generator) 
 
 def test_the_service_answers_and_its_answer_is_the_trajectory() -> None:
     problem = {"system": "stiefel", "inertia": A, "X": X, "P": P}
-    request = {"problem": problem, "times": [0, 1.5], "outputs": ["X", "P", "omega"], "formulation": "momentum"}
+    request = {
+        "problem": problem,
+        "times": [0, 1.5],
+        "outputs": ["X", "P", "omega"],
+        "formulation": "momentum",
+    }
     model, compute = TASKS["trajectory"]
     document = json.loads(encode(compute(model.model_validate(request))))
     direct = solve(StiefelFlow(A, X, P), [0, 1.5], formulation="momentum")
@@ -325,10 +394,30 @@ IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
         ({"inertia": {"special": [3, 2]}}, "inertia.special", "2 entries"),
         ({"inertia": {"special": [3, -2, 1]}}, "inertia.special[1]", "greater than 0"),
         ({"inertia": {"matrix": [[1, 0], [0, 1]]}}, "inertia.matrix", "2 rows"),
-        ({"inertia": {"matrix": [[1, 0, 0], [0, 1, 0.5], [0, 0, 1]]}}, "inertia.matrix[1][2]", "symmetric"),
-        ({"inertia": {"matrix": [[1, 0, 0], [0, 1, 2], [0, 2, 1]]}}, "inertia.matrix", "eigenvalue -1"),
-        ({"inertia": {"matrix": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}}, "inertia.matrix", "positive definite"),
-        ({"inertia": {"matrix": [[1e308, 0, 0], [0, 1e308, 0], [0, 0, 1e308]]}, "P": None, "X_dot": P}, "X_dot", "range"),
+        (
+            {"inertia": {"matrix": [[1, 0, 0], [0, 1, 0.5], [0, 0, 1]]}},
+            "inertia.matrix[1][2]",
+            "symmetric",
+        ),
+        (
+            {"inertia": {"matrix": [[1, 0, 0], [0, 1, 2], [0, 2, 1]]}},
+            "inertia.matrix",
+            "eigenvalue -1",
+        ),
+        (
+            {"inertia": {"matrix": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}},
+            "inertia.matrix",
+            "positive definite",
+        ),
+        (
+            {
+                "inertia": {"matrix": [[1e308, 0, 0], [0, 1e308, 0], [0, 0, 1e308]]},
+                "P": None,
+                "X_dot": P,
+            },
+            "X_dot",
+            "range",
+        ),
     ],
 )
 def test_bad_input_is_refused_by_name(arguments: dict[str, Any], field: str, said: str) -> None:
@@ -340,7 +429,10 @@ def test_bad_input_is_refused_by_name(arguments: dict[str, Any], field: str, sai
 
 def test_an_unknown_formulation_and_a_closed_form_are_refused() -> None:
     problem = StiefelFlow(A, X, P)
-    for options, field in (({"formulation": "geodesic"}, "formulation"), ({"engine": "analytic"}, "engine")):
+    for options, field in (
+        ({"formulation": "geodesic"}, "formulation"),
+        ({"engine": "analytic"}, "engine"),
+    ):
         with pytest.raises(InvalidInput) as raised:
             solve(problem, [1.0], **options)
         assert raised.value.field == field
@@ -360,6 +452,10 @@ def test_fifty_random_flows_keep_their_integrals_and_agree(n: int, r: int, kind:
         far = solve(problem, np.linspace(0, 100, 11))
         assert max(far.drift.values()) < 1e-12
         times = np.linspace(0, 10, 6)
-        reduced, momentum = (solve(problem, times, formulation=name) for name in problem.formulations)
+        reduced, momentum = (
+            solve(problem, times, formulation=name) for name in problem.formulations
+        )
         assert np.max(np.abs(reduced.X - momentum.X)) < 1e-9
-        assert np.all(np.max(np.abs(reduced.X - momentum.X), axis=(1, 2)) <= reduced.error + momentum.error)
+        assert np.all(
+            np.max(np.abs(reduced.X - momentum.X), axis=(1, 2)) <= reduced.error + momentum.error
+        )

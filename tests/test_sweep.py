@@ -1,4 +1,6 @@
-"""Sweeps over random problems, n = 2…8, ratios of A up to 100, |t| ≤ 50. Minutes: run with ./check --sweep."""
+"""Sweeps over random problems, n = 2…8, ratios of A up to 100, |t| ≤ 50. Minutes: run with ./check
+--sweep.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ def test_true_errors_never_exceed_reported_ones_on_random_problems(n: int) -> No
         times = np.sort(rng.uniform(-50, 50, 8))
         frame = true_motion(problem, times)[0]
         for engine, method in METHODS:
-            if n > 6 and method in ("theta", "products"):  # their sums are too long for so many problems
+            # their sums are too long for so many problems
+            if n > 6 and method in ("theta", "products"):
                 continue
             found = solve(problem, times, engine, method)
             assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)

@@ -1,4 +1,6 @@
-"""Sweeps from Python and the command line: which problems they are, what is said of each, and what outlives a process."""
+"""Sweeps from Python and the command line: which problems they are, what is said of each, and what
+outlives a process.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,13 @@ from veselova.service.sweeps.torus_columns import columns_of_torus
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
-BASE = {"system": "veselova", "A": [3, "1.5", 1], "q": [0.6, 0, 0.8], "q_dot": [0, 0.5, 0], "normalize": True}
+BASE = {
+    "system": "veselova",
+    "A": [3, "1.5", 1],
+    "q": [0.6, 0, 0.8],
+    "q_dot": [0, 0.5, 0],
+    "normalize": True,
+}
 DRAWN = {"/A/0": [2, 3, 4], "/q_dot": {"normal": [0, 1]}}
 
 #: What makes every problem take longer than anybody waits.
@@ -56,7 +64,9 @@ ENDLESS = {"times": {"start": 0, "stop": 1e6, "count": 2}, "engine": "numeric", 
 
 
 def request(**changes: Any) -> SweepRequest:
-    return read_request(SweepRequest, {"problem": BASE, "vary": DRAWN, "samples": 5, "seed": 7, **changes})
+    return read_request(
+        SweepRequest, {"problem": BASE, "vary": DRAWN, "samples": 5, "seed": 7, **changes}
+    )
 
 
 def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
@@ -64,7 +74,9 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
 
     from pyarrow import parquet
 
-    table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__).table))
+    table = parquet.read_table(
+        io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__).table)
+    )
     found: list[dict[str, Any]] = table.to_pylist()
     return found
 
@@ -73,13 +85,16 @@ def test_only_tori_that_are_computed_together_come_in_large_chunks() -> None:
     """A second or so of work for either kind: a frame makes every problem one of its own."""
     stated = {"system": "veselova", "A": [2, 1], "q": [1, 0], "q_dot": [0, 1]}
     together, single = (
-        request(problem={**stated, **more}, vary={"/A/0": [2, 3]}, samples=1) for more in ({}, {"frame": [[1, 0], [0, 1]]})
+        request(problem={**stated, **more}, vary={"/A/0": [2, 3]}, samples=1)
+        for more in ({}, {"frame": [[1, 0], [0, 1]]})
     )
     assert together.chunk_rows > 4 * single.chunk_rows
 
 
 def test_axes_are_combined_and_the_last_runs_fastest() -> None:
-    sweep = request(vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1)
+    sweep = request(
+        vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1
+    )
     assert sweep.shape == (2, 3)
     assert [dict(sweep.columns(sweep.values(row))) for row in (0, 1, 3)] == [
         {"A.0": 2, "q_dot.1": 1},
@@ -102,7 +117,10 @@ def test_a_draw_depends_on_seed_and_row_alone() -> None:
     ("stated", "inside"),
     [
         ({"uniform": [2, 3]}, lambda x: np.all((x >= 2) & (x <= 3)) and abs(x.mean() - 2.5) < 0.05),
-        ({"log_uniform": ["0.01", 100]}, lambda x: np.all((x >= 0.01) & (x <= 100)) and abs(np.log10(x).mean()) < 0.2),
+        (
+            {"log_uniform": ["0.01", 100]},
+            lambda x: np.all((x >= 0.01) & (x <= 100)) and abs(np.log10(x).mean()) < 0.2,
+        ),
         ({"normal": [5, 0.1]}, lambda x: abs(x.mean() - 5) < 0.02 and abs(x.std() - 0.1) < 0.02),
     ],
 )
@@ -114,8 +132,14 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
 
 
 def test_a_logarithmic_grid_has_equal_ratios() -> None:
-    sweep = request(vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1)
-    assert np.allclose([dict(sweep.columns(sweep.values(row)))["A.0"] for row in range(3)], [1, 10, 100], rtol=1e-14)
+    sweep = request(
+        vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1
+    )
+    assert np.allclose(
+        [dict(sweep.columns(sweep.values(row)))["A.0"] for row in range(3)],
+        [1, 10, 100],
+        rtol=1e-14,
+    )
 
 
 @pytest.mark.parametrize(
@@ -136,12 +160,18 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**9}}}, "vary./A/0.count"),
         ({"vary": {"/A/0": {"start": 1, "stop": "x", "count": 3}}}, "vary./A/0.stop"),
         ({"vary": {"/A/0": {"start": -1e308, "stop": 1e308, "count": 3}}}, "vary./A/0"),
-        ({"vary": {f"/A/{i}": {"start": 1, "stop": 2, "count": 400_000} for i in range(3)}}, "vary"),
+        (
+            {"vary": {f"/A/{i}": {"start": 1, "stop": 2, "count": 400_000} for i in range(3)}},
+            "vary",
+        ),
         ({"vary": {"/A/0": [3, math.nan]}}, "vary./A/0[1]"),
         ({"vary": {"/A/0": [3, "\ud800"]}, "samples": 1}, "the request"),
         ({"vary": {"/\ud800": [3]}}, "vary./\\ud800"),
         ({"vary": {"/A/0": {"start": 0, "stop": 2, "count": 3, "spacing": "log"}}}, "vary./A/0"),
-        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 3, "spacing": "cubic"}}}, "vary./A/0.spacing"),
+        (
+            {"vary": {"/A/0": {"start": 1, "stop": 2, "count": 3, "spacing": "cubic"}}},
+            "vary./A/0.spacing",
+        ),
         ({"vary": {"/A/0": {"uniform": [2, 1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"uniform": [1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"normal": [1, -1]}}}, "vary./A/0.normal[1]"),
@@ -153,7 +183,16 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ({"vary": [1]}, "vary"),
         ({"samples": 0}, "samples"),
         ({"samples": 2**63}, "samples"),
-        ({"samples": 10**6, "vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**6}, "/q_dot": {"normal": [0, 1]}}}, "vary"),
+        (
+            {
+                "samples": 10**6,
+                "vary": {
+                    "/A/0": {"start": 1, "stop": 2, "count": 10**6},
+                    "/q_dot": {"normal": [0, 1]},
+                },
+            },
+            "vary",
+        ),
         ({"samples": 2, "vary": {"/A/0": [1, 2]}}, "samples"),
         ({"seed": -1}, "seed"),
         ({"engine": "analytic"}, "engine"),
@@ -173,18 +212,32 @@ def test_a_fault_is_named_before_anything_runs(changes: dict[str, Any], field: s
 
 
 def test_a_system_without_a_torus_needs_times() -> None:
-    body = {"system": "euler-poisson", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0, 0.1]}
+    body = {
+        "system": "euler-poisson",
+        "inertia": [1, 2, 3],
+        "gamma": [0, 0, 1],
+        "Omega": [1, 0, 0.1],
+    }
     stated = {"problem": body, "vary": {"/Omega/0": [1, 2]}}
     with pytest.raises(InvalidRequest, match="times: required this field"):
         read_request(SweepRequest, stated)
-    found = rows(read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2)
+    found = rows(
+        read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2
+    )
     assert [row["outcome"] for row in found] == ["solved", "solved"]
     assert all(row["gamma.max.2"] == 1 and row["error.max"] < 1e-9 for row in found)
 
 
 def test_bodies_have_tori_where_their_motion_has_one() -> None:
-    body = {"system": "veselova-so3", "inertia": [1, 2, 3], "gamma": [0, 0, 1], "Omega": [1, 0.5, 0]}
-    found = rows(read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2)
+    body = {
+        "system": "veselova-so3",
+        "inertia": [1, 2, 3],
+        "gamma": [0, 0, 1],
+        "Omega": [1, 0.5, 0],
+    }
+    found = rows(
+        read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2
+    )
     assert [row["outcome"] for row in found] == ["solved", "not-rank-one"]
     expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 0]))
     assert np.isclose(found[0]["frequencies_t.0"], expected.frequencies_t[0], rtol=1e-15)
@@ -202,17 +255,23 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
         for name in ("energy", "mean_rate", "regime"):
             assert found[name] == getattr(expected, name)
         for name in ("constants", "frequencies_t", "actions", "phases", "branch_points"):
-            assert [found[f"{name}.{i}"] for i in range(getattr(expected, name).size)] == getattr(expected, name).tolist()
+            assert [found[f"{name}.{i}"] for i in range(getattr(expected, name).size)] == getattr(
+                expected, name
+            ).tolist()
         assert found["error.max"] == motion.error.max()
         assert found["drift.energy"] == motion.drift["energy"]
         assert found["frame.min.1.2"] == motion.frame[:, 1, 2].min()
         assert found["tau1.max"] == motion.tau1.max()
 
 
-def test_a_row_with_torus_and_motion_solves_its_problem_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_row_with_torus_and_motion_solves_its_problem_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     solved, construct = list[Any](), Solution.__init__
     compute_chunk(request().canonical, 0, 1, __version__)  # both engines are loaded and have run
-    monkeypatch.setattr(Solution, "__init__", lambda self, *rest: solved.append(rest) or construct(self, *rest))
+    monkeypatch.setattr(
+        Solution, "__init__", lambda self, *rest: solved.append(rest) or construct(self, *rest)
+    )
     for times in (None, [0, 1]):
         solved.clear()
         found = rows(request(times=times), 0, 3)
@@ -225,16 +284,22 @@ def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:
     found = rows(sweep, 0, sweep.total)
     assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
     assert found[0]["regime"] == "rest"
-    assert found[2]["detail"].startswith("problem.A[0]: required a finite number greater than 0; given -1")
+    assert found[2]["detail"].startswith(
+        "problem.A[0]: required a finite number greater than 0; given -1"
+    )
     assert found[2]["energy"] is None
 
 
 def test_tori_that_are_computed_together_are_those_of_torus() -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, vary={"/A": {"uniform": [1, 3]}, "/q_dot": {"normal": [0, 1]}}, samples=40)
+    sweep = request(
+        problem=plain, vary={"/A": {"uniform": [1, 3]}, "/q_dot": {"normal": [0, 1]}}, samples=40
+    )
     for row, found in enumerate(rows(sweep, 0, 40)):
         assert (found["row"], found["outcome"], found["detail"]) == (row, "solved", "")
-        expected = dict(columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem())))
+        expected = dict(
+            columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem()))
+        )
         assert list(found) == [
             "row",
             *(f"{name}.{i}" for name in ("A", "q_dot") for i in range(3)),
@@ -243,32 +308,57 @@ def test_tori_that_are_computed_together_are_those_of_torus() -> None:
             *expected,
         ]
         for name, value in expected.items():
-            assert found[name] == (pytest.approx(value, rel=1e-14, abs=1e-15) if isinstance(value, float) else value), name
+            assert found[name] == (
+                pytest.approx(value, rel=1e-14, abs=1e-15) if isinstance(value, float) else value
+            ), name
 
 
 def test_rows_do_not_depend_on_how_a_sweep_is_cut() -> None:
-    """Problems that can be computed together stand beside others, which are computed, or refused, one by one."""
+    """Problems that can be computed together stand beside others, which are computed, or refused,
+    one by one.
+    """
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, vary={"/A/0": [2, "2", 1.5, -1, "x", 4], "/q/1": [0.1, 0], "/q_dot/1": [0, 0.5]}, samples=1)
+    sweep = request(
+        problem=plain,
+        vary={"/A/0": [2, "2", 1.5, -1, "x", 4], "/q/1": [0.1, 0], "/q_dot/1": [0, 0.5]},
+        samples=1,
+    )
     whole = rows(sweep, 0, sweep.total)
     alone = [rows(sweep, row, row + 1)[0] for row in range(sweep.total)]
     for together, single in zip(whole, alone, strict=True):
         assert {name: value for name, value in together.items() if value is not None} == single
-    assert [row["outcome"] for row in whole] == ["solved"] * 12 + ["invalid-input"] * 8 + ["solved"] * 4
+    assert [row["outcome"] for row in whole] == ["solved"] * 12 + ["invalid-input"] * 8 + [
+        "solved"
+    ] * 4
     assert whole[1]["energy"] == pytest.approx(whole[5]["energy"], rel=1e-14)
-    assert [whole[i]["regime"] for i in (0, 1, 3, 9)] == ["rest", "generic", "generic", "closed-cut"]
+    assert [whole[i]["regime"] for i in (0, 1, 3, 9)] == [
+        "rest",
+        "generic",
+        "generic",
+        "closed-cut",
+    ]
 
 
 def test_a_start_off_the_sphere_is_refused_in_a_sweep_too() -> None:
-    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0, 0.8], "q_dot": [0.8, 1, -0.6], "normalize": False}
+    plain = {
+        **BASE,
+        "A": [3, 1.5, 1],
+        "q": [0.6, 0, 0.8],
+        "q_dot": [0.8, 1, -0.6],
+        "normalize": False,
+    }
     sweep = request(problem=plain, vary={"/q/1": [0, 1e-5, 1e-4], "/q_dot/1": [1, 2]}, samples=1)
     found = rows(sweep, 0, 6)
     assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
-    assert found[4]["detail"].startswith("problem.q: required a vector of unit length to 1e-9 (or normalize=True); given length")
+    assert found[4]["detail"].startswith(
+        "problem.q: required a vector of unit length to 1e-9 (or normalize=True); given length"
+    )
     assert found[2]["detail"].startswith("problem.q_dot: required a vector orthogonal to q to 1e-9")
 
 
-def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_problems_whose_common_computation_fails_are_computed_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def broken(*_: Any) -> Any:
         raise ZeroDivisionError
 
@@ -283,7 +373,9 @@ def test_problems_whose_common_computation_fails_are_computed_alone(monkeypatch:
         monkeypatch.setattr("veselova.analytic.motion.invariant_torus_batch.tori", failure)
         found = rows(sweep, 0, 2)
         assert [row["outcome"] for row in found] == ["solved"] * 2
-        assert np.allclose([row["mean_rate"] for row in found], [row["mean_rate"] for row in expected], rtol=1e-14)
+        assert np.allclose(
+            [row["mean_rate"] for row in found], [row["mean_rate"] for row in expected], rtol=1e-14
+        )
 
 
 def test_a_problem_over_its_budget_is_given_up() -> None:
@@ -295,7 +387,14 @@ def test_a_problem_over_its_budget_is_given_up() -> None:
         "normalize": True,
     }
     sweep = read_request(
-        SweepRequest, {"problem": hard, "vary": {"/A/0": [9, 10]}, "times": [0, 1000], "engine": "numeric", "budget_s": 0.05}
+        SweepRequest,
+        {
+            "problem": hard,
+            "vary": {"/A/0": [9, 10]},
+            "times": [0, 1000],
+            "engine": "numeric",
+            "budget_s": 0.05,
+        },
     )
     assert [row["outcome"] for row in rows(sweep, 0, 2)] == ["over-budget"] * 2
 
@@ -324,12 +423,18 @@ def test_a_problem_whose_worker_died_says_so() -> None:
 
 
 def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
-    with pytest.raises(OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"):
+    with pytest.raises(
+        OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"
+    ):
         compute_chunk(request().canonical, 0, 1, "0.0.0")
 
 
 def test_a_finished_job_keeps_its_results_and_no_chunks(tmp_path: Path) -> None:
-    job, jobs = run_sweep(request(times=[0, 1], trajectories=True), local_settings(tmp_path, 1), lambda done, total: None)
+    job, jobs = run_sweep(
+        request(times=[0, 1], trajectories=True),
+        local_settings(tmp_path, 1),
+        lambda done, total: None,
+    )
     names = {path.name for path in (tmp_path / "jobs" / job.id).iterdir()} - {"lock"}
     assert names == {"summaries.parquet", "trajectories.zarr.zip"}
     assert jobs.missing(job) == []
@@ -345,7 +450,11 @@ def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
     said: list[tuple[int, int]] = []
     dataset = vs.sweep(
         BASE,
-        {"/A/0": np.array([2.0, 3.0]), "/q": [[1, 0, 0], [0.6, 0, 0.8]], "/q_dot": {"normal": [0, 1]}},
+        {
+            "/A/0": np.array([2.0, 3.0]),
+            "/q": [[1, 0, 0], [0.6, 0, 0.8]],
+            "/q_dot": {"normal": [0, 1]},
+        },
         samples=3,
         times=[0, 1, 2],
         outputs=["q", "tau1"],
@@ -385,21 +494,31 @@ def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
 def test_integers_of_any_length_are_kept_exactly() -> None:
     sweep = request(vary={"/A/0": [10**30]}, samples=1)
     kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert kept.request_of(kept.values(0)).problem.problem().as_dict()["A"] == [str(10**30), "1.5", 1]
+    assert kept.request_of(kept.values(0)).problem.problem().as_dict()["A"] == [
+        str(10**30),
+        "1.5",
+        1,
+    ]
 
 
 def test_a_place_varies_by_the_numbers_of_numpy(tmp_path: Path) -> None:
     grid = {"start": np.float64(2), "stop": np.float32(3), "count": np.int64(2)}
-    dataset = vs.sweep(BASE, {"/A/0": grid, "/q_dot": {"uniform": (0.1, np.float64(1))}}, folder=tmp_path)
+    dataset = vs.sweep(
+        BASE, {"/A/0": grid, "/q_dot": {"uniform": (0.1, np.float64(1))}}, folder=tmp_path
+    )
     assert dataset["A.0"].values.tolist() == [2, 3]
 
 
-def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_result_does_not_depend_on_workers_or_interruptions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One run in this process; another by two workers, which is interrupted and then goes on."""
     sweep = request(samples=20, times=[0, 1], outputs=["q"], trajectories=True)
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 4)
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
-    job, undisturbed = run_sweep(sweep, local_settings(tmp_path / "one", 1), lambda done, total: None)
+    job, undisturbed = run_sweep(
+        sweep, local_settings(tmp_path / "one", 1), lambda done, total: None
+    )
 
     class Interrupted(Exception):
         pass
@@ -423,16 +542,25 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(tmp_path: Path, 
     calls: list[int] = []
     store = Jobs.store
     monkeypatch.setattr(
-        Jobs, "store", lambda self, job_id, position, *rest: calls.append(position) or store(self, job_id, position, *rest)
+        Jobs,
+        "store",
+        lambda self, job_id, position, *rest: (
+            calls.append(position) or store(self, job_id, position, *rest)
+        ),
     )
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
     _, resumed = run_sweep(sweep, settings, lambda done, total: None)
     assert sorted(calls) == sorted([*missing, victim])
     for path in ("result_path", "packed_path"):
-        assert getattr(resumed, path)(sweep.id).read_bytes() == getattr(undisturbed, path)(sweep.id).read_bytes()
+        assert (
+            getattr(resumed, path)(sweep.id).read_bytes()
+            == getattr(undisturbed, path)(sweep.id).read_bytes()
+        )
 
 
-def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_waits_for_a_database_that_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     monkeypatch.setattr(running, "_FIRST_PAUSE_S", 0.05)
     settings = local_settings(tmp_path, 1)
@@ -441,7 +569,9 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, mon
 
     def watched(self: Jobs, *arguments: Any) -> None:
         with self._engine.connect() as connection:
-            connection.exec_driver_sql(f"PRAGMA query_only = {'ON' if read_only.is_set() else 'OFF'}")
+            connection.exec_driver_sql(
+                f"PRAGMA query_only = {'ON' if read_only.is_set() else 'OFF'}"
+            )
         try:
             store(self, *arguments)
         except sa.exc.OperationalError:
@@ -457,10 +587,17 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(tmp_path: Path, mon
 
 
 @pytest.mark.parametrize("removed", [False, True])
-def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_that_another_process_ends_is_given_up(
+    removed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
-    sweep, settings, stored, ended = request(samples=30), local_settings(tmp_path, 1), list[bool](), threading.Event()
+    sweep, settings, stored, ended = (
+        request(samples=30),
+        local_settings(tmp_path, 1),
+        list[bool](),
+        threading.Event(),
+    )
     elsewhere, store = Jobs(settings), Jobs.store
 
     def end_after_first(self: Jobs, job_id: str, *rest: Any) -> None:
@@ -473,14 +610,18 @@ def test_a_job_that_another_process_ends_is_given_up(removed: bool, tmp_path: Pa
             elsewhere.remove(job_id)
 
     monkeypatch.setattr(Jobs, "store", end_after_first)
-    with pytest.raises((Unsolved, Refused), match="There is no job" if removed else "the sweep is cancelled"):
+    with pytest.raises(
+        (Unsolved, Refused), match="There is no job" if removed else "the sweep is cancelled"
+    ):
         run_sweep(sweep, settings, lambda done, total: None)
     assert stored
     assert not any(stored)  # the second chunk may be on its way to the disk when the job is ended
     assert (elsewhere.folder / sweep.id).exists() is not removed
 
 
-def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_asked_for_again_while_it_stops_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The thread that stores a chunk is waited for, and nothing of the job goes on behind it."""
     settings = local_settings(tmp_path, 1)
     jobs, storing, go_on = Jobs(settings), threading.Event(), threading.Event()
@@ -513,8 +654,12 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(tmp_path: Path, monkeypatc
     assert jobs.get(job.id).state == "finished"
 
 
-def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(tmp_path: Path) -> None:
-    """One worker is at work for somebody else, and has cancelled work in its queue; then it is the cancelled work itself."""
+def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(
+    tmp_path: Path,
+) -> None:
+    """One worker is at work for somebody else, and has cancelled work in its queue; then it is the
+    cancelled work itself.
+    """
     settings = local_settings(tmp_path, 1)
     job = Jobs(settings).submit(request(**ENDLESS))
 
@@ -538,7 +683,9 @@ def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(t
 def test_a_cancellation_waits_for_no_word_of_a_worker_and_for_no_successor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A worker has nothing but two chunks of the cancelled job, and hears nothing; it is ended once."""
+    """A worker has nothing but two chunks of the cancelled job, and hears nothing; it is ended
+    once.
+    """
     settings = local_settings(tmp_path, 1)
     job = Jobs(settings).submit(request(**ENDLESS))
     instantiate, successors = Nanny.instantiate, []
@@ -554,8 +701,14 @@ def test_a_cancellation_waits_for_no_word_of_a_worker_and_for_no_successor(
         async with open_cluster(settings) as client:
             monkeypatch.setattr(Nanny, "instantiate", late)
             monkeypatch.setattr(dispatch, "_PATIENCE_S", PATIENCE)
-            waiting = [asyncio.create_task(answers(client, job, start, start + 5, lambda: False)) for start in (0, 5)]
-            while sorted((await client.run(stages_of_chunks)).popitem()[1]) != ["executing", "ready"]:
+            waiting = [
+                asyncio.create_task(answers(client, job, start, start + 5, lambda: False))
+                for start in (0, 5)
+            ]
+            while sorted((await client.run(stages_of_chunks)).popitem()[1]) != [
+                "executing",
+                "ready",
+            ]:
                 await asyncio.sleep(0.01)
             deaf = asyncio.create_task(client.run(time.sleep, PATIENCE, on_error="ignore"))
             await asyncio.sleep(0.1)
@@ -570,8 +723,12 @@ def test_a_cancellation_waits_for_no_word_of_a_worker_and_for_no_successor(
     asyncio.run(run())
 
 
-def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Waits of more than ten seconds, Dask's before it looks among them, pass thirty times faster here."""
+def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Waits of more than ten seconds, Dask's before it looks among them, pass thirty times faster
+    here.
+    """
     instantiate = Nanny.instantiate
 
     async def run() -> None:
@@ -585,7 +742,11 @@ def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(tmp_path: 
         async with open_cluster(local_settings(tmp_path, 1)) as client:
             (nanny,) = client.cluster.workers.values()
             monkeypatch.setattr(Nanny, "instantiate", late)
-            monkeypatch.setattr(loop, "call_later", lambda s, *rest, **more: later(s / 30 if s > 10 else s, *rest, **more))
+            monkeypatch.setattr(
+                loop,
+                "call_later",
+                lambda s, *rest, **more: later(s / 30 if s > 10 else s, *rest, **more),
+            )
             os.kill(nanny.pid, signal.SIGKILL)
             while await client.nthreads():
                 await asyncio.sleep(0.01)
@@ -598,7 +759,9 @@ def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(tmp_path: 
     asyncio.run(run())
 
 
-def test_a_worker_whose_successor_cannot_be_started_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_whose_successor_cannot_be_started_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its nanny gives up then, for good."""
     start, failures = WorkerProcess.start, [OSError("no process can be started")]
 
@@ -673,7 +836,10 @@ def test_a_worker_that_replaces_another_leaves_interrupts_to_its_parent(tmp_path
             (first,) = (await client.run(os.getpid)).values()
             os.kill(first, signal.SIGKILL)
             async with asyncio.timeout(60):
-                while not (found := await client.run(os.getpid, on_error="ignore")) or first in found.values():
+                while (
+                    not (found := await client.run(os.getpid, on_error="ignore"))
+                    or first in found.values()
+                ):
                     await asyncio.sleep(0.05)
             (second,) = found.values()
             os.kill(second, signal.SIGINT)
@@ -700,10 +866,14 @@ def wait_for_file(path: str) -> str:
 
 
 def stages_of_chunks(dask_worker: Any) -> list[str]:
-    return [task.state for key, task in dask_worker.state.tasks.items() if "computed_chunk" in str(key)]
+    return [
+        task.state for key, task in dask_worker.state.tasks.items() if "computed_chunk" in str(key)
+    ]
 
 
-@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), TimeoutError("a look-up took too long")])
+@pytest.mark.parametrize(
+    "failure", [OSError(28, "No space left on device"), TimeoutError("a look-up took too long")]
+)
 def test_a_worker_whose_machine_fails_is_no_lost_cluster(
     failure: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -711,13 +881,19 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
         raise failure
 
     monkeypatch.setattr("veselova.service.sweeps.chunk_dispatch.computed_chunk", failing)
-    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)  # so that the sweep goes to a worker
+    # so that the sweep goes to a worker
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
     monkeypatch.setattr("veselova.service.sweeps.in_process_cluster.seconds_of", lambda *_: 1e9)
-    with pytest.raises(Unsolved, match=f"a worker could not compute the problems 0 to 14: {failure.strerror or failure}"):
+    with pytest.raises(
+        Unsolved,
+        match=f"a worker could not compute the problems 0 to 14: {failure.strerror or failure}",
+    ):
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
 
-def test_a_value_that_is_a_text_may_come_in_a_later_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_value_that_is_a_text_may_come_in_a_later_chunk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The table is the same as that of one chunk: the column has texts."""
     sweep = request(vary={"/A/0": [2, 2.5, "x"]}, samples=1)
 
@@ -731,7 +907,9 @@ def test_a_value_that_is_a_text_may_come_in_a_later_chunk(tmp_path: Path, monkey
     assert column("three chunks") == expected
 
 
-def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_death_while_the_store_is_removed_costs_no_trajectory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The file has been made by then, and must not be made again of what is left."""
     jobs = Jobs(Settings(data_dir=tmp_path))
     job = jobs.submit(request(times=[0, 1], outputs=["tau1"], trajectories=True))
@@ -754,9 +932,15 @@ def test_a_death_while_the_store_is_removed_costs_no_trajectory(tmp_path: Path, 
     assert not jobs.trajectories_path(job.id).exists()
 
 
-def test_a_sweep_does_not_notice_that_the_clock_is_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The clock of the wall jumps by days, to and fro, each time that the store or the cluster looks at it."""
-    job, undisturbed = run_sweep(request(), local_settings(tmp_path / "one", 1), lambda done, total: None)
+def test_a_sweep_does_not_notice_that_the_clock_is_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock of the wall jumps by days, to and fro, each time that the store or the cluster
+    looks at it.
+    """
+    job, undisturbed = run_sweep(
+        request(), local_settings(tmp_path / "one", 1), lambda done, total: None
+    )
     days = itertools.cycle([3, -5, 0, 400, -1])
     clock = time.time
 
@@ -768,19 +952,33 @@ def test_a_sweep_does_not_notice_that_the_clock_is_changed(tmp_path: Path, monke
     monkeypatch.setattr("veselova.service.sweeps.job_store.datetime", Jumping)
     monkeypatch.setattr("distributed.scheduler.time", lambda: clock() + 86400 * next(days))
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 3)
-    disturbed_job, disturbed = run_sweep(request(), local_settings(tmp_path / "two", 1), lambda done, total: None)
+    disturbed_job, disturbed = run_sweep(
+        request(), local_settings(tmp_path / "two", 1), lambda done, total: None
+    )
     assert disturbed_job.state == "finished"
-    assert disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
+    assert (
+        disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
+    )
 
 
 def test_the_command_line_sweeps(tmp_path: Path) -> None:
     body = {"problem": BASE, "vary": {"/A/0": [2, 3, -1]}}
     file = tmp_path / "sweep.json"
     file.write_text(json.dumps(body))
-    command = [sys.executable, "-m", "veselova", "sweep", str(file), "--folder", str(tmp_path / "kept")]
+    command = [
+        sys.executable,
+        "-m",
+        "veselova",
+        "sweep",
+        str(file),
+        "--folder",
+        str(tmp_path / "kept"),
+    ]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([*command, *more], capture_output=True, text=True, timeout=PATIENCE, check=False)
+        return subprocess.run(
+            [*command, *more], capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
 
     answer = run("--json", "--output", str(tmp_path / "table.csv"))
     assert answer.returncode == 0, answer.stderr
@@ -797,7 +995,9 @@ def test_the_command_line_sweeps(tmp_path: Path) -> None:
 
 
 def test_an_interrupt_ends_a_sweep_in_a_notebook(tmp_path: Path) -> None:
-    """The thread of a notebook runs a loop already, which does not take interrupts as ``asyncio.run`` does."""
+    """The thread of a notebook runs a loop already, which does not take interrupts as
+    ``asyncio.run`` does.
+    """
     script = f"""
 import asyncio, signal, veselova
 from pathlib import Path
@@ -811,12 +1011,16 @@ if __name__ == "__main__":
         asyncio.new_event_loop().run_until_complete(cell())
     except KeyboardInterrupt:
         print("interrupted")
-        left = [child for tasks in Path("/proc/self/task").glob("*/children") for child in tasks.read_text().split()]
-        print(sum("multiprocessing.spawn" in Path(f"/proc/{{child}}/cmdline").read_text() for child in left))
+        tasks = Path("/proc/self/task").glob("*/children")
+        left = [child for task in tasks for child in task.read_text().split()]
+        commands = [Path(f"/proc/{{child}}/cmdline").read_text() for child in left]
+        print(sum("multiprocessing.spawn" in command for command in commands))
 """
     (tmp_path / "cell.py").write_text(script)
     command = [sys.executable, str(tmp_path / "cell.py")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
         assert process.stdout is not None
         for _ in range(2):  # reports: its workers start
             process.stdout.readline()
@@ -825,15 +1029,36 @@ if __name__ == "__main__":
     assert (process.returncode, output.split()[-2:]) == (0, ["interrupted", "0"])
 
 
-def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback(tmp_path: Path) -> None:
+def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "sweep.json"
-    file.write_text(json.dumps({"problem": BASE, "vary": {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}}))
-    command = [sys.executable, "-m", "veselova", "sweep", str(file), "--folder", str(tmp_path / "kept"), "--workers", "2"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+    file.write_text(
+        json.dumps({"problem": BASE, "vary": {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}})
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "veselova",
+        "sweep",
+        str(file),
+        "--folder",
+        str(tmp_path / "kept"),
+        "--workers",
+        "2",
+    ]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
 
         def workers() -> int:
-            children = " ".join(path.read_text() for path in Path(f"/proc/{process.pid}/task").glob("*/children")).split()
-            return sum("multiprocessing.spawn" in Path(f"/proc/{child}/cmdline").read_text() for child in children)
+            children = " ".join(
+                path.read_text() for path in Path(f"/proc/{process.pid}/task").glob("*/children")
+            ).split()
+            return sum(
+                "multiprocessing.spawn" in Path(f"/proc/{child}/cmdline").read_text()
+                for child in children
+            )
 
         wait_until(lambda: workers() == 2)
         os.killpg(process.pid, signal.SIGINT)
@@ -846,18 +1071,24 @@ PLAIN_SCRIPT = """
 import veselova as vs
 problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])
 {before}
-dataset = vs.sweep(problem, {{"/A/0": {{"start": 2.5, "stop": 5, "count": {count}}}}}, folder={folder!r})
+vary = {{"/A/0": {{"start": 2.5, "stop": 5, "count": {count}}}}}
+dataset = vs.sweep(problem, vary, folder={folder!r})
 print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
 """
 
 
 @pytest.mark.parametrize(
-    ("before", "warns"), [("", False), ("import veselova.service.cli.local_sweep as l; l._SOON_S = 0.0", True)]
+    ("before", "warns"),
+    [("", False), ("import veselova.service.cli.local_sweep as l; l._SOON_S = 0.0", True)],
 )
-def test_a_sweep_in_a_plain_script_is_computed_in_its_process(before: str, warns: bool, tmp_path: Path) -> None:
+def test_a_sweep_in_a_plain_script_is_computed_in_its_process(
+    before: str, warns: bool, tmp_path: Path
+) -> None:
     script = tmp_path / "script.py"
     script.write_text(PLAIN_SCRIPT.format(before=before, count=60, folder=str(tmp_path / "kept")))
-    answer = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE)
+    answer = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.strip() == "{'A.0': 60} {'solved'}"
     assert ("computed in this process alone" in answer.stderr) is warns
@@ -870,14 +1101,21 @@ def test_a_sweep_in_a_plain_script_is_computed_in_its_process(before: str, warns
         ("def f():\n    print(unguarded())\nf()", "True"),
         ("if __name__ == '__main__':\n    print(unguarded())", "False"),
         ("def f():\n    print(unguarded())\nif '__main__' == __name__:\n    f()", "False"),
-        ("import threading\nt = threading.Thread(target=lambda: print(unguarded()))\nt.start()\nt.join()", "True"),
+        (
+            "import threading\nt = threading.Thread(target=lambda: "
+            "print(unguarded()))\nt.start()\nt.join()",
+            "True",
+        ),
     ],
 )
 def test_a_script_knows_whether_it_is_guarded(text: str, expected: str, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(f"from veselova.service.cli.script_guard import unguarded\n{text}\n")
     command = [[sys.executable, str(script)], [sys.executable, "-c", script.read_text()]]
-    answers = [subprocess.run(one, capture_output=True, text=True, check=True).stdout.strip() for one in command]
+    answers = [
+        subprocess.run(one, capture_output=True, text=True, check=True).stdout.strip()
+        for one in command
+    ]
     assert answers == [expected, "False"]
 
 

@@ -1,4 +1,6 @@
-"""Every system through every door: the same problem in Python, JSON, HTTP, the client, files and pictures."""
+"""Every system through every door: the same problem in Python, JSON, HTTP, the client, files and
+pictures.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,12 @@ from veselova import (
 )
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 from veselova.service.api.problem_models import SYSTEMS
-from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.request_models import (
+    ComparisonRequest,
+    TorusRequest,
+    TrajectoryRequest,
+    read_request,
+)
 
 TIMES = [-1.0, 0.0, 0.5, 2.0]
 
@@ -35,16 +42,34 @@ PROBLEMS: dict[str, dict[str, Any]] = {
     "veselova": {"A": [3, "3/2", 1], "q": ["0.6", 0, "0.8"], "q_dot": [0, 1, 0]},
     "neumann": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_prime": [0, 1, 0]},
     "ellipsoid-geodesic": {"A": [3, 2, 1], "X": [1, 1, 1], "X_dot": [1, -1, 0], "normalize": True},
-    "veselova-so3": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"], "potential": {"clebsch": 1}},
-    "euler-poisson": {"inertia": [1, 2, 3], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]},
-    "lr": {"n": 3, "rank": 1, "inertia": {"special": [3, 2, 1]}, "omega": [[0, 1, "0.5"], [-1, 0, 0], ["-0.5", 0, 0]]},
+    "veselova-so3": {
+        "inertia": [1, 2, 3],
+        "gamma": ["0.6", 0, "0.8"],
+        "Omega": ["0.8", 1, "-0.6"],
+        "potential": {"clebsch": 1},
+    },
+    "euler-poisson": {
+        "inertia": [1, 2, 3],
+        "gamma": ["0.6", 0, "0.8"],
+        "Omega": ["0.8", 1, "-0.6"],
+    },
+    "lr": {
+        "n": 3,
+        "rank": 1,
+        "inertia": {"special": [3, 2, 1]},
+        "omega": [[0, 1, "0.5"], [-1, 0, 0], ["-0.5", 0, 0]],
+    },
     "separable": {
         "A": [3, "3/2", 1],
         "q": ["0.6", "0.48", "0.64"],
         "q_dot": ["0.8", "-0.36", "-0.48"],
         "potential": {"quadratic": 1, "centrifugal": [0, "0.01", 0]},
     },
-    "stiefel": {"inertia": {"special": [3, 2, 1]}, "X": [[1, 0], [0, 1], [0, 0]], "P": [[0, 1], [-1, 0], ["0.5", 2]]},
+    "stiefel": {
+        "inertia": {"special": [3, 2, 1]},
+        "X": [[1, 0], [0, 1], [0, 0]],
+        "P": [[0, 1], [-1, 0], ["0.5", 2]],
+    },
 }
 
 
@@ -63,7 +88,9 @@ def test_every_system_is_in_the_table() -> None:
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -> None:
     problem = problem_of(name)
-    again = read_request(TorusRequest, orjson.loads(orjson.dumps({"problem": problem.as_dict()}))).problem.problem()
+    again = read_request(
+        TorusRequest, orjson.loads(orjson.dumps({"problem": problem.as_dict()}))
+    ).problem.problem()
     assert again.as_dict() == problem.as_dict()
     found = solve(problem, TIMES)
     assert found.provenance.engine == next(iter(problem.engines))
@@ -71,7 +98,9 @@ def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -
     for output, axes in problem.outputs.items():
         assert np.array_equal(back.series(output), found.series(output))
         assert found.series(output).ndim == 1 + len(axes)
-    assert {key: value.tolist() for key, value in back.integrals.items()} == {k: v.tolist() for k, v in found.integrals.items()}
+    assert {key: value.tolist() for key, value in back.integrals.items()} == {
+        k: v.tolist() for k, v in found.integrals.items()
+    }
 
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
@@ -80,13 +109,18 @@ def test_the_start_is_at_time_zero_and_dense_answers_agree(name: str) -> None:
     found = solve(problem, TIMES, "numeric")
     for output, values in problem.start.items():
         assert np.allclose(found.series(output)[1], values[0], atol=1e-12)
-    assert np.allclose(found.at([2.0]).series(problem.portrait), found.series(problem.portrait)[3:], atol=1e-9)
+    assert np.allclose(
+        found.at([2.0]).series(problem.portrait), found.series(problem.portrait)[3:], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_every_formulation_and_engine_agrees(name: str) -> None:
     problem = problem_of(name)
-    motions = [solve(problem, TIMES, "numeric", formulation=formulation) for formulation in problem.formulations]
+    motions = [
+        solve(problem, TIMES, "numeric", formulation=formulation)
+        for formulation in problem.formulations
+    ]
     if "analytic" in problem.engines:
         motions.append(solve(problem, TIMES, "analytic"))
         both = compare(problem, TIMES)
@@ -96,12 +130,18 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
             assert output in both._repr_html_()
     for other in motions[1:]:
         for output in problem.bounded:
-            difference = np.abs(other.series(output) - motions[0].series(output)).reshape(len(TIMES), -1).max(axis=1)
+            difference = (
+                np.abs(other.series(output) - motions[0].series(output))
+                .reshape(len(TIMES), -1)
+                .max(axis=1)
+            )
             assert np.all(difference <= other.error + motions[0].error)
 
 
 def small_oscillation(name: str, speed: float) -> Any:
-    """Return a start in a minimum of the potential, where the kinetic energy is of order speed² beside the other."""
+    """Return a start in a minimum of the potential, where the kinetic energy is of order speed²
+    beside the other.
+    """
     hanging = [{"coefficient": -1, "powers": [0, 0, 1]}]
     match name:
         case "neumann":
@@ -122,12 +162,19 @@ def small_oscillation(name: str, speed: float) -> Any:
 def test_small_oscillations_are_known_as_well_as_reported(name: str, speed: float) -> None:
     problem, times = small_oscillation(name, speed), [1.0, 9.5, 40.0]
     analytic = [solve(problem, times, "analytic")] if "analytic" in problem.engines else []
-    motions = [solve(problem, times, "numeric", formulation=formulation) for formulation in problem.formulations]
+    motions = [
+        solve(problem, times, "numeric", formulation=formulation)
+        for formulation in problem.formulations
+    ]
     for found in [*motions, solve(problem, times, "numeric", "taylor")]:
         assert np.all(found.error < 1e-10)
         for other in [*analytic, *motions]:
             for output in problem.bounded:
-                difference = np.abs(other.series(output) - found.series(output)).reshape(len(times), -1).max(axis=1)
+                difference = (
+                    np.abs(other.series(output) - found.series(output))
+                    .reshape(len(times), -1)
+                    .max(axis=1)
+                )
                 assert np.all(difference <= other.error + found.error)
 
 
@@ -141,7 +188,9 @@ def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path)
     assert [float(row[problem.time]) for row in rows] == TIMES
     found.to_npz(tmp_path / "x.npz")
     with np.load(tmp_path / "x.npz") as stored:
-        assert all(np.array_equal(stored[output], found.series(output)) for output in problem.outputs)
+        assert all(
+            np.array_equal(stored[output], found.series(output)) for output in problem.outputs
+        )
     assert set(found.to_xarray().data_vars) == {*problem.outputs, "error"}
     found.plot().savefig(tmp_path / "x.png")
     again = pickle.loads(pickle.dumps(found))
@@ -158,7 +207,13 @@ def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
     problem = problem_of(name)
     assert list(response.json()["series"]) == list(problem.outputs)
     with Client(server.url) as client:
-        found = client.trajectory(document(name), TIMES, "numeric", formulation=problem.formulations[-1], budget_s=BUDGET_S)
+        found = client.trajectory(
+            document(name),
+            TIMES,
+            "numeric",
+            formulation=problem.formulations[-1],
+            budget_s=BUDGET_S,
+        )
     expected = solve(problem, TIMES, "numeric", formulation=problem.formulations[-1])
     assert np.array_equal(found.series(problem.portrait), expected.series(problem.portrait))
     assert found.provenance.details["formulation"] == problem.formulations[-1]
@@ -169,27 +224,44 @@ def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_every_field_refuses_what_is_no_number(name: str) -> None:
-    """NaN, booleans, texts, objects, ragged lists, wrong lengths wherever a number may stand: named faults, nothing else."""
+    """NaN, booleans, texts, objects, ragged lists, wrong lengths wherever a number may stand: named
+    faults, nothing else.
+    """
     for field, value in PROBLEMS[name].items():
         if isinstance(value, bool):
             continue
-        for wrong in (float("nan"), True, "x", {"a": 1}, [[1], [1, 2]], [], None, [1, float("inf"), 2], 10**400):
+        for wrong in (
+            float("nan"),
+            True,
+            "x",
+            {"a": 1},
+            [[1], [1, 2]],
+            [],
+            None,
+            [1, float("inf"), 2],
+            10**400,
+        ):
             problem = {**document(name), field: wrong}
             if wrong is None and field in ("potential", "g"):
                 continue
             with pytest.raises((InvalidInput, InvalidRequest)) as caught:
                 read_request(TorusRequest, {"problem": problem}).problem.problem()
             # X of another shape makes another dimension, which the inertia then has not.
-            assert f"problem.{'inertia' if (name, field) == ('stiefel', 'X') and wrong == [[1], [1, 2]] else field}" in str(
-                caught.value
-            )
+            ragged = (name, field) == ("stiefel", "X") and wrong == [[1], [1, 2]]
+            assert f"problem.{'inertia' if ragged else field}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"formulation": "none"}, "formulation: required one of momentum, multipliers; given none."),
-        ({"outputs": ["q"]}, "outputs[0]: required one of omega, frame, momentum, multipliers; given q."),
+        (
+            {"formulation": "none"},
+            "formulation: required one of momentum, multipliers; given none.",
+        ),
+        (
+            {"outputs": ["q"]},
+            "outputs[0]: required one of omega, frame, momentum, multipliers; given q.",
+        ),
         ({"engine": "analytic"}, "engine: required one of numeric for system lr; given analytic."),
     ],
 )
@@ -197,7 +269,9 @@ def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], messag
     from veselova.service.workers.tasks import solve_request
 
     with pytest.raises((InvalidInput, InvalidRequest)) as caught:
-        solve_request(read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change}))
+        solve_request(
+            read_request(TrajectoryRequest, {"problem": document("lr"), "times": TIMES, **change})
+        )
     assert message in str(caught.value)
 
 
@@ -205,5 +279,11 @@ def test_a_system_of_one_engine_cannot_be_compared() -> None:
     from veselova.service.workers.tasks import compare_request
 
     with pytest.raises(InvalidInput) as caught:
-        compare_request(read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES}))
-    assert str(caught.value) == "problem: required a system that both engines solve; given lr, which numeric alone solves."
+        compare_request(
+            read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES})
+        )
+    assert (
+        str(caught.value)
+        == "problem: required a system that both engines solve; given lr, which numeric alone "
+        "solves."
+    )

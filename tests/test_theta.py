@@ -50,7 +50,8 @@ def test_every_characteristic_agrees_with_flint(genus: int, rng: np.random.Gener
         found = Theta(T).values(z[None, :], characteristics)[0]
         for characteristic, value in zip(characteristics, found, strict=True):
             true = expected[as_flint_orders(characteristic)]
-            # FLINT's series carries e^{2πi(m+ε)·(z+δ)}: real where ours is, since pairs ±(m+ε) join.
+            # FLINT's series carries e^{2πi(m+ε)·(z+δ)}: real where ours is, since pairs ±(m+ε)
+            # join.
             assert abs(true.imag) < 1e-14 * scale
             assert abs(value - true.real) < 1e-13 * scale
 
@@ -62,12 +63,16 @@ def test_waves_and_gaussians_are_the_same_function(genus: int, rng: np.random.Ge
     everything = tuple(range(genus))
     series = Theta(T, everything).values(z, characteristics)
     for waves in [(), everything[:1], everything[1:]]:
-        assert np.allclose(Theta(T, waves).values(z, characteristics), series, rtol=1e-12, atol=1e-13)
+        assert np.allclose(
+            Theta(T, waves).values(z, characteristics), series, rtol=1e-12, atol=1e-13
+        )
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3, 4])
 def test_values_at_few_points_are_those_at_many(genus: int, rng: np.random.Generator) -> None:
-    """Few points take all functions at once, many take group after group: with waves, with Gaussians, and with both."""
+    """Few points take all functions at once, many take group after group: with waves, with
+    Gaussians, and with both.
+    """
     T, z = random_riemann_matrix(rng, genus), rng.uniform(-3, 3, (2000, genus))
     characteristics = all_characteristics(genus)[:: 1 + genus**2]
     for waves in (None, (), tuple(range(genus)), (0,)):
@@ -81,17 +86,23 @@ def test_values_at_few_points_are_those_at_many(genus: int, rng: np.random.Gener
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3, 5])
-def test_theta_has_period_one_up_to_the_sign_of_its_characteristic(genus: int, rng: np.random.Generator) -> None:
+def test_theta_has_period_one_up_to_the_sign_of_its_characteristic(
+    genus: int, rng: np.random.Generator
+) -> None:
     theta, z = Theta(random_riemann_matrix(rng, genus)), rng.uniform(-1, 1, (4, genus))
     for characteristic in all_characteristics(genus)[:: genus**2]:
         values = theta.values(z, [characteristic])[:, 0]
         for s in range(genus):
             shifted = theta.values(z + np.eye(genus)[s], [characteristic])[:, 0]
-            assert np.allclose(shifted, (-1) ** characteristic.epsilon[s] * values, rtol=1e-11, atol=1e-13)
+            assert np.allclose(
+                shifted, (-1) ** characteristic.epsilon[s] * values, rtol=1e-11, atol=1e-13
+            )
 
 
 @pytest.mark.parametrize("genus", [1, 2, 3, 4])
-def test_parity_of_theta_is_that_of_its_characteristic(genus: int, rng: np.random.Generator) -> None:
+def test_parity_of_theta_is_that_of_its_characteristic(
+    genus: int, rng: np.random.Generator
+) -> None:
     theta, z = Theta(random_riemann_matrix(rng, genus)), rng.uniform(-1, 1, (4, genus))
     for characteristic in all_characteristics(genus):
         sign = -1 if characteristic.is_odd else 1
@@ -100,7 +111,9 @@ def test_parity_of_theta_is_that_of_its_characteristic(genus: int, rng: np.rando
 
 
 def test_theta_is_quasi_periodic_along_the_imaginary_periods(rng: np.random.Generator) -> None:
-    """θ[ε;δ] with ε moved by one is the same sum: the shadow, at real z, of quasi-periodicity along iT."""
+    """θ[ε;δ] with ε moved by one is the same sum: the shadow, at real z, of quasi-periodicity along
+    iT.
+    """
     T, z = random_riemann_matrix(rng, 2), rng.uniform(-1, 1, (1, 2))
     for epsilon in ([0.0, 0.0], [0.5, 0.0], [0.5, 0.5]):
         for shift in ([1, 0], [0, -2]):
@@ -112,26 +125,40 @@ def test_theta_is_quasi_periodic_along_the_imaginary_periods(rng: np.random.Gene
 
 
 def test_values_below_the_smallest_double_are_zero() -> None:
-    """Between lattice points T = 1e-3 leaves e^−785; what is there taken for more would be a finite quotient of nothing."""
+    """Between lattice points T = 1e-3 leaves e^−785; what is there taken for more would be a finite
+    quotient of nothing.
+    """
     functions = [Characteristic((0,), (0,)), Characteristic((1,), (0,))]
-    assert np.array_equal(Theta(np.array([[1e-3]])).values(np.array([[0.5], [0.45]]), functions), np.zeros((2, 2)))
+    assert np.array_equal(
+        Theta(np.array([[1e-3]])).values(np.array([[0.5], [0.45]]), functions), np.zeros((2, 2))
+    )
 
 
 def test_riemanns_quartic_relation(rng: np.random.Generator) -> None:
-    """In genus one: θ3(0)⁴ = θ2(0)⁴ + θ4(0)⁴, and the two relations between squares at z and at zero."""
+    """In genus one: θ3(0)⁴ = θ2(0)⁴ + θ4(0)⁴, and the two relations between squares at z and at
+    zero.
+    """
     theta = Theta(np.array([[0.8]]))
     z = rng.uniform(-1, 1, (6, 1))
     names = {"θ3": ((0,), (0,)), "θ4": ((0,), (1,)), "θ2": ((1,), (0,)), "θ1": ((1,), (1,))}
     at_z = {k: theta.values(z, [Characteristic(*v)])[:, 0] for k, v in names.items()}
     at_0 = {k: theta.values(np.zeros((1, 1)), [Characteristic(*v)])[0, 0] for k, v in names.items()}
     assert np.isclose(at_0["θ3"] ** 4, at_0["θ2"] ** 4 + at_0["θ4"] ** 4, rtol=1e-13)
-    assert np.allclose(at_z["θ3"] ** 2 * at_0["θ3"] ** 2, at_z["θ4"] ** 2 * at_0["θ4"] ** 2 + at_z["θ2"] ** 2 * at_0["θ2"] ** 2)
-    assert np.allclose(at_z["θ4"] ** 2 * at_0["θ3"] ** 2, at_z["θ3"] ** 2 * at_0["θ4"] ** 2 + at_z["θ1"] ** 2 * at_0["θ2"] ** 2)
+    assert np.allclose(
+        at_z["θ3"] ** 2 * at_0["θ3"] ** 2,
+        at_z["θ4"] ** 2 * at_0["θ4"] ** 2 + at_z["θ2"] ** 2 * at_0["θ2"] ** 2,
+    )
+    assert np.allclose(
+        at_z["θ4"] ** 2 * at_0["θ3"] ** 2,
+        at_z["θ3"] ** 2 * at_0["θ4"] ** 2 + at_z["θ1"] ** 2 * at_0["θ2"] ** 2,
+    )
 
 
 @pytest.mark.parametrize("genus", [2, 3])
 def test_the_addition_theorem_of_second_order_thetas(genus: int, rng: np.random.Generator) -> None:
-    """θ(x+y)θ(x−y) = Σ_ε θ[ε;0](2x; 2T) θ[ε;0](2y; 2T), ε over half periods: Riemann's bilinear addition theorem."""
+    """θ(x+y)θ(x−y) = Σ_ε θ[ε;0](2x; 2T) θ[ε;0](2y; 2T), ε over half periods: Riemann's bilinear
+    addition theorem.
+    """
     T = random_riemann_matrix(rng, genus)
     x, y = rng.uniform(-1, 1, (2, 1, genus))
     zero = Characteristic.zero(genus)
@@ -167,11 +194,15 @@ def test_quotients_agree_with_inversion_in_angles(n: int, rng: np.random.Generat
         by_theta, by_angles = solution.attitude(z, "theta"), solution.attitude(z, "angles")
         assert np.max(np.abs(by_theta.q - by_angles.q)) < 2e-14
         assert np.max(np.abs(by_theta.normals - by_angles.normals)) < 2e-14
-        assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(np.abs(by_angles.components))
+        assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(
+            np.abs(by_angles.components)
+        )
 
 
 def test_reduced_coordinates_leave_the_functions_as_they_are(rng: np.random.Generator) -> None:
-    """Near a separatrix, where the basis is far from that of Z^g, against the lattice sum of Gaussians around each point."""
+    """Near a separatrix, where the basis is far from that of Z^g, against the lattice sum of
+    Gaussians around each point.
+    """
     for genus in (2, 3, 4):
         T = random_riemann_matrix(rng, genus) + 1e-2 * np.eye(genus)
         difference = np.zeros(genus)
@@ -188,7 +219,11 @@ def test_reduced_coordinates_leave_the_functions_as_they_are(rng: np.random.Gene
             for characteristic, value in zip(characteristics, row, strict=True):
                 y = point + np.array(characteristic.delta) / 2
                 nearest = np.rint(y)
-                x = lattice_points(inverse, np.sqrt(39 / np.pi + (y - nearest) @ inverse @ (y - nearest)), nearest - y)
+                x = lattice_points(
+                    inverse,
+                    np.sqrt(39 / np.pi + (y - nearest) @ inverse @ (y - nearest)),
+                    nearest - y,
+                )
                 terms = np.exp(-np.pi * np.sum((x @ inverse) * x, axis=1))
                 signs = np.cos(np.pi * ((x + y) @ np.array(characteristic.epsilon)))
                 scale = np.sqrt(np.linalg.det(inverse))
@@ -207,7 +242,9 @@ def test_a_riemann_matrix_that_doubles_cannot_hold_is_refused() -> None:
 
 
 def test_one_index_constants_are_the_values_at_half_periods() -> None:
-    """|κ_j| from z = 0 (z = ½e_s for an odd index), where every λ_s is the lower (upper) end of its cut."""
+    """|κ_j| from z = 0 (z = ½e_s for an odd index), where every λ_s is the lower (upper) end of its
+    cut.
+    """
     solution = Solution(tagged("reference", "generic")[3].problem())
     curve, g = solution.curve, solution.curve.genus
     theta = Theta(np.asarray(solution.periods.riemann_matrix))
@@ -220,7 +257,9 @@ def test_one_index_constants_are_the_values_at_half_periods() -> None:
             ends[(j - 1) // 2] = curve.branch_points[j + 1]
         values = theta.values(z, [Characteristic.of_branch_point(j, g), Characteristic.zero(g)])[0]
         size = np.prod([abs(curve.branch_points[j] - end) for end in ends])
-        size /= np.prod([abs(curve.differences[j, curve.place["I", k]]) for k in range(g + 1) if k != i])
+        size /= np.prod(
+            [abs(curve.differences[j, curve.place["I", k]]) for k in range(g + 1) if k != i]
+        )
         expected = np.sqrt(size) * abs(values[1] / values[0])
         assert np.isclose(abs(solution.quotients.constants[i]), expected, rtol=1e-12)
 
@@ -228,5 +267,7 @@ def test_one_index_constants_are_the_values_at_half_periods() -> None:
 def test_the_denominator_has_no_real_zero_and_no_cancellation(rng: np.random.Generator) -> None:
     for case in tagged("near-degenerate"):
         genus = case.problem().n - 1
-        values = Solution(case.problem()).quotients.theta.values(rng.uniform(0, 1, (200, genus)), [Characteristic.zero(genus)])
+        values = Solution(case.problem()).quotients.theta.values(
+            rng.uniform(0, 1, (200, genus)), [Characteristic.zero(genus)]
+        )
         assert np.min(values) > 0

@@ -40,14 +40,25 @@ def furthest(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 @pytest.mark.parametrize(
-    "time", [FAR, "123456789012345678.9", 10**20 + 1, Fraction(10**16, 3), Decimal("-31415926535.8979323846")]
+    "time",
+    [
+        FAR,
+        "123456789012345678.9",
+        10**20 + 1,
+        Fraction(10**16, 3),
+        Decimal("-31415926535.8979323846"),
+    ],
 )
 def test_far_times_are_taken_with_all_their_digits(time: Any) -> None:
     found, exact = vs.solve(body(), [time]), vs.solve(body(), [time], digits=20)
     assert furthest(found.frame, exact.frame) <= found.error[0]
     assert found.error[0] < max(1e-11, 1e-28 * abs(float(Fraction(time))))
-    assert Fraction(found.times[0]) + Fraction(found.remainders[0]) == pytest.approx(Fraction(time), rel=1e-31, abs=0)  # type: ignore[index]
-    assert furthest(vs.solve(body(), found.times).frame, found.frame) > 100 * found.error[0], "the remainder counts"
+    assert Fraction(found.times[0]) + Fraction(found.remainders[0]) == pytest.approx(
+        Fraction(time), rel=1e-31, abs=0
+    )  # type: ignore[index]
+    assert furthest(vs.solve(body(), found.times).frame, found.frame) > 100 * found.error[0], (
+        "the remainder counts"
+    )
 
 
 @pytest.mark.parametrize("method", ["theta", "products", "angles"])
@@ -56,7 +67,10 @@ def test_every_method_takes_remainders(method: str, clock: str | None) -> None:
     from veselova.analytic.solve import solve
 
     times = ["100000.1", "200000.3"]
-    found, exact = solve(body(), times, method=method, time_map=clock), vs.solve(body(), times, digits=20)
+    found, exact = (
+        solve(body(), times, method=method, time_map=clock),
+        vs.solve(body(), times, digits=20),
+    )
     assert (np.abs(found.frame - exact.frame).max(axis=(1, 2)) <= found.error).all()
 
 
@@ -66,7 +80,9 @@ def test_remainders_move_a_clock_by_panels() -> None:
 
     times, remainders = np.array([20.0, 30.0]), np.array([1e-3, -2e-3])
     clock = EvaluationPlan(Solution(body()), np.array([0.0, 31.0])).clock("panels")
-    assert np.allclose(clock.tau1(times, remainders)[1], clock.tau1(times + remainders)[1], rtol=0, atol=1e-13)
+    assert np.allclose(
+        clock.tau1(times, remainders)[1], clock.tau1(times + remainders)[1], rtol=0, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,12 +90,19 @@ def test_remainders_move_a_clock_by_panels() -> None:
     [
         vs.NeumannSystem(["3", "2", "1.5"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225"]),
         vs.EllipsoidGeodesic(["3", "2", "1.5"], [math.sqrt(3), 0, 0], [0, 0.6, 0.8]),
-        vs.SeparableVeselova(["3", "2", "1.5"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225"], {"centrifugal": ["0.1", 0, "0.2"]}),
+        vs.SeparableVeselova(
+            ["3", "2", "1.5"],
+            ["0.6", "0", "0.8"],
+            ["0.3", "1", "-0.225"],
+            {"centrifugal": ["0.1", 0, "0.2"]},
+        ),
     ],
     ids=lambda problem: problem.system,
 )
 def test_other_systems_take_remainders_too(problem: Any) -> None:
-    """A time stated as a text lies between its neighbours among doubles, at the place that its velocity says."""
+    """A time stated as a text lies between its neighbours among doubles, at the place that its
+    velocity says.
+    """
     text = "20000.3"
     below, above = (float(np.nextafter(20000.3, side)) for side in (0, 1e6))
     found = vs.solve(problem, [Fraction(below), Fraction(text), Fraction(above)])
@@ -124,7 +147,10 @@ def test_a_grid_of_texts_is_exact_and_one_of_doubles_that_of_linspace() -> None:
         assert plain_grid.remainders is None
         assert (plain_grid.doubles == np.linspace(float(ends[0]), float(ends[1]), 601)).all()
     for end in (Fraction(1, 3), Decimal("0.1"), "1", 2**53 + 1):
-        assert TimeGrid.of({"start": 0, "stop": end, "count": 2}).exact == (0, exact_number(end, ()))
+        assert TimeGrid.of({"start": 0, "stop": end, "count": 2}).exact == (
+            0,
+            exact_number(end, ()),
+        )
 
 
 def test_grids_of_any_size_are_right_to_thirty_digits() -> None:
@@ -177,11 +203,15 @@ def test_decimals_keep_the_order_of_times() -> None:
     found, ordered = vs.solve(body(), times, digits=20), vs.solve(body(), ["0.1", "0.7"], digits=20)
     assert found.decimals is not None
     assert ordered.decimals is not None
-    assert (found.decimals.midpoints["frame"] == ordered.decimals.midpoints["frame"][[1, 0, 1]]).all()
+    assert (
+        found.decimals.midpoints["frame"] == ordered.decimals.midpoints["frame"][[1, 0, 1]]
+    ).all()
     assert (found.decimals.error == ordered.decimals.error[[1, 0, 1]]).all()
 
 
-@pytest.mark.parametrize("time", [2, 2.0, "2", Fraction(2), np.float64(2), np.array(2.0), Decimal(2)])
+@pytest.mark.parametrize(
+    "time", [2, 2.0, "2", Fraction(2), np.float64(2), np.array(2.0), Decimal(2)]
+)
 def test_a_single_number_is_one_time(time: Any) -> None:
     assert vs.solve(body(), time).times.tolist() == [2]
     assert as_request(time) in ([2], ["2"])
@@ -230,7 +260,15 @@ def test_http_and_its_client_take_exact_times_in_any_order(server: Server) -> No
 
 def test_the_command_line_says_what_its_doubles_leave(tmp_path: Path) -> None:
     path = tmp_path / "far.json"
-    path.write_text(json.dumps({"problem": {"system": "veselova", **BODY}, "times": [FAR, 10**17 + 1, 0], "outputs": ["q"]}))
+    path.write_text(
+        json.dumps(
+            {
+                "problem": {"system": "veselova", **BODY},
+                "times": [FAR, 10**17 + 1, 0],
+                "outputs": ["q"],
+            }
+        )
+    )
     answer = CliRunner().invoke(app, ["solve", str(path), "--json"])
     document = json.loads(answer.stdout)
     assert document["times"] == [1000000000.3, 1e17, 0]

@@ -1,4 +1,6 @@
-"""Many tori at once: the numbers of ``torus``, problem by problem, whatever else is computed with them."""
+"""Many tori at once: the numbers of ``torus``, problem by problem, whatever else is computed with
+them.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,20 @@ Array = np.ndarray[Any, Any]
 NUMBERS = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]
 
 
-def starts(rng: np.random.Generator, count: int, n: int, ratio: float) -> tuple[Array, Array, Array]:
-    return np.exp(rng.uniform(0, np.log(ratio), (count, n))), rng.normal(size=(count, n)), rng.normal(size=(count, n))
+def starts(
+    rng: np.random.Generator, count: int, n: int, ratio: float
+) -> tuple[Array, Array, Array]:
+    return (
+        np.exp(rng.uniform(0, np.log(ratio), (count, n))),
+        rng.normal(size=(count, n)),
+        rng.normal(size=(count, n)),
+    )
 
 
 def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Array, Array]:
-    """Return starts with nearly equal A's, near planes q_i = 0, with q̇ nearly along q, and with directions that hardly move."""
+    """Return starts with nearly equal A's, near planes q_i = 0, with q̇ nearly along q, and with
+    directions that hardly move.
+    """
     A, q, q_dot = starts(rng, count, n, 10.0)
     kind, part = np.arange(count) % 4, 10.0 ** -rng.uniform(0, 11, count)
     on_plane = 10.0 ** -rng.uniform(0, 40, count)
@@ -36,7 +46,9 @@ def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Arra
 
 
 def deviation(found: Tori, i: int, problem: Veselova) -> float:
-    """Return the largest difference of any number to that of ``torus``, relative to it (for phases: of a cycle)."""
+    """Return the largest difference of any number to that of ``torus``, relative to it (for phases:
+    of a cycle).
+    """
     expected = torus(problem)
     assert expected.origins == tuple(found.origins[i])
     assert expected.regime == "generic"
@@ -44,7 +56,11 @@ def deviation(found: Tori, i: int, problem: Veselova) -> float:
     for name in NUMBERS:
         there, here = np.atleast_1d(getattr(expected, name)), np.atleast_1d(getattr(found, name)[i])
         assert there.shape == here.shape
-        apart = np.abs(np.mod(here - there + 0.5, 1) - 0.5) if name == "phases" else np.abs(here - there)
+        apart = (
+            np.abs(np.mod(here - there + 0.5, 1) - 0.5)
+            if name == "phases"
+            else np.abs(here - there)
+        )
         size = np.where((there == 0) | (name == "phases"), 1, np.abs(there))
         worst = max(worst, float(np.max(apart / size, initial=0)))
     return worst
@@ -56,7 +72,13 @@ def test_many_tori_are_those_of_each(n: int, rng: np.random.Generator) -> None:
         A, q, q_dot = starts(rng, 15, n, ratio)
         found = tori(A, q, q_dot)
         assert np.all(found.known)
-        assert max(deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in range(15)) < 1e-14
+        assert (
+            max(
+                deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True))
+                for i in range(15)
+            )
+            < 1e-14
+        )
 
 
 @pytest.mark.parametrize("n", range(3, 7))
@@ -65,14 +87,24 @@ def test_narrow_gaps_cost_no_digit(n: int, rng: np.random.Generator) -> None:
     found = tori(A, q, q_dot)
     known = np.flatnonzero(found.known)
     assert known.size >= 25
-    assert max(deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True)) for i in known.tolist()) < 1e-14
+    assert (
+        max(
+            deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True))
+            for i in known.tolist()
+        )
+        < 1e-14
+    )
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("n", range(2, 8))
 def test_a_thousand_tori_are_those_of_each(n: int) -> None:
     rng = np.random.default_rng(n)
-    for draw in (lambda: starts(rng, 250, n, 2.0), lambda: starts(rng, 250, n, 1e4), lambda: difficult(rng, 500, n)):
+    for draw in (
+        lambda: starts(rng, 250, n, 2.0),
+        lambda: starts(rng, 250, n, 1e4),
+        lambda: difficult(rng, 500, n),
+    ):
         A, q, q_dot = draw()
         found = tori(A, q, q_dot)
         for i in np.flatnonzero(found.known).tolist():
@@ -87,7 +119,10 @@ def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
         for part in parts:
             alone = tori(A[part], q[part], q_dot[part])
             for field in fields(Tori):
-                assert getattr(alone, field.name).tobytes() == getattr(whole, field.name)[part].tobytes(), field.name
+                assert (
+                    getattr(alone, field.name).tobytes()
+                    == getattr(whole, field.name)[part].tobytes()
+                ), field.name
 
 
 @pytest.mark.parametrize(
@@ -108,11 +143,16 @@ def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
         ([3, 2, 1], [1, 1, np.inf], [1, 0, -1]),
     ],
 )
-def test_what_needs_more_digits_is_left_out(A: list[float], q: list[float], q_dot: list[float]) -> None:
+def test_what_needs_more_digits_is_left_out(
+    A: list[float], q: list[float], q_dot: list[float]
+) -> None:
     """And what is no problem at all; a neighbour is computed all the same."""
     found = tori([A, [3, 2, 1]], [q, [1, 1, 1]], [q_dot, [1, 0, -1]])
     assert found.known.tolist() == [False, True]
-    assert all(np.all(np.isnan(getattr(found, name)[0])) and np.all(np.isfinite(getattr(found, name)[1])) for name in NUMBERS)
+    assert all(
+        np.all(np.isnan(getattr(found, name)[0])) and np.all(np.isfinite(getattr(found, name)[1]))
+        for name in NUMBERS
+    )
 
 
 @pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])

@@ -10,7 +10,16 @@ from scipy.integrate import quad
 
 from draws import random_problem
 from problems import tagged
-from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Unsolved, Veselova, from_torus, solve, torus
+from veselova import (
+    EllipsoidGeodesic,
+    InvalidInput,
+    NeumannSystem,
+    Unsolved,
+    Veselova,
+    from_torus,
+    solve,
+    torus,
+)
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -18,7 +27,9 @@ def test_constants_and_phases_give_the_start_back(n: int, rng: np.random.Generat
     for _ in range(5):
         problem = random_problem(rng, n)
         found = torus(problem)
-        again = from_torus(problem.A, found.energy, found.constants, found.phases, found.signs, problem.frame)
+        again = from_torus(
+            problem.A, found.energy, found.constants, found.phases, found.signs, problem.frame
+        )
         assert np.max(np.abs(again.q - problem.q)) < 1e-13
         assert np.max(np.abs(again.q_dot - problem.q_dot)) < 1e-13 * np.max(np.abs(problem.q_dot))
         back = torus(again)
@@ -43,21 +54,37 @@ def test_phases_advance_by_the_frequencies() -> None:
     moved = torus(Veselova(problem.A, later.q[0], later.q_dot[0], normalize=True))
     expected = found.phases + found.frequencies_tau1 * later.tau1[0]
     assert np.max(np.abs(np.mod(moved.phases - expected + 0.5, 1) - 0.5)) < 1e-13
-    started = from_torus(problem.A, found.energy, found.constants, expected, np.sign(later.q[0]).astype(int))
+    started = from_torus(
+        problem.A, found.energy, found.constants, expected, np.sign(later.q[0]).astype(int)
+    )
     assert np.allclose(started.q, later.q[0], atol=1e-13)
 
 
-def test_tori_of_neumanns_system_and_of_geodesics_move_their_phases(rng: np.random.Generator) -> None:
+def test_tori_of_neumanns_system_and_of_geodesics_move_their_phases(
+    rng: np.random.Generator,
+) -> None:
     for n in (2, 3, 4, 5):
         A, q, v = rng.uniform(1, 3, n), rng.normal(size=n), rng.normal(size=n)
-        point, geodesic = NeumannSystem(A, q, v, normalize=True), EllipsoidGeodesic(A, q, v, normalize=True)
+        point, geodesic = (
+            NeumannSystem(A, q, v, normalize=True),
+            EllipsoidGeodesic(A, q, v, normalize=True),
+        )
         later, farther = solve(point, [2.5]), solve(geodesic, [2.5])
         moved = torus(NeumannSystem(A, later.q[0], later.q_prime[0], normalize=True))
         shift = moved.phases - torus(point).phases - 2.5 * torus(point).frequencies_t
         assert np.max(np.abs(np.mod(shift + 0.5, 1) - 0.5)) < 1e-12
-        assert np.allclose(torus(point).constants, point.integrals(point.start)["constants"][0], rtol=1e-12, atol=1e-13)
+        assert np.allclose(
+            torus(point).constants,
+            point.integrals(point.start)["constants"][0],
+            rtol=1e-12,
+            atol=1e-13,
+        )
         passed = torus(EllipsoidGeodesic(A, farther.X[0], farther.X_dot[0], normalize=True))
-        shift = passed.phases - torus(geodesic).phases - farther.tau1[0] * torus(geodesic).frequencies_tau1
+        shift = (
+            passed.phases
+            - torus(geodesic).phases
+            - farther.tau1[0] * torus(geodesic).frequencies_tau1
+        )
         assert np.max(np.abs(np.mod(shift + 0.5, 1) - 0.5)) < 1e-12
         assert np.allclose(torus(geodesic).constants, 1 / geodesic.quadrics, rtol=1e-12)
 
@@ -75,14 +102,20 @@ def test_actions_are_loop_integrals(n: int, rng: np.random.Generator) -> None:
             ratio = np.prod(np.abs(point - constants)) / np.prod(np.abs(point - inverse))
             return float(0.5 * np.sqrt(ratio) * (high - low) / 2 * np.sin(angle))
 
-        assert np.isclose(found.actions[s], quad(momentum, 0, np.pi, epsabs=1e-13)[0] / np.pi, rtol=1e-10)
+        assert np.isclose(
+            found.actions[s], quad(momentum, 0, np.pi, epsabs=1e-13)[0] / np.pi, rtol=1e-10
+        )
     assert found.rotation_numbers[0] == 1
     assert np.allclose(found.rotation_numbers, found.frequencies_t / found.frequencies_t[0])
 
 
 @pytest.mark.parametrize("n", [3, 4])
-def test_frequencies_are_derivatives_of_the_energy_in_the_actions(n: int, rng: np.random.Generator) -> None:
-    """Within c_1 = 0: dH = 2π f·dJ with H = ½(Σ I_i − Σ c_k), Neumann's energy, for every change of the other constants."""
+def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
+    n: int, rng: np.random.Generator
+) -> None:
+    """Within c_1 = 0: dH = 2π f·dJ with H = ½(Σ I_i − Σ c_k), Neumann's energy, for every change of
+    the other constants.
+    """
     problem = random_problem(rng, n, ratio=5.0)
     found, step = torus(problem), 1e-5
     for k in range(n - 2):
@@ -90,36 +123,62 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(n: int, rng: n
         for sign in (1, -1):
             constants = found.constants.copy()
             constants[k] += sign * step
-            actions.append(torus(from_torus(problem.A, 1, constants, found.phases, found.signs)).actions)
+            actions.append(
+                torus(from_torus(problem.A, 1, constants, found.phases, found.signs)).actions
+            )
         change = (actions[0] - actions[1]) / (2 * step)
         terms = 2 * np.pi * found.frequencies_tau1 * change
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
 
 
 @pytest.mark.parametrize("small", [1e-81, 1e-140])
-def test_narrow_intervals_whose_product_is_no_float_are_those_of_a_plane_motion(small: float) -> None:
-    """Two directions that hardly move make two neighbouring cuts of such widths squared; until they grow, a plane is left."""
+def test_narrow_intervals_whose_product_is_no_float_are_those_of_a_plane_motion(
+    small: float,
+) -> None:
+    """Two directions that hardly move make two neighbouring cuts of such widths squared; until they
+    grow, a plane is left.
+    """
     problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
     plane = Veselova([4, 1], [1, 1], [1, -1.5], normalize=True)
     assert np.isclose(torus(problem).periods[0, 0], torus(plane).periods[0, 0], rtol=1e-14)
-    found, within = solve(problem, [1.0, 10.0]), Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True)
+    found, within = (
+        solve(problem, [1.0, 10.0]),
+        Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True),
+    )
     integrated = solve(within, [1.0, 10.0], "numeric")
     assert np.max(found.error) < 1e-11
     assert np.all(np.abs(found.q - integrated.q) <= (found.error + integrated.error)[:, None])
 
 
 @pytest.mark.parametrize(
-    ("name", "regime"), [("body4", "generic"), ("two-pairs", "closed-cut"), ("planar", "closed-cut"), ("umbilic", "separatrix")]
+    ("name", "regime"),
+    [
+        ("body4", "generic"),
+        ("two-pairs", "closed-cut"),
+        ("planar", "closed-cut"),
+        ("umbilic", "separatrix"),
+    ],
 )
 def test_the_regime_is_named(name: str, regime: str) -> None:
-    case = next(case for tag in ("generic", "closed-cut", "separatrix") for case in tagged(tag) if case.name == name)
+    case = next(
+        case
+        for tag in ("generic", "closed-cut", "separatrix")
+        for case in tagged(tag)
+        if case.name == name
+    )
     found = torus(case.problem())
     assert found.regime == regime
     assert found.constants.size == found.n - 2
     assert np.allclose(found.constants, case.problem().constants, atol=1e-13)
 
 
-GOOD: dict[str, Any] = {"A": [3, 2, 1], "energy": 1, "constants": ["0.6"], "phases": [0.1, 0.2], "signs": [1, 1, -1]}
+GOOD: dict[str, Any] = {
+    "A": [3, 2, 1],
+    "energy": 1,
+    "constants": ["0.6"],
+    "phases": [0.1, 0.2],
+    "signs": [1, 1, -1],
+}
 
 
 @pytest.mark.parametrize(
@@ -148,6 +207,10 @@ def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[st
 @pytest.mark.parametrize("A", [["1e-300", "1e300"], ["1e150", "1e-150", 1]], ids=str)
 def test_moments_too_far_apart_for_floats_are_refused_by_name(A: list[Any]) -> None:
     problem = Veselova(A, [3, 4, 0][: len(A)], [4, -3, 1][: len(A)], normalize=True)
-    for ask in (torus, lambda problem: solve(problem, [1.0]), lambda problem: solve(problem, [1.0], digits=30)):
+    for ask in (
+        torus,
+        lambda problem: solve(problem, [1.0]),
+        lambda problem: solve(problem, [1.0], digits=30),
+    ):
         with pytest.raises(Unsolved, match="beyond-floats: the A's are too far apart"):
             ask(problem)

@@ -1,4 +1,6 @@
-"""Nonuniform FFTs along an orbit against the theta sums, point by point, and what they make of the motion."""
+"""Nonuniform FFTs along an orbit against the theta sums, point by point, and what they make of the
+motion.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def entries(at: Any) -> Any:
 
 
 def assert_like_theta_sums(solution: Solution, cycles: Any) -> None:
-    """At the given cycles of the fastest phase the entries differ by no more than what is stated."""
+    """At the given cycles of the fastest phase the entries differ by no more than
+    what is stated.
+    """
     tau1 = cycles / np.max(np.abs(solution.in_tau1.rates))
     z = solution.in_tau1.phases(tau1)
     found, rounding = solution.transforms.at(tau1, z)
@@ -42,7 +46,9 @@ def test_transforms_are_the_theta_sums_to_the_stated_rounding(case: Case) -> Non
     """Dense and sparse, backwards and forwards."""
     solution = Solution(case.problem())
     scattered = np.random.default_rng(1).uniform(-30, 30, 1500)
-    assert_like_theta_sums(solution, np.unique(np.concatenate([scattered, np.linspace(-1000, 1000, 30)])))
+    assert_like_theta_sums(
+        solution, np.unique(np.concatenate([scattered, np.linspace(-1000, 1000, 30)]))
+    )
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-8, 1e-14])
@@ -71,7 +77,9 @@ def test_the_motion_is_that_of_theta_sums_at_many_times(rng: np.random.Generator
     found, expected = solve(problem, times, method="nufft"), solve(problem, times, method="theta")
     assert found.provenance.method == "nufft"
     assert found.provenance.details["evaluations"] == times.size
-    assert np.all(np.max(np.abs(found.frame - expected.frame), axis=(1, 2)) <= found.error + expected.error)
+    assert np.all(
+        np.max(np.abs(found.frame - expected.frame), axis=(1, 2)) <= found.error + expected.error
+    )
     assert np.max(found.error - expected.error) < 2e-13
     assert np.max(np.abs(found.spheroconic - expected.spheroconic)) < 1e-11
 
@@ -86,7 +94,9 @@ def test_far_times_keep_their_digits(t: float) -> None:
     assert np.max(np.abs(found.frame - expected.frame)) < 3e-13
 
 
-def test_windows_that_hold_few_times_take_no_transform(monkeypatch: Any, rng: np.random.Generator) -> None:
+def test_windows_that_hold_few_times_take_no_transform(
+    monkeypatch: Any, rng: np.random.Generator
+) -> None:
     solution, calls = Solution(random_problem(rng, 4)), 0
 
     def counted(*arguments: Any, **options: Any) -> Any:
@@ -107,7 +117,9 @@ def test_windows_that_hold_few_times_take_no_transform(monkeypatch: Any, rng: np
 def test_adversarial_starts_are_served_honestly_or_refused_by_name(seed: int) -> None:
     name, problem = adversarial_start(np.random.default_rng([2024, seed]), 2 + seed % 4)
     fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
-    times = np.array([-5, 0, 0.1, 1, 5]) * min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
+    times = np.array([-5, 0, 0.1, 1, 5]) * min(
+        1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest
+    )
     times = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], 200)]))
     found = answer(problem, times)
     if isinstance(found, Unsolved):
@@ -115,11 +127,15 @@ def test_adversarial_starts_are_served_honestly_or_refused_by_name(seed: int) ->
         return
     chosen = np.linspace(0, times.size - 1, 9).astype(int)
     frame = true_motion(problem, times[chosen])[0]
-    assert np.all(np.max(np.abs(found.frame[chosen] - frame), axis=(1, 2)) <= found.error[chosen]), name
+    assert np.all(
+        np.max(np.abs(found.frame[chosen] - frame), axis=(1, 2)) <= found.error[chosen]
+    ), name
 
 
 def test_sums_that_leave_no_digit_are_a_named_outcome() -> None:
-    problem = Veselova(["1", "1/10", "1/26"], ["3/5", "1e-100", "4/5"], ["4/5", 1, "-3/5"], normalize=True)
+    problem = Veselova(
+        ["1", "1/10", "1/26"], ["3/5", "1e-100", "4/5"], ["4/5", 1, "-3/5"], normalize=True
+    )
     times = np.linspace(0, 20, 300)
     assert np.max(solve(problem, times, method="theta").error) < 1e-6
     with pytest.raises(Unsolved, match="sums of nufft cancel") as raised:
@@ -135,4 +151,9 @@ def test_sums_that_would_fill_the_memory_are_a_named_outcome(rng: np.random.Gene
 
 def test_transforms_are_never_taken_of_themselves() -> None:
     assert {Solution(case.problem()).default_method() for case in MOVING} == {"theta", "angles"}
-    assert solve(tagged("generic")[1].problem(), [1.0], method="nufft").provenance.details["theta_terms"] > 1
+    assert (
+        solve(tagged("generic")[1].problem(), [1.0], method="nufft").provenance.details[
+            "theta_terms"
+        ]
+        > 1
+    )

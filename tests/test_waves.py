@@ -32,13 +32,21 @@ def test_few_waves_are_those_of_many(count: int, rng: np.random.Generator) -> No
 
 
 def test_no_order_but_zero_is_a_constant(rng: np.random.Generator) -> None:
-    assert np.array_equal(waves(turns(rng.uniform(-3, 3, (6, 2)), 0), np.zeros((3, 2), dtype=np.int64)), np.ones((3, 6)))
+    assert np.array_equal(
+        waves(turns(rng.uniform(-3, 3, (6, 2)), 0), np.zeros((3, 2), dtype=np.int64)),
+        np.ones((3, 6)),
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 30])
-def test_sums_of_doubles_are_those_of_every_arithmetic(count: int, rng: np.random.Generator) -> None:
+def test_sums_of_doubles_are_those_of_every_arithmetic(
+    count: int, rng: np.random.Generator
+) -> None:
     coefficients, psi = rng.normal(size=(3, count, 4)), rng.uniform(-6, 6, (20, 3))
     for name in ("sine_sums", "cosine_sums"):
-        found, expected = getattr(DOUBLE, name)(coefficients)(psi), getattr(Arithmetic, name)(DOUBLE, coefficients)(psi)
+        found, expected = (
+            getattr(DOUBLE, name)(coefficients)(psi),
+            getattr(Arithmetic, name)(DOUBLE, coefficients)(psi),
+        )
         assert found.shape == expected.shape
         assert np.allclose(found, expected, rtol=0, atol=2e-14 * np.sum(np.abs(coefficients))), name

@@ -1,4 +1,6 @@
-"""Full matrices: principal axes beyond doubles, and errors that hold whatever the condition of the matrix."""
+"""Full matrices: principal axes beyond doubles, and errors that hold whatever the condition of the
+matrix.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def test_principal_axes_have_sixty_digits(n: int, rng: np.random.Generator) -> N
         columns = [[Fraction(x, 1 << 320) for x in column] for column in found.columns.T.tolist()]
         for value, column in zip(found.values, columns, strict=True):
             image = [sum(a * x for a, x in zip(row, column, strict=True)) for row in matrix]
-            assert max(abs(a - value * x) for a, x in zip(image, column, strict=True)) < Fraction(1, 10**70)
+            assert max(abs(a - value * x) for a, x in zip(image, column, strict=True)) < Fraction(
+                1, 10**70
+            )
             assert abs(sum(x * x for x in column) - 1) < Fraction(1, 10**70)
         assert np.isclose(np.linalg.det(found.rounded), 1, atol=1e-14)
 
@@ -56,7 +60,9 @@ def _in_forty_digits(A: Any, q: Any, q_dot: Any, inverse: bool) -> tuple[Veselov
 
 @pytest.mark.parametrize("seed", range(30))
 def test_errors_of_a_full_matrix_hold(seed: int) -> None:
-    """Against the same motion along principal axes in 40 digits, whose own error is that of a diagonal A."""
+    """Against the same motion along principal axes in 40 digits, whose own error is that of a
+    diagonal A.
+    """
     rng = np.random.default_rng([20251125, seed])
     on_group, condition = seed % 2 == 1, 10.0 ** (8 * seed / 29)
     A = _matrix(rng, 3 if on_group else 2 + seed // 2 % 4, condition)
@@ -65,9 +71,14 @@ def test_errors_of_a_full_matrix_hold(seed: int) -> None:
         q = q / np.linalg.norm(q)
         problem: Any = VeselovaSO3(A, q, np.cross(q, v))
         with mpmath.workdps(50):
-            gamma, Omega = (list(map(mpmath.mpf, x)) for x in (problem.given["gamma"], problem.given["Omega"]))
+            gamma, Omega = (
+                list(map(mpmath.mpf, x)) for x in (problem.given["gamma"], problem.given["Omega"])
+            )
             length = mpmath.norm(mpmath.matrix(gamma))
-            v = [(gamma[i - 2] * Omega[i - 1] - gamma[i - 1] * Omega[i - 2]) / length for i in range(3)]
+            v = [
+                (gamma[i - 2] * Omega[i - 1] - gamma[i - 1] * Omega[i - 2]) / length
+                for i in range(3)
+            ]
             reference, axes = _in_forty_digits(A, gamma, v, inverse=True)
     else:
         problem = Veselova(A, q, v, normalize=True)

@@ -49,7 +49,11 @@ def test_products_are_taken_at_every_time_and_windows_at_few() -> None:
     problem, times = random_problem(np.random.default_rng(5), 4), np.linspace(-20, 40, 3000)
     windows, products = solve(problem, times), solve(problem, times, method="products")
     assert products.provenance.method == "products"
-    assert products.provenance.details["evaluations"] == times.size > windows.provenance.details["evaluations"]
+    assert (
+        products.provenance.details["evaluations"]
+        == times.size
+        > windows.provenance.details["evaluations"]
+    )
     assert_one_motion(windows, products, np.arange(times.size))
     assert np.max(np.abs(windows.frame - products.frame)) < 1e-13
 
@@ -59,11 +63,17 @@ def test_products_are_taken_at_every_time_and_windows_at_few() -> None:
 def test_windows_serve_either_clock_and_route(method: str, clock: str) -> None:
     problem = random_problem(np.random.default_rng(4), 4)
     # Dense here, sparse there, and in both directions.
-    times = np.unique(np.concatenate([np.linspace(-9, -7, 800), np.linspace(-5, 30, 50), np.geomspace(1e-6, 8, 900)]))
+    times = np.unique(
+        np.concatenate(
+            [np.linspace(-9, -7, 800), np.linspace(-5, 30, 50), np.geomspace(1e-6, 8, 900)]
+        )
+    )
     chosen = np.arange(0, times.size, 20)
     many = solve_analytic(problem, times, method=method, time_map=clock)
     assert many.provenance.details["evaluations"] < times.size
-    assert_one_motion(many, solve_analytic(problem, times[chosen], method=method, time_map=clock), chosen)
+    assert_one_motion(
+        many, solve_analytic(problem, times[chosen], method=method, time_map=clock), chosen
+    )
     identity = np.swapaxes(many.frame, 1, 2) @ many.frame
     assert np.max(np.abs(identity - np.eye(4))) < 1e-13
 
@@ -79,7 +89,9 @@ def test_far_windows_keep_every_digit() -> None:
 
 def test_stretches_far_apart_have_windows_of_their_own() -> None:
     problem = random_problem(np.random.default_rng(6), 3)
-    times = np.unique(np.concatenate([start + np.linspace(0, 3, 700) for start in (-1e6, -2.0, 10.0, 1e5)]))
+    times = np.unique(
+        np.concatenate([start + np.linspace(0, 3, 700) for start in (-1e6, -2.0, 10.0, 1e5)])
+    )
     many, chosen = solve(problem, times), np.arange(0, times.size, 13)
     assert many.provenance.details["evaluations"] < times.size
     assert_one_motion(many, solve(problem, times[chosen]), chosen)
@@ -128,14 +140,23 @@ def test_windows_that_adjoin_tell_the_time_themselves(n: int, span: tuple[float,
     problem = random_problem(np.random.default_rng(6), n, 100.0)
     times, chosen = np.linspace(*span, 3000) / problem.turning, np.arange(0, 3000, 37)
     many = solve_analytic(problem, times, time_map="panels")
-    assert many.provenance.details["time_map_size"] <= many.provenance.details["evaluations"] < times.size
+    assert (
+        many.provenance.details["time_map_size"]
+        <= many.provenance.details["evaluations"]
+        < times.size
+    )
     for clock in ("panels", "fourier"):
         assert_one_motion(many, solve_analytic(problem, times[chosen], time_map=clock), chosen)
     at_zero = np.argmin(np.abs(times))
-    assert many.error[at_zero] <= 2 * solve_analytic(problem, times[[at_zero]], time_map="panels").error[0]
+    assert (
+        many.error[at_zero]
+        <= 2 * solve_analytic(problem, times[[at_zero]], time_map="panels").error[0]
+    )
 
 
-def test_windows_that_would_take_too_much_memory_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_that_would_take_too_much_memory_are_not_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     problem, times = random_problem(np.random.default_rng(6), 4), np.linspace(0, 30, 3000)
     kept = solve_analytic(problem, times, time_map="panels")
     monkeypatch.setattr(track, "_MOST_KEPT", 10_000)
@@ -148,19 +169,29 @@ def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     problem = random_problem(np.random.default_rng(301), 3, 30.0)
     cycle = 1 / np.max(np.abs(Solution(problem).in_time.rates))
     near = np.linspace(-0.3 * cycle, 0, 40)
-    far, alone = (solve_analytic(problem, times, time_map="panels") for times in (np.append(-7000 * cycle, near), near))
+    far, alone = (
+        solve_analytic(problem, times, time_map="panels")
+        for times in (np.append(-7000 * cycle, near), near)
+    )
     difference = np.max(np.abs(far.frame[1:] - alone.frame), axis=(1, 2))
     assert np.all(difference <= far.error[1:] + alone.error)
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.75, -3.0, 3e5, -(2.0**40), 0.0031415926535897934, -0.31415926535897934])
+@pytest.mark.parametrize(
+    "begin", [0.0, 0.75, -3.0, 3e5, -(2.0**40), 0.0031415926535897934, -0.31415926535897934]
+)
 def test_times_next_to_borders_are_placed_as_if_these_were_not_rounded(begin: float) -> None:
     offsets = np.sort(np.random.default_rng(6).uniform(0, 3, 200))
     sums = begin + offsets
-    times = np.unique(np.concatenate([sums, np.nextafter(sums, np.inf), np.nextafter(sums, -np.inf)]))
+    times = np.unique(
+        np.concatenate([sums, np.nextafter(sums, np.inf), np.nextafter(sums, -np.inf)])
+    )
     found = pieces._first_from(times, np.full(200, begin), offsets)
     exact = [Fraction(t) for t in times.tolist()]
-    expected = [next(i for i, t in enumerate(exact) if t >= Fraction(begin) + Fraction(o)) for o in offsets.tolist()]
+    expected = [
+        next(i for i, t in enumerate(exact) if t >= Fraction(begin) + Fraction(o))
+        for o in offsets.tolist()
+    ]
     assert found.tolist() == expected
 
 
@@ -182,14 +213,17 @@ import numpy as np
 from veselova import Veselova, solve
 
 for k in range(8):
-    problem = Veselova(A=[4, 3, 2, 1 + k / 100], q=[1, 1, 1, 1], q_dot=[0.3, -0.7, 0.4, 0], normalize=True)
+    A, q_dot = [4, 3, 2, 1 + k / 100], [0.3, -0.7, 0.4, 0]
+    problem = Veselova(A, [1, 1, 1, 1], q_dot, normalize=True)
     if k == 4:
         before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
     solve(problem, np.linspace(0, 100, 1000))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
     # Dask, where a test has loaded it, sets glibc's threshold for all processes that follow.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")
+    }
     command = [sys.executable, "-c", code]
     asked = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     assert int(asked.stdout) < 300  # a dozen; a thousand and more where every temporary comes anew

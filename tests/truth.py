@@ -1,7 +1,8 @@
-"""The true motion: the Neumann form in physical time, integrated by heyoka in binary128 (34 digits).
+"""The true motion: the Neumann form in physical time, integrated by heyoka in binary128 (34
+digits).
 
-It shares nothing with the engines under test: other equations (Neumann's, not the extended system), other arithmetic, and
-the start rounded to 34 digits straight from the exact input.
+It shares nothing with the engines under test: other equations (Neumann's, not the extended system),
+other arithmetic, and the start rounded to 34 digits straight from the exact input.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 
 Array = NDArray[np.float64]
 
-#: Steps from one time to the next before giving up: minutes. A's over many orders of magnitude can ask for as many.
+#: Steps from one time to the next before giving up: minutes. A's over many orders of magnitude can
+#: ask for as many.
 MOST_STEPS = 20_000
 
 _CONTEXT = mpmath.MPContext()
@@ -48,22 +50,26 @@ def _integrator(n: int, time: str = "t") -> Any:
         equations += [(column[i], rate * (v[i] * along_q - q[i] * along_v)) for i in range(n)]
     equations.append((tau1, rate))
     zeros = [quad(0)] * (2 * n + n * (n - 1) + 1)
-    return hy.taylor_adaptive(equations, zeros, fp_type=quad, compact_mode=True, pars=[quad(1)] * (2 * n + 1))
+    return hy.taylor_adaptive(
+        equations, zeros, fp_type=quad, compact_mode=True, pars=[quad(1)] * (2 * n + 1)
+    )
 
 
 def true_motion(
     problem: TorusProblem, times: Array, frame: Any = None, most_steps: int = MOST_STEPS
 ) -> tuple[Array, Array, Array]:
-    """Return (frame, velocity, τ₁) at the problem's own times, rounded to double from 34 digits; ``frame``: exact strings.
+    """Return (frame, velocity, τ₁) at the problem's own times, rounded to double from 34 digits;
+    ``frame``: exact strings.
 
-    A frame left to the problem is taken as the problem's own doubles, made orthogonal in high precision. The velocity is dq/dt,
-    or dq/dτ₁ but for Veselova's system.
+    A frame left to the problem is taken as the problem's own doubles, made orthogonal in high
+    precision. The velocity is dq/dt, or dq/dτ₁ but for Veselova's system.
     """
     import heyoka as hy
 
     mp = _CONTEXT
     exact, n = problem.exact, problem.n
-    unit = max(exact.A)  # the motion does not know the unit of A, and time is counted in units of 1/max|q̇|
+    # the motion does not know the unit of A, and time is counted in units of 1/max|q̇|
+    unit = max(exact.A)
     A = [mp.mpf((a / unit).numerator) / (a / unit).denominator for a in exact.A]
     q = [mp.mpf(x.numerator) / x.denominator for x in exact.q]
     q_dot = [mp.mpf(x.numerator) / x.denominator for x in exact.q_dot]
@@ -71,11 +77,16 @@ def true_motion(
     q = [x / length for x in q]
     slope = mp.fsum(x * y for x, y in zip(q, q_dot, strict=True))
     q_dot = [y - slope * x for x, y in zip(q, q_dot, strict=True)]
-    wedge, rate, speed, q_dot = _start(problem.time, A, q, q_dot, mp.sqrt(mp.mpf(unit.numerator) / unit.denominator))
+    wedge, rate, speed, q_dot = _start(
+        problem.time, A, q, q_dot, mp.sqrt(mp.mpf(unit.numerator) / unit.denominator)
+    )
     columns = [q]
     source = problem.frame if frame is None else frame
     for k in range(1, n):
-        column = [mp.mpf(str(source[i][k]) if isinstance(source[i][k], str) else float(source[i][k])) for i in range(n)]
+        column = [
+            mp.mpf(str(source[i][k]) if isinstance(source[i][k], str) else float(source[i][k]))
+            for i in range(n)
+        ]
         for _ in range(2):
             for other in columns:
                 overlap = mp.fsum(x * y for x, y in zip(other, column, strict=True))
@@ -86,7 +97,12 @@ def true_motion(
     def quad(x: Any) -> Any:
         return hy.real128(mp.nstr(x, 36))
 
-    start = [*q, *(y / rate for y in q_dot), *(columns[k][i] for k in range(1, n) for i in range(n)), mp.zero]
+    start = [
+        *q,
+        *(y / rate for y in q_dot),
+        *(columns[k][i] for k in range(1, n) for i in range(n)),
+        mp.zero,
+    ]
     parameters = [*A, *(1 / a for a in A), wedge]
     integrator = _integrator(n, problem.time)
     integrator.pars[:] = [quad(x) for x in parameters]
@@ -96,7 +112,9 @@ def true_motion(
         integrator.state[:] = [quad(x) for x in start]
         indices = np.flatnonzero(times >= 0) if direction > 0 else np.flatnonzero(times < 0)[::-1]
         for index in indices:
-            outcome = integrator.propagate_until(quad(mp.mpf(float(times[index])) * speed), max_steps=most_steps)[0]
+            outcome = integrator.propagate_until(
+                quad(mp.mpf(float(times[index])) * speed), max_steps=most_steps
+            )[0]
             if outcome != hy.taylor_outcome.time_limit:
                 raise TimeoutError(f"integration in binary128 ended with {outcome}")
             results[index] = [float(x) for x in integrator.state]
@@ -114,22 +132,31 @@ def true_motion(
 
 
 def _start(time: str, A: Any, q: Any, q_dot: Any, root: Any) -> tuple[Any, Any, Any, Any]:
-    """Return (W, by what the velocity is to be divided, one over the unit of time, the velocity); ``root``: of the unit of A.
+    """Return (W, by what the velocity is to be divided, one over the unit of time, the velocity);
+    ``root``: of the unit of A.
 
-    With w the A-orthogonal part of q̇: (dτ₁/dt)² = (w,Aw) = W/(q,Aq), and dτ₁/ds = √J (q,Aq), J = (w,Aw)/((Aw,Aw)(q,Aq)).
+    With w the A-orthogonal part of q̇: (dτ₁/dt)² = (w,Aw) = W/(q,Aq), and dτ₁/ds = √J (q,Aq), J =
+    (w,Aw)/((Aw,Aw)(q,Aq)).
     """
     mp, n = _CONTEXT, len(A)
     if time == "tau1":  # in units of root
         return mp.one, 1 / root, 1 / root, q_dot
     speed = max(abs(y) for y in q_dot)
     v = [y / speed for y in q_dot]
-    wedge = mp.fsum(A[i] * A[j] * (q[i] * v[j] - q[j] * v[i]) ** 2 for j in range(n) for i in range(j))
+    wedge = mp.fsum(
+        A[i] * A[j] * (q[i] * v[j] - q[j] * v[i]) ** 2 for j in range(n) for i in range(j)
+    )
     qAq, qAv = (mp.fsum(a * x * y for a, x, y in zip(A, q, other, strict=True)) for other in (q, v))
     rate = mp.sqrt(wedge / qAq)
     if time == "t":
         return wedge, rate, speed, v
     w = [y - qAv / qAq * x for x, y in zip(q, v, strict=True)]
-    return rate / mp.sqrt(qAq * mp.fsum((a * x) ** 2 for a, x in zip(A, w, strict=True))), rate, 1 / root, v
+    return (
+        rate / mp.sqrt(qAq * mp.fsum((a * x) ** 2 for a, x in zip(A, w, strict=True))),
+        rate,
+        1 / root,
+        v,
+    )
 
 
 @lru_cache(maxsize=16)
@@ -143,17 +170,24 @@ def _geodesic_integrator(n: int) -> Any:
     VIV = hy.sum([c * v * v for c, v in zip(inverse, V, strict=True)])
     equations = [(x, v) for x, v in zip(X, V, strict=True)]
     equations += [(v, -(VIV / uu) * c * x) for v, c, x in zip(V, inverse, X, strict=True)]
-    return hy.taylor_adaptive(equations, [quad(1)] * (2 * n), fp_type=quad, compact_mode=True, pars=[quad(1)] * n)
+    return hy.taylor_adaptive(
+        equations, [quad(1)] * (2 * n), fp_type=quad, compact_mode=True, pars=[quad(1)] * n
+    )
 
 
 def true_geodesic(problem: EllipsoidGeodesic, arcs: Array) -> tuple[Array, Array]:
-    """Return (X, X_dot) at arc lengths from the geodesic equation in binary128, from the exact data."""
+    """Return (X, X_dot) at arc lengths from the geodesic equation in binary128, from the exact
+    data.
+    """
     import heyoka as hy
 
     mp = _CONTEXT
     exact, n = problem.exact, problem.n
     A = [mp.mpf(a.numerator) / a.denominator for a in exact.A]
-    X, V = ([a * mp.mpf(x.numerator) / x.denominator for a, x in zip(A, row, strict=True)] for row in (exact.q, exact.q_dot))
+    X, V = (
+        [a * mp.mpf(x.numerator) / x.denominator for a, x in zip(A, row, strict=True)]
+        for row in (exact.q, exact.q_dot)
+    )
     size = mp.sqrt(mp.fsum(x * x / a for x, a in zip(X, A, strict=True)))
     X = [x / size for x in X]
     normal = [x / a for x, a in zip(X, A, strict=True)]

@@ -21,7 +21,8 @@ DIGITS = 20
 #: Steps of an integration in binary128: half a minute at n = 8.
 STEPS = 3000
 
-#: Classes at which balls need longer than integration, and those of starts at which some integrator would take hours.
+#: Classes at which balls need longer than integration, and those of starts at which some integrator
+#: would take hours.
 FIRST_INTEGRATED = (
     "near a separatrix",
     "separatrix",
@@ -34,7 +35,9 @@ FIRST_INTEGRATED = (
 
 
 def time_unit(problem: Problem) -> float:
-    """Return the time of a radian of turning, or of two cycles of the fastest phase where that is shorter."""
+    """Return the time of a radian of turning, or of two cycles of the fastest phase where that is
+    shorter.
+    """
     turning = min(1 / problem.turning, 1e200) if problem.turning > 0 else 1.0
     if not isinstance(problem, vs.Veselova):
         return turning
@@ -43,7 +46,9 @@ def time_unit(problem: Problem) -> float:
 
 
 def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, Any]:
-    """Return the true error at each time, (N,), and what it may be; raises TimeoutError or Unsolved where none can be had."""
+    """Return the true error at each time, (N,), and what it may be; raises TimeoutError or Unsolved
+    where none can be had.
+    """
     problem, times = found.problem, found.times
     if isinstance(problem, TorusProblem) and problem.moves:
         frame = true_frame(name, problem, times, patience)
@@ -54,15 +59,22 @@ def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, 
             off = np.maximum(off, np.max(np.abs(found.series("X") - X), axis=1))
         return off, found.error
     other = _within(2 * patience, lambda: vs.solve(problem, times, "numeric", "taylor"))
-    gaps = [np.abs(found.series(series) - other.series(series)).reshape(times.size, -1).max(axis=1) for series in problem.bounded]
+    gaps = [
+        np.abs(found.series(series) - other.series(series)).reshape(times.size, -1).max(axis=1)
+        for series in problem.bounded
+    ]
     return np.max(gaps, axis=0), found.error + other.error
 
 
 def true_frame(name: str, problem: TorusProblem, times: Any, patience: int) -> Any:
-    """Return the frames in balls or in binary128, whichever can be had; raises Unsolved or TimeoutError where neither can."""
+    """Return the frames in balls or in binary128, whichever can be had; raises Unsolved or
+    TimeoutError where neither can.
+    """
     ways: list[Callable[[], Any]] = [lambda: true_motion(problem, times, most_steps=STEPS)[0]]
     if isinstance(problem, vs.Veselova):
-        ways.append(lambda: _within(patience, lambda: vs.solve(problem, times, digits=DIGITS).frame))
+        ways.append(
+            lambda: _within(patience, lambda: vs.solve(problem, times, digits=DIGITS).frame)
+        )
         if name not in FIRST_INTEGRATED:
             ways.reverse()
     for way in ways[:-1]:

@@ -1,4 +1,6 @@
-"""Evaluate a closed-form document with NumPy alone: python evaluate.py [document.json values.json]"""
+"""Evaluate a closed-form document with NumPy alone: python evaluate.py [document.json
+values.json]
+"""
 
 import itertools, json, sys  # noqa: E401
 import numpy as np

@@ -1,9 +1,10 @@
-"""Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by integration.
+"""Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by
+integration.
 
-    import veselova as vs
-    problem = vs.Veselova(A=[3, 2, 1.5, 1], q=[0.5, 0.5, 0.5, 0.5], q_dot=[0.5, -0.5, 0.3, -0.3])
-    trajectory = vs.solve(problem, times=[0, 1, 1000])
-    trajectory.frame                                # (3, 4, 4), columns e_i; trajectory.error bounds every component
+    import veselova as vs problem = vs.Veselova(A=[3, 2, 1.5, 1], q=[0.5, 0.5, 0.5, 0.5],
+    q_dot=[0.5, -0.5, 0.3, -0.3]) trajectory = vs.solve(problem, times=[0, 1, 1000])
+    trajectory.frame                                # (3, 4, 4), columns e_i; trajectory.error
+    bounds every component
 
 Names are loaded when first used: importing the client loads neither engine.
 """
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     from veselova.mechanics.groups.matrix_group import MatrixGroup as MatrixGroup
     from veselova.mechanics.results.closed_form import ClosedForm as ClosedForm
     from veselova.mechanics.results.comparison import Comparison as Comparison
+    from veselova.mechanics.results.provenance import Provenance as Provenance
     from veselova.mechanics.results.torus import Torus as Torus
-    from veselova.mechanics.results.trajectory import Provenance as Provenance
     from veselova.mechanics.results.trajectory import Trajectory as Trajectory
     from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
@@ -64,7 +65,7 @@ _HOMES = {
     "MatrixGroup": "veselova.mechanics.groups.matrix_group",
     "NeumannSystem": "veselova.mechanics.systems.neumann",
     "ProblemResponse": "veselova.mechanics.core.errors",
-    "Provenance": "veselova.mechanics.results.trajectory",
+    "Provenance": "veselova.mechanics.results.provenance",
     "SeparableVeselova": "veselova.mechanics.systems.separable_veselova",
     "ServiceError": "veselova.mechanics.core.errors",
     "ServiceUnreachable": "veselova.mechanics.core.errors",
@@ -109,7 +110,8 @@ _EXTRAS = {"AsyncClient": "client", "Client": "client", "sweep": "sweeps"}
 def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
     """Return what to raise where a public name cannot be loaded for want of a library."""
     library = (error.name or "").split(".")[0]
-    if name not in _EXTRAS or library in ("", "veselova"):  # a fault of this package, or of the core
+    # a fault of this package, or of the core
+    if name not in _EXTRAS or library in ("", "veselova"):
         return error
     from veselova.mechanics.core.errors import BackendMissing, install_extra
 

@@ -11,7 +11,9 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the command line; an interrupt while it is still loading ends it as quietly as one later."""
+    """Run the command line; an interrupt while it is still loading ends it as quietly
+    as one later.
+    """
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
     try:
         from veselova.service.cli import main as cli
@@ -29,7 +31,10 @@ def _refuse(error: ModuleNotFoundError) -> NoReturn:
         raise error
     from veselova.mechanics.core.errors import install_extra
 
-    print(f"veselova: the command line needs {library}; install it with: {install_extra('service')}", file=sys.stderr)
+    print(
+        f"veselova: the command line needs {library}; install it with: {install_extra('service')}",
+        file=sys.stderr,
+    )
     raise SystemExit(1)
 
 

@@ -1,4 +1,5 @@
-"""Hyperelliptic curves with real branch points: periods, Riemann matrix, Abel–Jacobi map and its inverse.
+"""Hyperelliptic curves with real branch points: periods, Riemann matrix, Abel–Jacobi map and its
+inverse.
 
 from veselova import curves
 curve = curves.RealHyperelliptic([0, 1, 2, 4, 7])
@@ -30,13 +31,16 @@ Complex = NDArray[np.complex128]
 #: Genera that are served; higher ones are right too, but were not tested.
 _LARGEST_GENUS = 16
 
-#: Rounding of an entry of T in ε, for each unit by which its periods cancel; largest seen over random curves: 6.
+#: Rounding of an entry of T in ε, for each unit by which its periods cancel; largest seen over
+#: random curves: 6.
 _ENTRY_ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class CurvePeriods:
-    """Periods of λ^{k−1}dλ/w, k = 1 … g: ``a`` (g, g) real, ``b`` (g, g) imaginary; column s belongs to the cycle a_s or b_s."""
+    """Periods of λ^{k−1}dλ/w, k = 1 … g: ``a`` (g, g) real, ``b`` (g, g) imaginary; column s
+    belongs to the cycle a_s or b_s.
+    """
 
     a: Array
     b: Complex
@@ -44,7 +48,9 @@ class CurvePeriods:
 
 @dataclass(frozen=True)
 class ThomaeConstant:
-    """Thomae's formula for one partition: |θ[ε;δ](0)|⁴ of a characteristic is ``fourth_power``; ``subset`` numbers the b's."""
+    """Thomae's formula for one partition: |θ[ε;δ](0)|⁴ of a characteristic is ``fourth_power``;
+    ``subset`` numbers the b's.
+    """
 
     subset: tuple[int, ...]
     characteristic: tuple[tuple[float, ...], tuple[float, ...]]
@@ -54,12 +60,14 @@ class ThomaeConstant:
 class RealHyperelliptic:
     """The curve w² = sign·Π(λ−b_j) with 2g+1 or 2g+2 distinct real branch points.
 
-    branch_points   numbers or text ("0.7", "7/10"), taken exactly, in any order; near-coincident ones keep their digits
+    branch_points   numbers or text ("0.7", "7/10"), taken exactly, in any order; near-coincident
+        ones keep their digits
     sign            −1 or 1
 
-    Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once. Raises InvalidInput for
-    repeated, complex or too few branch points. Accuracy: ``riemann_matrix_error``; tested for g = 1 … 10 and gaps to 1e-12
-    against quadrature with 30 digits.
+    Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once.
+    Raises InvalidInput for repeated, complex or too few branch points. Accuracy:
+    ``riemann_matrix_error``; tested for g = 1 … 10 and gaps to 1e-12 against quadrature with 30
+    digits.
     """
 
     def __init__(self, branch_points: ArrayLike | Sequence[Any], sign: int = -1) -> None:
@@ -70,7 +78,10 @@ class RealHyperelliptic:
         self.sign = int(sign)
 
     def __repr__(self) -> str:
-        return f"RealHyperelliptic(genus {self.genus}, {len(self.branch_points)} branch points, sign {self.sign:+d})"
+        return (
+            f"RealHyperelliptic(genus {self.genus}, {len(self.branch_points)} branch points, "
+            f"sign {self.sign:+d})"
+        )
 
     @property
     def genus(self) -> int:
@@ -101,7 +112,8 @@ class RealHyperelliptic:
     def periods(self) -> CurvePeriods:
         """Return the periods of the monomial differentials λ^{k−1}dλ/w.
 
-        On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which ``cuts`` are numbered.
+        On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which
+        ``cuts`` are numbered.
         """
         a, b = self._curve.cycles(self.genus - 1)
         return CurvePeriods(a, np.asarray(1j * b, dtype=complex))
@@ -113,7 +125,9 @@ class RealHyperelliptic:
 
     @cached_property
     def riemann_matrix(self) -> Complex:
-        """Return τ = iT, T real, symmetric, positive definite, (g, g): the b-periods of the normalised differentials."""
+        """Return τ = iT, T real, symmetric, positive definite, (g, g): the b-periods of the
+        normalised differentials.
+        """
         return np.asarray(1j * self._curve.periods.riemann_matrix)
 
     @cached_property
@@ -126,23 +140,30 @@ class RealHyperelliptic:
 
     @property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
-        """Return ω, ω', η, η' (g, g): half the periods over a_s and b_s (columns) of du_k, and of −dr_k, rows k = 1 … g.
+        """Return ω, ω', η, η' (g, g): half the periods over a_s and b_s (columns) of du_k, and of
+        −dr_k, rows k = 1 … g.
 
-        du_k = μ^{k−1}dμ/y and dr_k = Σ_j (j+1−k) m_{j+1+k} μ^j dμ/4y on y² = 4Π(μ−β) = Σ m_i μ^i, in the coordinate μ in which
-        one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are 2g+2.
+        du_k = μ^{k−1}dμ/y and dr_k = Σ_j (j+1−k) m_{j+1+k} μ^j dμ/4y on y² = 4Π(μ−β) = Σ m_i μ^i,
+        in the coordinate μ in which
+        one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are
+        2g+2.
         """
         return self._curve.quasi_periods
 
     @property
     def legendre_residual(self) -> float:
-        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over ½π: Legendre's relation between periods of the first and second kind, a check."""
+        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over ½π: Legendre's relation between periods of the first
+        and second kind, a check.
+        """
         omega, omega_prime, eta, eta_prime = self._curve.quasi_periods
         found = (omega @ eta_prime.T - omega_prime @ eta.T) / (np.pi / 2)
         return float(np.max(np.abs(np.abs(found) - np.eye(self.genus))))
 
     @cached_property
     def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
-        """Return (ε, δ) of each branch point: τε + δ is its image under ``abel``; zero for the last of 2g+2."""
+        """Return (ε, δ) of each branch point: τε + δ is its image under ``abel``; zero for the last
+        of 2g+2.
+        """
         zero = Characteristic.zero(self.genus)
         found = [zero] * len(self._curve.points)
         for j, number in enumerate(self._curve.order):
@@ -152,19 +173,28 @@ class RealHyperelliptic:
     def abel(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Complex:
         """Return ∫ of the normalised differentials from the last branch point to (λ, w), (N, g).
 
-        The last branch point is infinity where there are 2g+1, and the largest one where there are 2g+2. The image is known
-        modulo the lattice Z^g + τZ^g. points: N numbers, real ones exact where text · w: N numbers; their signs (of imaginary
-        parts over gaps, the nearer root for complex λ) name the sheets. Raises InvalidInput for bad numbers, Unsolved where a
-        path passes too near a branch point. Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
+        The last branch point is infinity where there are 2g+1, and the largest one where there are
+        2g+2. The image is known modulo the lattice Z^g + τZ^g. points: N numbers, real ones exact
+        where text · w: N numbers; their signs (of imaginary parts over gaps, the nearer root for
+        complex λ) name the sheets. Raises InvalidInput for bad numbers, Unsolved where a path
+        passes too near a branch point. Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
         """
         sheets = np.atleast_1d(np.array(w, dtype=complex))
         places = _numbers(points)
         if len(places) != len(sheets):
-            raise InvalidInput(("w",), f"{len(places)} numbers, one for each point", str(len(sheets)))
-        return np.array([self._image(point, sheet) for point, sheet in zip(places, sheets.tolist(), strict=True)])
+            raise InvalidInput(
+                ("w",), f"{len(places)} numbers, one for each point", str(len(sheets))
+            )
+        return np.array(
+            [
+                self._image(point, sheet)
+                for point, sheet in zip(places, sheets.tolist(), strict=True)
+            ]
+        )
 
     def _image(self, point: Fraction | complex, w: complex) -> Complex:
-        curve, T = self._curve, self._curve.periods.riemann_matrix
+        curve = self._curve
+        T = self._curve.periods.riemann_matrix
         if isinstance(point, Fraction):
             if curve.is_even and point == curve.points[-1]:
                 return np.zeros(self.genus, dtype=complex)
@@ -174,13 +204,17 @@ class RealHyperelliptic:
                 part = curve.from_left_end(number, [mu])[0]
                 on_cut = number % 2 == 1
                 sheet = -1 if (w.real if on_cut else w.imag) < 0 else 1
-                return np.asarray(self._at_end(number, T) + sheet * (part if on_cut else -1j * part))
+                return np.asarray(
+                    self._at_end(number, T) + sheet * (part if on_cut else -1j * part)
+                )
             target: complex = complex(float(mu))
         else:
             target = complex(curve.to_mu(point))
         j, part, v = curve.from_nearest_end(target)
         # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity.
-        wanted = w * (-target if curve.reverses else target) ** (self.genus + 1) if curve.is_even else w
+        wanted = (
+            w * (-target if curve.reverses else target) ** (self.genus + 1) if curve.is_even else w
+        )
         sign = 1 if abs(wanted - v) <= abs(wanted + v) else -1
         return np.asarray((0 if j is None else self._at_end(j, T)) + sign * part)
 
@@ -189,20 +223,29 @@ class RealHyperelliptic:
         return np.asarray(1j * (T @ np.array(epsilon)) + np.array(delta))
 
     def invert(self, z: ArrayLike) -> tuple[Array, Array]:
-        """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the real torus R^g/Z^g.
+        """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the
+        real torus R^g/Z^g.
 
-        z = Σ_s ∫ of the normalised differentials to (λ_s, w_s), each from the end of cut s with the lower number in order of
+        z = Σ_s ∫ of the normalised differentials to (λ_s, w_s), each from the end of cut s with the
+        lower number in order of
         ``cuts``: ``torus`` is the way back. Raises InvalidInput for bad points. Accuracy: 1e-13.
         """
         phases = np.array(z, dtype=float)
-        if phases.ndim not in (1, 2) or phases.shape[-1] != self.genus or not np.all(np.isfinite(phases)):
-            raise InvalidInput(("z",), f"a vector of {self.genus} finite real numbers, or rows of them", show(z))
+        if (
+            phases.ndim not in (1, 2)
+            or phases.shape[-1] != self.genus
+            or not np.all(np.isfinite(phases))
+        ):
+            raise InvalidInput(
+                ("z",), f"a vector of {self.genus} finite real numbers, or rows of them", show(z)
+            )
         rows = np.atleast_2d(phases)
         curve = self._curve
         psi = curve.inversion.invert(rows - np.floor(rows))
         below, above = curve.periods.roots_on_cuts(psi)
         betas = curve.periods.curve.branch_points
-        lower, upper = betas[1::2, None] + below**2, betas[2::2, None] - above**2
+        lower = betas[1::2, None] + below**2
+        upper = betas[2::2, None] - above**2
         mu = np.where(below**2 <= above**2, lower, upper).T
         turns = np.arange(self.genus, 0, -1) - 1
         signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
@@ -210,31 +253,49 @@ class RealHyperelliptic:
         return (points[0], signs[0]) if phases.ndim == 1 else (points, signs)
 
     def torus(self, points: Any, signs: ArrayLike) -> Array:
-        """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the inverse of ``invert``."""
+        """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
+        inverse of ``invert``.
+        """
         rows = [_numbers(row) for row in (points if np.ndim(points) == 2 else [points])]
         directions = np.atleast_2d(np.array(signs, dtype=float))
-        if any(len(row) != self.genus for row in rows) or directions.shape != (len(rows), self.genus):
-            raise InvalidInput(("points",), f"rows of {self.genus} points with as many signs", show(points))
+        if any(len(row) != self.genus for row in rows) or directions.shape != (
+            len(rows),
+            self.genus,
+        ):
+            raise InvalidInput(
+                ("points",), f"rows of {self.genus} points with as many signs", show(points)
+            )
         curve = self._curve
         exact = [[curve.to_mu(point) for point in row] for row in rows]
         for i, row in enumerate(exact):
             for s, mu in enumerate(row):
-                if isinstance(mu, complex) or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]:
+                if (
+                    isinstance(mu, complex)
+                    or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]
+                ):
                     low, high = self.cuts[s]
-                    raise InvalidInput(("points", i, s), f"a number on cut {s + 1}, {low:.6g} … {high:.6g}", show(rows[i][s]))
+                    raise InvalidInput(
+                        ("points", i, s),
+                        f"a number on cut {s + 1}, {low:.6g} … {high:.6g}",
+                        show(rows[i][s]),
+                    )
         upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
         z = curve.inversion.map(curve.angles(exact, upwards))
         return np.asarray(np.mod(z, 1.0)[0] if np.ndim(points) == 1 else np.mod(z, 1.0))
 
     def thomae(self) -> tuple[ThomaeConstant, ...]:
-        """Return Thomae's values of |θ[η_S](0)|⁴ for all sets S of g+1 among 2g+1 branch points; of 2g+2 the last is left out.
+        """Return Thomae's values of |θ[η_S](0)|⁴ for all sets S of g+1 among 2g+1 branch points; of
+        2g+2 the last is left out.
 
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
         """
         curve = self._curve
         betas = [float(b) for b in curve.betas]
         differences = np.abs(curve.periods.curve.differences)
-        sizes = [2 * curve.monomial_integrals(2 * s - 1, self.genus - 1) for s in range(1, self.genus + 1)]
+        sizes = [
+            2 * curve.monomial_integrals(2 * s - 1, self.genus - 1)
+            for s in range(1, self.genus + 1)
+        ]
         determinant = abs(float(np.linalg.det(np.stack(sizes, axis=1)))) / (2 * np.pi) ** self.genus
         numbers = range(len(betas))
         odd = [Characteristic.of_branch_point(j, self.genus) for j in numbers]
@@ -242,12 +303,18 @@ class RealHyperelliptic:
         found = []
         for subset in itertools.combinations(numbers, self.genus + 1):
             rest = [j for j in numbers if j not in subset]
-            logs = [np.log(differences[i, j]) for group in (subset, rest) for i, j in itertools.combinations(group, 2)]
+            logs = [
+                np.log(differences[i, j])
+                for group in (subset, rest)
+                for i, j in itertools.combinations(group, 2)
+            ]
             total = Characteristic.zero(self.genus)
             for characteristic in [odd[j] for j in subset] + shift:
                 total = total + characteristic
             named = tuple(sorted(curve.order[j] for j in subset))
-            found.append(ThomaeConstant(named, _halves(total), determinant**2 * float(np.exp(np.sum(logs)))))
+            found.append(
+                ThomaeConstant(named, _halves(total), determinant**2 * float(np.exp(np.sum(logs))))
+            )
         return tuple(found)
 
 
@@ -258,15 +325,22 @@ def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[fl
 def _exact_points(given: Any) -> tuple[Fraction, ...]:
     """Return the branch points as rationals, increasing; raises InvalidInput."""
     if isinstance(given, np.ndarray) and np.iscomplexobj(given):
-        raise InvalidInput(("branch_points",), "real numbers (curves with complex branch points are not served)", show(given))
+        raise InvalidInput(
+            ("branch_points",),
+            "real numbers (curves with complex branch points are not served)",
+            show(given),
+        )
     values = [Fraction(value) for value in exact_vector(given, ("branch_points",))]
     if not 3 <= len(values) <= 2 * _LARGEST_GENUS + 2:
-        raise InvalidInput(("branch_points",), f"3 to {2 * _LARGEST_GENUS + 2} real numbers", str(len(values)))
+        raise InvalidInput(
+            ("branch_points",), f"3 to {2 * _LARGEST_GENUS + 2} real numbers", str(len(values))
+        )
     points = tuple(sorted(values))
     for before, after in itertools.pairwise(points):
         if before == after:
             raise InvalidInput(
-                ("branch_points",), "distinct numbers (drop a pair: the curve of the others has the same differentials)",
+                ("branch_points",), "distinct numbers (drop a pair: the curve of the others has "
+                    "the same differentials)",
                 f"{float(before):.6g} twice",
             )  # fmt: skip
     return points
@@ -274,7 +348,11 @@ def _exact_points(given: Any) -> tuple[Fraction, ...]:
 
 def _numbers(given: Any) -> list[Fraction | complex]:
     """Return points as rationals where they are real, and complex numbers; raises InvalidInput."""
-    items = np.atleast_1d(given).tolist() if isinstance(given, (np.ndarray, int, float, complex)) else list(given)
+    items = (
+        np.atleast_1d(given).tolist()
+        if isinstance(given, (np.ndarray, int, float, complex))
+        else list(given)
+    )
     found: list[Fraction | complex] = []
     for i, item in enumerate(items):
         if isinstance(item, complex) and item.imag:

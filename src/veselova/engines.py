@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 __all__ = ["ENGINES", "Prepared", "closed_form", "compare", "from_torus", "solve", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
-ENGINES: Mapping[str, str] = {"analytic": "veselova.analytic.solve", "numeric": "veselova.numeric.solve"}
+ENGINES: Mapping[str, str] = {
+    "analytic": "veselova.analytic.solve",
+    "numeric": "veselova.numeric.solve",
+}
 
 
 def solve(
@@ -40,24 +43,29 @@ def solve(
     certified: bool = False,
     formulation: str | None = None,
 ) -> Trajectory:
-    """Return the motion of a problem at the given times, in the order in which they are given; the start is t = 0.
+    """Return the motion of a problem at the given times, in the order in which they are given; the
+    start is t = 0.
 
-    ``times``: a number, a list or array of numbers in any order, or a mapping of start, stop and count. A text ("0.1", "1/3"), a
-    Fraction, a Decimal or a whole number is taken exactly: ``trajectory.times`` has the nearest doubles, and
-    ``trajectory.remainders`` the rest. The points between start and stop are those of ``numpy.linspace`` where both ends are
-    doubles, else exact.
+    ``times``: a number, a list or array of numbers in any order, or a mapping of start, stop and
+    count. A text ("0.1", "1/3"), a
+    Fraction, a Decimal or a whole number is taken exactly: ``trajectory.times`` has the nearest
+    doubles, and ``trajectory.remainders`` the rest. The points between start and stop are those of
+    ``numpy.linspace`` where both ends are doubles, else exact.
 
-    ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``; None takes the closed form where
-    the problem has one, ``problem.default_engine``. ``method``: None for the engine's default; analytic: ``theta``,
-    ``products``, ``nufft`` or ``angles``;
-    numeric: ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``. ``formulation`` (numeric): which of
-    ``problem.formulations`` is integrated.
-    ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal with that many digits after the
-    point in q and frame, ``trajectory.decimals``. Data are taken at their word: strings exactly, doubles as the dyadic numbers
-    they store. ``certified`` (analytic): the error of every such number is a proven bound.
-    Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem, BackendMissing without its library.
+    ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``;
+    None takes the closed form where the problem has one, ``problem.default_engine``. ``method``:
+    None for the engine's default; analytic: ``theta``, ``products``, ``nufft`` or ``angles``;
+    numeric: ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``.
+    ``formulation`` (numeric): which of ``problem.formulations`` is integrated.
+    ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal
+    with that many digits after the point in q and frame, ``trajectory.decimals``. Data are taken at
+    their word: strings exactly, doubles as the dyadic numbers they store. ``certified`` (analytic):
+    the error of every such number is a proven bound. Raises InvalidInput for bad input, Unsolved
+    where the engine cannot serve the problem, BackendMissing without its library.
     """
-    return _solve(problem, times, engine, method, digits=digits, certified=certified, formulation=formulation)
+    return _solve(
+        problem, times, engine, method, digits=digits, certified=certified, formulation=formulation
+    )
 
 
 def _solve(
@@ -72,9 +80,17 @@ def _solve(
     solution: Solution | None = None,
 ) -> Trajectory:
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
-    if engine is None:  # what is asked for beyond double precision is asked of the closed form, which says why it has none
-        engine = "analytic" if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False) else None
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
+        )
+    # what is asked for beyond double precision is asked of the closed form, which says why it has
+    # none
+    if engine is None:
+        engine = (
+            "analytic"
+            if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False)
+            else None
+        )
         engine = engine or problem.default_engine
     require_options(type(problem), engine, method, formulation, digits, certified)
     named = {"method": method, "formulation": formulation}
@@ -88,7 +104,9 @@ def _solve(
 
 
 class Prepared:
-    """A problem of which both the torus and a motion are asked: what the two have in common is computed once."""
+    """A problem of which both the torus and a motion are asked: what the two have in common is
+    computed once.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -108,19 +126,30 @@ class Prepared:
         """Return the torus; raises as the function of this name does."""
         return _torus(self.problem, self._solution if self.has_torus else None)
 
-    def solve(self, times: Any, engine: str | None = None, method: str | None = None, **options: Any) -> Trajectory:
+    def solve(
+        self, times: Any, engine: str | None = None, method: str | None = None, **options: Any
+    ) -> Trajectory:
         """Return the motion; takes and raises what the function of this name does."""
         known = self._solution if "_solution" in vars(self) else None
         return _solve(self.problem, times, engine, method, solution=known, **options)
 
 
 def require_options(
-    system: type[Problem], engine: Any, method: Any, formulation: Any, digits: Any = FEWEST_DIGITS, certified: Any = False
+    system: type[Problem],
+    engine: Any,
+    method: Any,
+    formulation: Any,
+    digits: Any = FEWEST_DIGITS,
+    certified: Any = False,
 ) -> None:
-    """Raise InvalidInput, with all faults, unless an engine of a system has this method, formulation, and precision."""
+    """Raise InvalidInput, with all faults, unless an engine of a system has this method,
+    formulation, and precision.
+    """
     faults = Faults()
     if not isinstance(engine, str) or engine not in system.engines:
-        faults.found.append(unknown_name(("engine",), engine, list(system.engines), f"for system {system.system}"))
+        faults.found.append(
+            unknown_name(("engine",), engine, list(system.engines), f"for system {system.system}")
+        )
     else:
         if method is not None and method not in system.engines[engine]:
             faults.found.append(unknown_name(("method",), method, system.engines[engine]))
@@ -133,18 +162,30 @@ def require_options(
 
 
 def _require_precision(engine: str, digits: Any, certified: Any) -> None:
-    """Raise InvalidInput unless the engine has these digits, and bounds where they are asked for."""
-    if isinstance(digits, bool) or not isinstance(digits, (int, np.integer)) or not FEWEST_DIGITS <= digits <= MOST_DIGITS:
-        raise InvalidInput(("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", show(digits))
+    """Raise InvalidInput unless the engine has these digits, and bounds where they
+    are asked for.
+    """
+    if (
+        isinstance(digits, bool)
+        or not isinstance(digits, (int, np.integer))
+        or not FEWEST_DIGITS <= digits <= MOST_DIGITS
+    ):
+        raise InvalidInput(
+            ("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", show(digits)
+        )
     require_truth_value(certified, "certified")
     if engine != "analytic" and digits > FEWEST_DIGITS:
-        raise InvalidInput(("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits))
+        raise InvalidInput(
+            ("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits)
+        )
     if engine != "analytic" and certified:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
 def compare(problem: Problem, times: Any, method: str | None = None) -> Comparison:
-    """Return both engines' answers and their differences; ``method`` is the numerical one (``dop853`` or ``taylor``)."""
+    """Return both engines' answers and their differences; ``method`` is the numerical one
+    (``dop853`` or ``taylor``).
+    """
     if isinstance(problem, Problem) and len(problem.engines) < len(ENGINES):
         given = f"{problem.system}, which {' and '.join(problem.engines)} alone solves"
         raise InvalidInput(("problem",), "a system that both engines solve", given)
@@ -152,14 +193,20 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
     return Comparison(solve(problem, grid, "analytic"), solve(problem, grid, "numeric", method))
 
 
-def from_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None) -> Veselova:
-    """Return the Veselova problem whose motion has these constants and phases, as ``torus`` gives them.
+def from_torus(
+    A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None
+) -> Veselova:
+    """Return the Veselova problem whose motion has these constants and phases, as ``torus`` gives
+    them.
 
-    A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 = 0 and the sorted I_i
-            interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases (n−1,) z⁰ of the start, modulo 1
-    signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as a Veselova problem takes it
+    A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 =
+            0 and the sorted I_i interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases
+            (n−1,) z⁰ of the start, modulo 1
+    signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as a Veselova
+        problem takes it
 
-    Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A up to 100.
+    Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A
+    up to 100.
     """
     from veselova.analytic.motion.start_from_torus import start_on_torus
     from veselova.mechanics.systems.veselova import Veselova
@@ -169,26 +216,34 @@ def from_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any, fra
 
 
 def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
-    """Return the motion of a problem as data: a document of a few kilobytes that any language can evaluate at any time.
+    """Return the motion of a problem as data: a document of a few kilobytes that any language can
+    evaluate at any time.
 
-    ``accuracy``: the error that modes left out of the time map may make. Raises InvalidInput for a system without a torus and for
-    bad arguments, Unsolved where theta functions do not serve (rest, a separatrix, too many modes).
+    ``accuracy``: the error that modes left out of the time map may make. Raises InvalidInput for a
+    system without a torus and for bad arguments, Unsolved where theta functions do not serve (rest,
+    a separatrix, too many modes).
     """
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
+        )
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     return closed_form_of(problem, accuracy)
 
 
 def torus(problem: Problem) -> Torus:
-    """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the analytic engine does."""
+    """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
+    analytic engine does.
+    """
     return _torus(problem)
 
 
 def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
     if not isinstance(problem, Problem):
-        raise InvalidInput(("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem))
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
+        )
     from veselova.analytic.motion.invariant_torus import torus as torus_of
 
     return torus_of(on_torus(problem), solution)

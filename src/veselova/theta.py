@@ -1,4 +1,5 @@
-"""Riemann theta functions of any matrix of the Siegel half space, with characteristics and derivatives.
+"""Riemann theta functions of any matrix of the Siegel half space, with characteristics and
+derivatives.
 
 θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ))
 
@@ -18,7 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 
-__all__ = ["ScaledTheta", "riemann_theta", "scaled_riemann_theta", "siegel_reduce", "theta_constants"]
+__all__ = [
+    "ScaledTheta",
+    "riemann_theta",
+    "scaled_riemann_theta",
+    "siegel_reduce",
+    "theta_constants",
+]
 
 Complex = NDArray[np.complex128]
 
@@ -36,8 +43,8 @@ _LARGEST_EXPONENT = 709.0
 class ScaledTheta:
     """Theta values as ``mantissa``·exp(``exponent``), whatever their size.
 
-    mantissa: complex, the shape of the values · exponent, error: real, without the axes of derivatives. The mantissa is off by at
-    most ``error``.
+    mantissa: complex, the shape of the values · exponent, error: real, without the axes of
+    derivatives. The mantissa is off by at most ``error``.
     """
 
     mantissa: Complex
@@ -45,7 +52,9 @@ class ScaledTheta:
     error: NDArray[np.float64]
 
 
-def riemann_theta(z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None = None, derivatives: int = 0) -> Complex:
+def riemann_theta(
+    z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None = None, derivatives: int = 0
+) -> Complex:
     """Return θ[ε;δ](z|τ), or its derivatives in z.
 
     z                (g,) or (N, g), complex
@@ -53,21 +62,30 @@ def riemann_theta(z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None
     characteristic   [ε, δ], shape (2, g), any real numbers; (C, 2, g) for several; None for zero
     derivatives      0 for values, 1 for gradients, 2 for matrices of second derivatives
 
-    The shape is that of the points, then (C,) for several characteristics, then (g,) or (g, g) for derivatives. Raises
-    InvalidInput for bad input, Unsolved where a value overflows (``beyond-floats``; take ``scaled_riemann_theta``) or a sum
-    has too many terms (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against python-flint.
+    The shape is that of the points, then (C,) for several characteristics, then (g,) or (g, g) for
+    derivatives. Raises InvalidInput for bad input, Unsolved where a value overflows
+    (``beyond-floats``; take ``scaled_riemann_theta``) or a sum has too many terms
+    (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against
+    python-flint.
     """
     found = scaled_riemann_theta(z, tau, characteristic, derivatives)
-    exponent = found.exponent.reshape(found.exponent.shape + (1,) * (found.mantissa.ndim - found.exponent.ndim))
+    exponent = found.exponent.reshape(
+        found.exponent.shape + (1,) * (found.mantissa.ndim - found.exponent.ndim)
+    )
     if np.max(exponent, initial=0.0) > _LARGEST_EXPONENT:
-        raise Unsolved("beyond-floats", f"exp({np.max(exponent):.6g}) leaves the range of a float; take scaled_riemann_theta")
+        raise Unsolved(
+            "beyond-floats",
+            f"exp({np.max(exponent):.6g}) leaves the range of a float; take scaled_riemann_theta",
+        )
     return np.asarray(found.mantissa * np.exp(exponent))
 
 
 def scaled_riemann_theta(
     z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None = None, derivatives: int = 0
 ) -> ScaledTheta:
-    """Return the same as ``riemann_theta`` as mantissas and exponents, with a bound of the error."""
+    """Return the same as ``riemann_theta`` as mantissas and exponents, with a bound
+    of the error.
+    """
     matrix = _siegel(tau)
     genus = len(matrix)
     points, single = _points(z, genus)
@@ -79,11 +97,15 @@ def scaled_riemann_theta(
         raise Unsolved("too-many-terms", f"the sum has about {function.terms:.1e} terms")
     take = (0 if single else slice(None), 0 if alone else slice(None))
     mantissas, exponents, errors = function.values(points, halves, derivatives)
-    return ScaledTheta(np.asarray(mantissas[take]), np.asarray(exponents[take]), np.asarray(errors[take]))
+    return ScaledTheta(
+        np.asarray(mantissas[take]), np.asarray(exponents[take]), np.asarray(errors[take])
+    )
 
 
 def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float, ...]], complex]:
-    """Return θ[ε;δ](0|τ) of all half-integer characteristics by (ε, δ), entries 0 and ½; odd ones vanish exactly."""
+    """Return θ[ε;δ](0|τ) of all half-integer characteristics by (ε, δ), entries 0 and ½; odd ones
+    vanish exactly.
+    """
     matrix = _siegel(tau)
     genus = len(matrix)
     rows = list(itertools.product((0.0, 0.5), repeat=genus))
@@ -94,9 +116,11 @@ def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float
 
 
 def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
-    """Return the reduced τ' and the symplectic matrix [[A, B], [C, D]], (2g, 2g), with τ' = (Aτ+B)(Cτ+D)⁻¹.
+    """Return the reduced τ' and the symplectic matrix [[A, B], [C, D]], (2g, 2g), with τ' =
+    (Aτ+B)(Cτ+D)⁻¹.
 
-    Reduced: Im τ' is reduced as a quadratic form, |Re τ'| ≤ ½, |τ'_11| ≥ 1, so that Im τ'_11 ≥ √3/2.
+    Reduced: Im τ' is reduced as a quadratic form, |Re τ'| ≤ ½, |τ'_11| ≥ 1, so that Im τ'_11 ≥
+    √3/2.
     """
     reduction = SiegelTheta(_siegel(tau)).reduction
     return reduction.tau.astype(complex), reduction.symplectic
@@ -108,17 +132,27 @@ def _siegel(tau: Any) -> Complex:
         matrix = np.array(tau, dtype=complex)
     except (TypeError, ValueError):
         raise InvalidInput(("tau",), "a square matrix of numbers", show(tau)) from None
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not 1 <= len(matrix) <= _LARGEST_GENUS:
-        raise InvalidInput(("tau",), f"a g × g matrix, g = 1 … {_LARGEST_GENUS}", f"shape {matrix.shape}")
+    if (
+        matrix.ndim != 2
+        or matrix.shape[0] != matrix.shape[1]
+        or not 1 <= len(matrix) <= _LARGEST_GENUS
+    ):
+        raise InvalidInput(
+            ("tau",), f"a g × g matrix, g = 1 … {_LARGEST_GENUS}", f"shape {matrix.shape}"
+        )
     if not np.all(np.isfinite(matrix)):
         raise InvalidInput(("tau",), "finite numbers", show(tau))
     defect = float(np.max(np.abs(matrix - matrix.T)))
     if defect > _SYMMETRY * float(np.max(np.abs(matrix))):
-        raise InvalidInput(("tau",), "a symmetric matrix", f"one that differs from its transpose by {defect:.3g}")
+        raise InvalidInput(
+            ("tau",), "a symmetric matrix", f"one that differs from its transpose by {defect:.3g}"
+        )
     matrix = np.asarray((matrix + matrix.T) / 2)
     least = float(np.linalg.eigvalsh(matrix.imag)[0])
     if not least > 0:
-        raise InvalidInput(("tau",), "a positive definite imaginary part", f"one with least eigenvalue {least:.6g}")
+        raise InvalidInput(
+            ("tau",), "a positive definite imaginary part", f"one with least eigenvalue {least:.6g}"
+        )
     return matrix
 
 
@@ -127,9 +161,13 @@ def _points(z: Any, genus: int) -> tuple[Complex, bool]:
     try:
         points = np.array(z, dtype=complex)
     except (TypeError, ValueError):
-        raise InvalidInput(("z",), f"a vector of {genus} numbers, or rows of them", show(z)) from None
+        raise InvalidInput(
+            ("z",), f"a vector of {genus} numbers, or rows of them", show(z)
+        ) from None
     if points.ndim not in (1, 2) or points.shape[-1] != genus:
-        raise InvalidInput(("z",), f"a vector of {genus} numbers, or rows of them", f"shape {points.shape}")
+        raise InvalidInput(
+            ("z",), f"a vector of {genus} numbers, or rows of them", f"shape {points.shape}"
+        )
     if not np.all(np.isfinite(points)):
         raise InvalidInput(("z",), "finite numbers", show(z))
     return np.atleast_2d(points), points.ndim == 1
@@ -145,7 +183,11 @@ def _characteristics(given: Any, genus: int) -> tuple[NDArray[np.float64], bool]
         halves = np.empty(0)
     alone = np.ndim(given) == 2
     if halves.ndim != 3 or halves.shape[1:] != (2, genus) or not np.all(np.isfinite(halves)):
-        raise InvalidInput(("characteristic",), f"[ε, δ] of {genus} real numbers each, or a list of those", show(given))
+        raise InvalidInput(
+            ("characteristic",),
+            f"[ε, δ] of {genus} real numbers each, or a list of those",
+            show(given),
+        )
     return halves, alone
 
 

@@ -31,7 +31,8 @@ __all__ = ["METHODS", "solve"]
 
 Array = NDArray[np.float64]
 
-#: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few roundings of the data.
+#: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few
+#: roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
 
 #: The series that states are, along the principal axes; the last may be left to the problem.
@@ -41,7 +42,9 @@ _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 _NO_DIGIT = 0.1
 
 #: What else may leave none.
-_OR_CANCELLATION = ", or the sums of nufft cancel beyond the digits of a double; those of theta do not"
+_OR_CANCELLATION = (
+    ", or the sums of nufft cancel beyond the digits of a double; those of theta do not"
+)
 
 
 def solve(
@@ -57,34 +60,48 @@ def solve(
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
-    ``method``: ``theta`` (every entry of the attitude a theta quotient; many times from few, in windows), ``products`` (the same
-    at every time, by products of matrices), ``nufft`` (at every time, by nonuniform FFTs, extra ``fast``) or ``angles``
-    (Abel–Jacobi inversion, then the algebraic frame; windows too); None takes the cheaper of ``theta`` and ``angles``.
-    ``time_map``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same by ``fourier``. ``clock`` is its name
-    in version 0.1. Every start is
-    served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is that of starts a rounding away,
-    and grows like e^(rate·t); near one sums by ``nufft`` cancel, which is in their error.
-    ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see Trajectory.decimals.
-    ``solution``: that of the problem in double precision, where it is known already.
-    Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit of the answer,
-    BackendMissing for ``nufft`` without finufft.
-    ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about 1e-14 at t of order 10².
+    ``method``: ``theta`` (every entry of the attitude a theta quotient; many times from few, in
+    windows), ``products`` (the same at every time, by products of matrices), ``nufft`` (at every
+    time, by nonuniform FFTs, extra ``fast``) or ``angles`` (Abel–Jacobi inversion, then the
+    algebraic frame; windows too); None takes the cheaper of ``theta`` and ``angles``.
+    ``time_map``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same by
+    ``fourier``. ``clock`` is its name in version 0.1. Every start is
+    served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is
+    that of starts a rounding away, and grows like e^(rate·t); near one sums by ``nufft`` cancel,
+    which is in their error.
+    ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see
+    Trajectory.decimals.
+    ``solution``: that of the problem in double precision, where it is known already. Raises
+    InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit
+    of the answer, BackendMissing for ``nufft`` without finufft.
+    ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about
+    1e-14 at t of order 10².
     """
     grid = TimeGrid.of(times, beyond_double(digits, certified))
     time_map = time_map or clock
-    for field, value, names in (("method", method, METHODS), ("time_map", time_map, ("fourier", "panels"))):
+    for field, value, names in (
+        ("method", method, METHODS),
+        ("time_map", time_map, ("fourier", "panels")),
+    ):
         if value is not None and value not in names:
             raise unknown_name((field,), value, names)
     if isinstance(problem, VeselovaSO3) and problem.has_torus:
         _require_exact_axes(problem, digits, certified)
-        options: Any = {"method": method, "time_map": time_map, "digits": digits, "certified": certified, "solution": solution}
+        options: Any = {
+            "method": method,
+            "time_map": time_map,
+            "digits": digits,
+            "certified": certified,
+            "solution": solution,
+        }
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
         return motion_of_body(problem, solve(point, grid, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, time_map, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
         motion = _TorusMotion(problem, method, time_map)
-        if solution is not None:  # no field of the motion: pickling leaves behind what can be computed again
+        # no field of the motion: pickling leaves behind what can be computed again
+        if solution is not None:
             vars(motion)["_solution"] = solution
         return motion.evaluate(grid)
     served = ("angles",) if certified else ("theta", "angles")
@@ -92,14 +109,20 @@ def solve(
         precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
         raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", show(method))
     if time_map is not None:
-        raise InvalidInput(("time_map",), f"none, where digits > {FEWEST_DIGITS} or errors are certified", show(time_map))
+        raise InvalidInput(
+            ("time_map",),
+            f"none, where digits > {FEWEST_DIGITS} or errors are certified",
+            show(time_map),
+        )
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
     return MotionInBalls(problem, digits, certified, method)(grid)
 
 
 def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
-    """Raise InvalidInput where more than doubles are asked for along axes that are known in double precision."""
+    """Raise InvalidInput where more than doubles are asked for along axes that are known in double
+    precision.
+    """
     if problem.axes is not None and beyond_double(digits, certified):
         field = "digits" if digits > FEWEST_DIGITS else "certified"
         required = "inertia as 3 principal moments (a matrix is diagonalised in double precision)"
@@ -107,18 +130,30 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
 
 
 def _separable_motion(
-    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, method: str | None, time_map: str | None, beyond: bool
+    problem: VeselovaSO3 | SeparableVeselova,
+    grid: TimeGrid,
+    method: str | None,
+    time_map: str | None,
+    beyond: bool,
 ) -> Trajectory:
-    """Return the motion in a separable potential; it has one method, one choice of clocks and 15 digits."""
+    """Return the motion in a separable potential; it has one method, one choice of clocks and 15
+    digits.
+    """
     for field, given, allowed in (
         ("method", method, (None, "angles")),
         ("time_map", time_map, (None,)),
         ("digits", beyond, (False,)),
     ):
         if given not in allowed:
-            required = {"method": "angles", "time_map": "none", "digits": f"{FEWEST_DIGITS}, not certified,"}[field]
+            required = {
+                "method": "angles",
+                "time_map": "none",
+                "digits": f"{FEWEST_DIGITS}, not certified,",
+            }[field]
             raise InvalidInput((field,), f"{required} for system {problem.system}", show(given))
-    return (BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)).evaluate(grid)
+    return (
+        BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
+    ).evaluate(grid)
 
 
 @dataclass(frozen=True)
@@ -147,19 +182,30 @@ class _TorusMotion(Motion[TorusProblem]):
 
     @cached_property
     def _departure(self) -> DepartureBound | None:
-        """Return how far starts a rounding away part from the motion, where it is on a separatrix."""
+        """Return how far starts a rounding away part from the motion, where it is on
+        a separatrix.
+        """
         if not self._solution.separatrices:
             return None
-        neighbours = (Evaluator(Solution(self.problem, sign * _DATA_ROUNDING), self._evaluator.method) for sign in (1, -1))
+        neighbours = (
+            Evaluator(Solution(self.problem, sign * _DATA_ROUNDING), self._evaluator.method)
+            for sign in (1, -1)
+        )
         evaluators = (self._evaluator, *neighbours)
-        return DepartureBound(partial(_frames, evaluators, self.time_map), self.problem.turning, _NO_DIGIT)
+        return DepartureBound(
+            partial(_frames, evaluators, self.time_map), self.problem.turning, _NO_DIGIT
+        )
 
     @property
     def _cause(self) -> str:
         """Return why no digit is left, and what answers."""
         if self._departure is None:
             return "the data determine no digit there"
-        further = "; ask for more digits, which come from the exact data" if self.problem.axes is None else ""
+        further = (
+            "; ask for more digits, which come from the exact data"
+            if self.problem.axes is None
+            else ""
+        )
         return f"on a separatrix the data determine the motion, and doubles do not{further}"
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
@@ -174,20 +220,30 @@ class _TorusMotion(Motion[TorusProblem]):
             lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
             cause = self._cause + _OR_CANCELLATION * (evaluator.method == "nufft")
-            raise Unsolved("no-digit-left", f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}")
+            raise Unsolved(
+                "no-digit-left",
+                f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}",
+            )
         solution = evaluator.solution
         details = {
             "regime": solution.regime,
             "time_map": time_map.name,
             "time_map_size": time_map.size,
             "evaluations": along.evaluations,
-            "time_map_estimates": plan.costs.estimates(plan.inversions) if time_map.name != "uniform" else {},
+            "time_map_estimates": plan.costs.estimates(plan.inversions)
+            if time_map.name != "uniform"
+            else {},
             "guard_digits": plan.is_guarded,
             "quadrature_nodes": solution.periods.quadrature_nodes,
             "theta_terms": evaluator.terms,
         }
         states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
-        return self.problem.complete(dict(zip(_SERIES, states, strict=False))), error, evaluator.method, details
+        return (
+            self.problem.complete(dict(zip(_SERIES, states, strict=False))),
+            error,
+            evaluator.method,
+            details,
+        )
 
 
 def _frames(evaluators: Sequence[Evaluator], time_map: str | None, instants: Array) -> list[Array]:
@@ -195,5 +251,6 @@ def _frames(evaluators: Sequence[Evaluator], time_map: str | None, instants: Arr
     grid = TimeGrid.of(instants)
     plans = [evaluator.to(grid) for evaluator in evaluators]
     return [
-        evaluator.evaluate(plan, plan.time_map(time_map))[0].series[1] for evaluator, plan in zip(evaluators, plans, strict=True)
+        evaluator.evaluate(plan, plan.time_map(time_map))[0].series[1]
+        for evaluator, plan in zip(evaluators, plans, strict=True)
     ]

@@ -1,1 +1,3 @@
-"""The physics, written once: the problem, its integrals of motion, coordinates and results. Solves nothing."""
+"""The physics, written once: the problem, its integrals of motion, coordinates and results. Solves
+nothing.
+"""

@@ -1,1 +1,3 @@
-"""Changes of the database's tables, one file each; Alembic runs those that a database has not seen, in their order."""
+"""Changes of the database's tables, one file each; Alembic runs those that a database has not seen,
+in their order.
+"""

@@ -10,7 +10,9 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Make the tables; some are there already where version 0.1.0 was stopped in the middle of this step."""
+    """Make the tables; some are there already where version 0.1.0 was stopped in the middle of this
+    step.
+    """
     op.create_table(
         "jobs",
         sa.Column("id", sa.String(32), primary_key=True),
@@ -26,7 +28,9 @@ def upgrade() -> None:
     op.create_index("ix_jobs_state", "jobs", ["state"], if_not_exists=True)
     op.create_table(
         "chunks",
-        sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+        sa.Column(
+            "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True
+        ),
         sa.Column("position", sa.Integer, primary_key=True, autoincrement=False),
         sa.Column("rows", sa.Integer, nullable=False),
         sa.Column("sha256", sa.String(64), nullable=False),
@@ -35,7 +39,9 @@ def upgrade() -> None:
     op.create_table(
         "idempotency_keys",
         sa.Column("key", sa.String(255), primary_key=True),
-        sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False),
+        sa.Column(
+            "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False
+        ),
         if_not_exists=True,
     )
     op.create_table(

@@ -23,14 +23,22 @@ _IDEMPOTENCY_KEYS = sa.table(
 
 
 def upgrade() -> None:
-    """Add the columns, and make the table of idempotency keys again, whose primary key is another."""
-    op.add_column("api_keys", sa.Column("scope", sa.String(16), nullable=False, server_default="solve"))
+    """Add the columns, and make the table of idempotency keys again, whose primary
+    key is another.
+    """
+    op.add_column(
+        "api_keys", sa.Column("scope", sa.String(16), nullable=False, server_default="solve")
+    )
     op.add_column("api_keys", sa.Column("owner", sa.String(16), nullable=False, server_default=""))
     op.add_column("api_keys", sa.Column("expires_at", sa.DateTime(timezone=True)))
     op.execute(sa.text("UPDATE api_keys SET owner = id"))
     op.add_column("jobs", sa.Column("owner", sa.String(16), nullable=False, server_default=""))
-    connection, now = op.get_bind(), datetime.now(UTC)
-    rows = [row._asdict() for row in connection.execute(sa.text("SELECT key, job_id FROM idempotency_keys"))]
+    connection = op.get_bind()
+    now = datetime.now(UTC)
+    rows = [
+        row._asdict()
+        for row in connection.execute(sa.text("SELECT key, job_id FROM idempotency_keys"))
+    ]
     op.drop_table("idempotency_keys")
     op.create_table(
         "idempotency_keys",
@@ -45,20 +53,34 @@ def upgrade() -> None:
         sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
     )
     if rows:
-        connection.execute(sa.insert(_IDEMPOTENCY_KEYS), [{**row, "owner": "", "created_at": now} for row in rows])
+        connection.execute(
+            sa.insert(_IDEMPOTENCY_KEYS), [{**row, "owner": "", "created_at": now} for row in rows]
+        )
 
 
 def downgrade() -> None:
     """Take the columns away again; idempotency keys of owners are forgotten."""
     connection = op.get_bind()
-    rows = [row._asdict() for row in connection.execute(sa.text("SELECT key, job_id FROM idempotency_keys WHERE owner = ''"))]
+    rows = [
+        row._asdict()
+        for row in connection.execute(
+            sa.text("SELECT key, job_id FROM idempotency_keys WHERE owner = ''")
+        )
+    ]
     op.drop_table("idempotency_keys")
     op.create_table(
         "idempotency_keys",
         sa.Column("key", sa.String(255), primary_key=True),
-        sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False),
+        sa.Column(
+            "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False
+        ),
     )
     if rows:
         connection.execute(sa.insert(_IDEMPOTENCY_KEYS), rows)
-    for table, column in (("jobs", "owner"), ("api_keys", "expires_at"), ("api_keys", "owner"), ("api_keys", "scope")):
+    for table, column in (
+        ("jobs", "owner"),
+        ("api_keys", "expires_at"),
+        ("api_keys", "owner"),
+        ("api_keys", "scope"),
+    ):
         op.drop_column(table, column)

@@ -1,4 +1,6 @@
-"""A job has the bytes that were promised to it, and those that it took once it has ended; 0 stands for not counted yet."""
+"""A job has the bytes that were promised to it, and those that it took once it has ended; 0 stands
+for not counted yet.
+"""
 
 from __future__ import annotations
 

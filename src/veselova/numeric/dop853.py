@@ -18,10 +18,12 @@ Array = NDArray[np.float64]
 
 
 class Dop853(Integrator):
-    """DOP853 at a relative tolerance, absolute tolerance a tenth of it (states are of order one)."""
+    """DOP853 at a relative tolerance, absolute tolerance a tenth of it (states are of
+    order one).
+    """
 
-    #: 100 ε is the least that SciPy takes; against 1e-13 integrals drift four times less, for a tenth more steps. The looser one
-    #: shows its error.
+    #: 100 ε is the least that SciPy takes; against 1e-13 integrals drift four times less, for a
+    #: tenth more steps. The looser one shows its error.
     tolerances: ClassVar[tuple[float, float]] = (2.3e-14, 1e-12)
     method: ClassVar[str] = "dop853"
 
@@ -30,7 +32,9 @@ class Dop853(Integrator):
         self._tolerance = tolerance
         self._steps = 0
 
-    def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
+    def advance(
+        self, state: Array, start: float, stop: float, wanted: Array
+    ) -> tuple[Array, Array]:
         """Return (states at the wanted times, state at stop)."""
         if self._flow.clearance(state) <= 0:
             raise self._flow.ending(start, state)
@@ -49,7 +53,8 @@ class Dop853(Integrator):
             raise self._flow.ending(float(answer.t_events[0][0]), answer.y_events[0][0])
         if not answer.success:
             raise Unsolved(
-                "integration-failed", f"DOP853 stopped between t = {start:.6g} and {stop:.6g} (scaled): {answer.message}"
+                "integration-failed",
+                f"DOP853 stopped between t = {start:.6g} and {stop:.6g} (scaled): {answer.message}",
             )
         self._steps += answer.nfev // 12  # twelve stages a step
         states = np.ascontiguousarray(answer.y.T)

@@ -1,7 +1,9 @@
-"""heyoka as its own users call it: the peer that the benchmarks and ``veselova bench`` compare with.
+"""heyoka as its own users call it: the peer that the benchmarks and ``veselova bench`` compare
+with.
 
-The field is compiled once for every n, with A as parameters. ``propagate_grid`` yields the states, and (q, p) is put back on
-the manifold every ten radians. The attitude comes from q and p where they determine it (n ≤ 3); there is no error estimate.
+The field is compiled once for every n, with A as parameters. ``propagate_grid`` yields the states,
+and (q, p) is put back on the manifold every ten radians. The attitude comes from q and p where they
+determine it (n ≤ 3); there is no error estimate.
 """
 
 from __future__ import annotations
@@ -24,15 +26,18 @@ _STRETCH = 10.0
 #: States that turn into attitudes at once: their arrays stay in the processor's cache.
 _BLOCK = 4096
 
-#: From this many equations on the compact mode, which compiles in a second where unrolled code takes minutes.
+#: From this many equations on the compact mode, which compiles in a second where unrolled code
+#: takes minutes.
 _COMPACT_FROM = 20
 
 
 class HeyokaPeer:
-    """One motion of a moving body by heyoka's Taylor method, τ₁, velocity and frame, without an error estimate.
+    """One motion of a moving body by heyoka's Taylor method, τ₁, velocity and frame, without an
+    error estimate.
 
-    In space p is at rest, and so are vectors u with u̇ = −(q̇,u) q: (q, p/|p|, u₃, …, uₙ) is the frame up to a constant rotation.
-    For n = 3 the last one is q × p/|p|; for n ≥ 4 heyoka integrates n − 2 of them besides (q, p, τ₁).
+    In space p is at rest, and so are vectors u with u̇ = −(q̇,u) q: (q, p/|p|, u₃, …, uₙ) is the
+    frame up to a constant rotation. For n = 3 the last one is q × p/|p|; for n ≥ 4 heyoka
+    integrates n − 2 of them besides (q, p, τ₁).
     """
 
     def __init__(self, problem: Veselova) -> None:
@@ -40,7 +45,8 @@ class HeyokaPeer:
         n = flow.n
         self._flow, self._integrator = flow, compile_integrator(n)
         self._integrator.pars[:] = flow.parameters
-        p, frame = flow.initial[:n], flow.initial[n:-1].reshape(n, n)
+        p = flow.initial[:n]
+        frame = flow.initial[n:-1].reshape(n, n)
         basis = np.linalg.qr(np.column_stack([frame[:, 0], p, np.eye(n)]))[0][:, :n]
         basis[:, 0], basis[:, 1] = frame[:, 0], p / np.linalg.norm(p)
         carried = basis[:, 2:].T if n > 3 else np.empty((0, n))
@@ -48,10 +54,14 @@ class HeyokaPeer:
         self._constant = self._basis(self._start[:, None])[:, :, 0].T @ frame
 
     def __call__(self, times: Array) -> tuple[Array, Array, Array]:
-        """Return (τ₁, q̇, frame) of shapes (N,), (N, n) and (N, n, n) at increasing times that are not negative."""
-        flow, n = self._flow, self._flow.n
+        """Return (τ₁, q̇, frame) of shapes (N,), (N, n) and (N, n, n) at increasing times that are
+        not negative.
+        """
+        flow = self._flow
+        n = self._flow.n
         states = self._states(times / flow.time_unit)
-        q_dot, frame = np.empty((times.size, n)), np.empty((times.size, n, n))
+        q_dot = np.empty((times.size, n))
+        frame = np.empty((times.size, n, n))
         for first in range(0, times.size, _BLOCK):
             part = slice(first, first + _BLOCK)
             block = np.ascontiguousarray(states[part].T)
@@ -61,8 +71,10 @@ class HeyokaPeer:
 
     def _velocity(self, block: Array) -> Array:
         """Return q̇ of shape (n, N), from states of shape (·, N)."""
-        flow, n = self._flow, self._flow.n
-        q, p_inverse = block[:n], flow.inverse[:, None] * block[n : 2 * n]
+        flow = self._flow
+        n = self._flow.n
+        q = block[:n]
+        p_inverse = flow.inverse[:, None] * block[n : 2 * n]
         sliding = p_inverse - np.sum(p_inverse * q, axis=0) * q
         return np.asarray(sliding / (flow.A @ (q * q) * flow.time_unit))
 
@@ -83,16 +95,21 @@ class HeyokaPeer:
 
     def _project(self, state: Array) -> None:
         """Put (q, p) back on the manifold: (q,q) = 1, (q,p) = 0, p rescaled to the energy."""
-        flow, n = self._flow, self._flow.n
-        q, p = state[:n], state[n : 2 * n]
+        flow = self._flow
+        n = self._flow.n
+        q = state[:n]
+        p = state[n : 2 * n]
         q /= np.sqrt(q @ q)
         p -= (p @ q) * q
         p *= np.sqrt(flow.twice_energy * (q @ (flow.A * q)) / (p @ (flow.inverse * p)))
 
     def _basis(self, block: Array) -> Array:
-        """Return the matrices with columns q, p/|p|, u₃, …, uₙ, as (row, column, N), from states of shape (·, N)."""
+        """Return the matrices with columns q, p/|p|, u₃, …, uₙ, as (row, column, N), from states of
+        shape (·, N).
+        """
         n = self._flow.n
-        q, p = block[:n], block[n : 2 * n]
+        q = block[:n]
+        p = block[n : 2 * n]
         basis = np.empty((n, n, block.shape[1]))
         basis[:, 0] = q
         basis[:, 1] = p / np.sqrt(np.sum(p * p, axis=0))
@@ -106,13 +123,16 @@ class HeyokaPeer:
 
 @cache
 def compile_integrator(n: int) -> Any:
-    """Return heyoka's integrator of (q, p, u₃, …, uₙ, τ₁), or (q, p, τ₁) for n ≤ 3, with the parameters A, A⁻¹ and W."""
+    """Return heyoka's integrator of (q, p, u₃, …, uₙ, τ₁), or (q, p, τ₁) for n ≤ 3, with the
+    parameters A, A⁻¹ and W.
+    """
     import heyoka as hy
 
     others = n - 2 if n > 3 else 0
     x = np.array(hy.make_vars(*[f"x{i}" for i in range(2 * n + others * n + 1)]), dtype=object)
     A, inverse = ([hy.par[first + i] for i in range(n)] for first in (0, n))
-    q, p = x[:n], x[n : 2 * n]
+    q = x[:n]
+    p = x[n : 2 * n]
     p_inverse = inverse * p
     qAq = hy.sum([a * b * b for a, b in zip(A, q, strict=True)])
     along = hy.sum(list(p_inverse * q))
@@ -122,4 +142,6 @@ def compile_integrator(n: int) -> Any:
         equations.extend(-(hy.sum(list(q_dot * u)) * q))
     equations.append(hy.sqrt(hy.par[2 * n] / qAq))
     system = list(zip(x, equations, strict=True))
-    return hy.taylor_adaptive(system, np.ones(x.size), tol=2.0**-52, compact_mode=x.size >= _COMPACT_FROM)
+    return hy.taylor_adaptive(
+        system, np.ones(x.size), tol=2.0**-52, compact_mode=x.size >= _COMPACT_FROM
+    )

@@ -1,4 +1,6 @@
-"""What an integrator of a flow is: one segment of time, states at the wanted times and at the end."""
+"""What an integrator of a flow is: one segment of time, states at the wanted times
+and at the end.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +26,17 @@ class Integrator(ABC):
 
     @abstractmethod
     def __init__(self, flow: Flow, tolerance: float) -> None:
-        """Prepare for one flow at one tolerance; raises BackendMissing when the library is not installed."""
+        """Prepare for one flow at one tolerance; raises BackendMissing when the library is not
+        installed.
+        """
 
     @abstractmethod
-    def advance(self, state: Array, start: float, stop: float, wanted: Array) -> tuple[Array, Array]:
-        """Return (states at the wanted times, state at stop), from the state at start; stop may lie before start."""
+    def advance(
+        self, state: Array, start: float, stop: float, wanted: Array
+    ) -> tuple[Array, Array]:
+        """Return (states at the wanted times, state at stop), from the state at start; stop may lie
+        before start.
+        """
 
     @property
     @abstractmethod

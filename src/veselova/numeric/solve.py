@@ -1,4 +1,6 @@
-"""The numerical engine's answer: integrate, project every ten radians, integrate again looser, report the difference."""
+"""The numerical engine's answer: integrate, project every ten radians, integrate again looser,
+report the difference.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from veselova.mechanics.core.errors import Unsolved, unknown_name
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.numeric.integrator import Integrator
 
 __all__ = ["METHODS", "solve"]
@@ -28,37 +31,47 @@ METHODS: Mapping[str, tuple[str, str]] = {
     "taylor": ("veselova.numeric.taylor", "Taylor"),
 }
 
-#: Scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut the error from 1e-5 to 3.5e-10.
+#: Scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut the error
+#: from 1e-5 to 3.5e-10.
 _SEGMENT = 10.0
 
-#: Scaled time that an integration is begun for: hours at n = 3, and by then one rounding of the data has grown to 1e-7.
+#: Scaled time that an integration is begun for: hours at n = 3, and by then one rounding of the
+#: data has grown to 1e-7.
 _FARTHEST = 1e9
 
-#: How far from the data, in ε, the check run starts: rounding of the start and of each projection is common to equal starts.
+#: How far from the data, in ε, the check run starts: rounding of the start and of each projection
+#: is common to equal starts.
 _DATA_ROUNDING = 32.0
 
-#: What the difference of two runs may hide: rounding that happens to agree, in ε·(1 + turning), and three quarters of the rest
-#: (the two starts differ in one direction, which need not be the one in which errors grow most; 2.8 was seen in 1400 draws).
+#: What the difference of two runs may hide: rounding that happens to agree, in ε·(1 + turning), and
+#: three quarters of the rest (the two starts differ in one direction, which need not be the one in
+#: which errors grow most; 2.8 was seen in 1400 draws).
 _SHARED_ROUNDING = 16.0
 _DIFFERENCE_SAFETY = 4.0
 
 #: Further times at which the two runs are compared.
 _CHECKPOINTS = 32
 
-#: What the estimate may still miss: with it the true error is at most the reported one. Largest true error over an estimate
-#: without it, in all draws of ``benchmarks/honesty.py``: 0.95.
+#: What the estimate may still miss: with it the true error is at most the reported one. Largest
+#: true error over an estimate without it, in all draws of ``benchmarks/honesty.py``: 0.95.
 _SAFETY = 2.0
 
 
-def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: str | None = None) -> Trajectory:
-    """Return the motion at the given times by integrating the problem's flow; the start is at time zero.
+def solve(
+    problem: Problem, times: Any, *, method: str = "dop853", formulation: str | None = None
+) -> Trajectory:
+    """Return the motion at the given times by integrating the problem's flow; the start is at time
+    zero.
 
-    ``method``: ``dop853`` (SciPy, relative tolerance 2e-14) or ``taylor`` (heyoka, to rounding). ``formulation``: one of the
-    problem's ``formulations``, equations of motion that differ and agree; None takes the first.
-    ``error`` bounds the true error of every bounded series: true ≤ error. It is measured by a second integration, at a looser
-    tolerance and from a start a few roundings away: eight times the running maximum of the difference in the bounded series,
-    plus twice the rounding that both may share. Tested for n = 2…8, |ω t| ≤ 10⁴.
-    Raises InvalidInput for bad times or names, BackendMissing without the library, Unsolved when the integrator gives up.
+    ``method``: ``dop853`` (SciPy, relative tolerance 2e-14) or ``taylor`` (heyoka, to rounding).
+    ``formulation``: one of the problem's ``formulations``, equations of motion that differ and
+    agree; None takes the first.
+    ``error`` bounds the true error of every bounded series: true ≤ error. It is measured by a
+    second integration, at a looser
+    tolerance and from a start a few roundings away: eight times the running maximum of the
+    difference in the bounded series, plus twice the rounding that both may share. Tested for n =
+    2…8, |ω t| ≤ 10⁴. Raises InvalidInput for bad times or names, BackendMissing without the
+    library, Unsolved when the integrator gives up.
     """
     grid = TimeGrid.of(times)
     if not isinstance(method, str) or method not in METHODS:
@@ -67,9 +80,15 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
         raise unknown_name(("formulation",), formulation, problem.formulations)
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
-    chosen, began = formulation or problem.formulations[0], time.perf_counter()
+    chosen = formulation or problem.formulations[0]
+    began = time.perf_counter()
     again = partial(solve, problem, method=method, formulation=formulation)
-    details = {"formulation": chosen, "tolerance": backend.tolerances[0], "steps": 0, "projection_every": _SEGMENT}
+    details = {
+        "formulation": chosen,
+        "tolerance": backend.tolerances[0],
+        "steps": 0,
+        "projection_every": _SEGMENT,
+    }
     if not problem.moves:
         provenance = Provenance.since(began, "numeric", method, details)
         return Trajectory.at_rest(problem, grid, provenance, again)
@@ -77,11 +96,17 @@ def solve(problem: Problem, times: Any, *, method: str = "dop853", formulation: 
     farthest = float(np.max(np.abs(grid.doubles / flow.time_unit)))
     if not farthest <= _FARTHEST:
         further = ", the closed form farther" if "analytic" in problem.engines else ""
-        raise Unsolved("too-far", f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}{further}")
+        raise Unsolved(
+            "too-far",
+            f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}{further}",
+        )
     series, error, steps = _integrate_twice(flow, problem.bounded, grid, backend)
-    series, details = problem.complete(series), {**details, "steps": steps}
+    series = problem.complete(series)
+    details = {**details, "steps": steps}
     provenance = Provenance.since(began, "numeric", method, details)
-    return Trajectory.on_grid(problem, grid, problem.bound(series, error), series, provenance, again)
+    return Trajectory.on_grid(
+        problem, grid, problem.bound(series, error), series, provenance, again
+    )
 
 
 def _integrate_twice(
@@ -91,21 +116,32 @@ def _integrate_twice(
     # Two runs may agree by chance at the few times asked for, not at all of these too.
     scaled = np.union1d(asked, np.linspace(min(asked[0], 0.0), max(asked[-1], 0.0), _CHECKPOINTS))
     neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)
-    answer, check = backend(flow, backend.tolerances[0]), backend(neighbour, backend.tolerances[1])
+    answer = backend(flow, backend.tolerances[0])
+    check = backend(neighbour, backend.tolerances[1])
     states = _integrate(flow, scaled, answer)
     series = flow.unpack(states)
     other = neighbour.unpack(_integrate(neighbour, scaled, check))
-    difference = np.max([_largest(series[name] - other[name]) for name in bounded if name in series], axis=0)
+    difference = np.max(
+        [_largest(series[name] - other[name]) for name in bounded if name in series], axis=0
+    )
     rounding = flow.size * _SHARED_ROUNDING * np.finfo(float).eps * (1 + np.abs(scaled))
-    # One step's own error, and that of interpolating inside it, is in both runs where their first steps coincide.
+    # One step's own error, and that of interpolating inside it, is in both runs where their first
+    # steps coincide.
     truncation = flow.size * backend.tolerances[0]
-    error = _SAFETY * (_DIFFERENCE_SAFETY * _running_maximum(scaled, difference) + rounding + truncation)
+    error = _SAFETY * (
+        _DIFFERENCE_SAFETY * _running_maximum(scaled, difference) + rounding + truncation
+    )
     kept = np.searchsorted(scaled, asked)
     if grid.remainders is None:
         return {name: values[kept] for name, values in series.items()}, error[kept], answer.steps
-    # The rest of the time, at most a rounding of it: what a step of first order leaves is its square, far below the error.
+    # The rest of the time, at most a rounding of it: what a step of first order leaves is its
+    # square, far below the error.
     velocities = np.stack([flow.vector_field(0.0, state) for state in states[kept]])
-    return flow.unpack(states[kept] + (grid.remainders / flow.time_unit)[:, None] * velocities), error[kept], answer.steps
+    return (
+        flow.unpack(states[kept] + (grid.remainders / flow.time_unit)[:, None] * velocities),
+        error[kept],
+        answer.steps,
+    )
 
 
 def _largest(values: Array) -> Array:
@@ -118,26 +154,34 @@ def _integrate(flow: Flow, scaled: Array, integrator: Integrator) -> Array:
     states = np.empty((scaled.size, flow.initial.size))
     for direction in (1.0, -1.0):
         indices = np.flatnonzero(scaled >= 0) if direction > 0 else np.flatnonzero(scaled < 0)[::-1]
-        state, start, done = flow.initial, 0.0, 0
+        state = flow.initial
+        start = 0.0
+        done = 0
         while done < indices.size:
             farthest = direction * scaled[indices[-1]]
             # The last segment is stretched rather than followed by a sliver.
             stop = start + _SEGMENT if farthest - start > 1.5 * _SEGMENT else max(farthest, start)
-            reached = done + int(np.searchsorted(direction * scaled[indices[done:]], stop, side="right"))
+            reached = done + int(
+                np.searchsorted(direction * scaled[indices[done:]], stop, side="right")
+            )
             wanted = scaled[indices[done:reached]]
             if stop > start:
-                states[indices[done:reached]], state = integrator.advance(state, direction * start, direction * stop, wanted)
+                states[indices[done:reached]], state = integrator.advance(
+                    state, direction * start, direction * stop, wanted
+                )
                 state = flow.project(state)
             else:
                 states[indices[done:reached]] = state
-            start, done = stop, reached
+            start = stop
+            done = reached
     return states
 
 
 def _running_maximum(scaled: Array, difference: Array) -> Array:
     """Return the largest difference seen between t = 0 and each time."""
     error = np.empty_like(difference)
-    later, earlier = scaled >= 0, scaled < 0
+    later = scaled >= 0
+    earlier = scaled < 0
     error[later] = np.maximum.accumulate(difference[later])
     error[earlier] = np.maximum.accumulate(difference[earlier][::-1])[::-1]
     return error

@@ -1,1 +1,3 @@
-"""Doubles, extended precision and balls behind one interface; double-double and fixed-point numbers."""
+"""Doubles, extended precision and balls behind one interface; double-double and fixed-point
+numbers.
+"""

@@ -1,7 +1,8 @@
 """The one place that touches precision: the arithmetic in which the closed form is evaluated.
 
-The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are float64; in ``Extended`` they
-are multiprecision numbers of an mpmath context that belongs to the arithmetic alone, so nothing global changes.
+The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are
+float64; in ``Extended`` they are multiprecision numbers of an mpmath context that belongs to the
+arithmetic alone, so nothing global changes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,15 @@ from scipy.special import ellipkm1, elliprf
 
 from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
 
-__all__ = ["DOUBLE", "LAST_COEFFICIENTS", "Arithmetic", "Decimals", "Double", "Extended", "extended_arithmetic"]
+__all__ = [
+    "DOUBLE",
+    "LAST_COEFFICIENTS",
+    "Arithmetic",
+    "Decimals",
+    "Double",
+    "Extended",
+    "extended_arithmetic",
+]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
@@ -32,17 +41,22 @@ Values = NDArray[Any]
 Sums = Callable[[Values], Values]
 
 #: Tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at most.
-_MOST_KEPT, _LARGEST_KEPT = 64, 256
+_MOST_KEPT = 64
+_LARGEST_KEPT = 256
 
-#: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is taken for what it leaves out
-#: where that is not bounded.
-LAST_COEFFICIENTS, _TAIL = 3, 4
+#: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is
+#: taken for what it leaves out where that is not bounded.
+LAST_COEFFICIENTS = 3
+_TAIL = 4
 
 
 class Arithmetic(ABC):
-    """Elementary functions, constants and small linear algebra at one precision. Functions act entrywise on arrays."""
+    """Elementary functions, constants and small linear algebra at one precision. Functions act
+    entrywise on arrays.
+    """
 
-    #: Whether numbers carry their own error, so that every truncation has to be added to it; whether that has to be a bound.
+    #: Whether numbers carry their own error, so that every truncation has to be added to it;
+    #: whether that has to be a bound.
     has_radii: ClassVar[bool] = False
     certified: bool = False
 
@@ -60,10 +74,14 @@ class Arithmetic(ABC):
 
     @abstractmethod
     def number(self, value: Any) -> Any:
-        """Return one number (Fraction, float, or a number of another arithmetic), rounded to this precision."""
+        """Return one number (Fraction, float, or a number of another arithmetic), rounded to this
+        precision.
+        """
 
     def array(self, values: Any) -> Values:
-        """Return an array of numbers of this arithmetic from nested sequences or an array of any other."""
+        """Return an array of numbers of this arithmetic from nested sequences or an array of any
+        other.
+        """
         given = np.array(values, dtype=object)
         result = np.empty(given.size, dtype=object)
         result[:] = [self.number(value) for value in given.ravel().tolist()]
@@ -87,31 +105,45 @@ class Arithmetic(ABC):
         return self.digits * math.log(10)
 
     def add_error(self, values: Any, bound: Any) -> Any:
-        """Return the values with a truncation of at most ``bound`` noted in them; here nothing keeps such notes."""
+        """Return the values with a truncation of at most ``bound`` noted in them; here nothing
+        keeps such notes.
+        """
         return values
 
     def nodes(self, count: int) -> Values:
-        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full period, by symmetry."""
+        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full
+        period, by symmetry.
+        """
         return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
 
     def sine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
+        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
+        coefficients (g, M, K).
+        """
         orders = self.array(list(range(1, coefficients.shape[1] + 1)))
         flat = coefficients.reshape(-1, coefficients.shape[2])
-        return lambda psi: np.asarray(self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat)
+        return lambda psi: np.asarray(
+            self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat
+        )
 
     def cosine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for coefficients (g, M, K)."""
+        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
+        coefficients (g, M, K).
+        """
         orders = self.array(list(range(coefficients.shape[1])))
 
         def sums(psi: Values) -> Values:
             exponentials = self.cos(psi[..., None] * orders)
-            return np.stack([exponentials[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2)
+            return np.stack(
+                [exponentials[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2
+            )
 
         return sums
 
     def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values."""
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
+        values.
+        """
         count = values.shape[-1]
         coefficients = self.product(values, self._exponentials(count)) * 2 / count
         coefficients[..., 0] = np.sum(values, axis=-1) / count
@@ -124,15 +156,19 @@ class Arithmetic(ABC):
 
     @staticmethod
     def bound_tail(largest: Any, decay: Any, count: int) -> Any:
-        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the aliases in those, at any real ψ.
+        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the
+        aliases in those, at any real ψ.
 
-        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤ 2Mρ^m.
+        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤
+        2Mρ^m.
         """
         return 6 * largest * decay**count / (1 - decay)
 
     @staticmethod
     def estimate_tail(series: Values) -> Values:
-        """Return what cosine series leave out judging by their last coefficients, shape (K,) for (K, N)."""
+        """Return what cosine series leave out judging by their last coefficients, shape (K,) for
+        (K, N).
+        """
         return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
     def product(self, a: Values, b: Values) -> Values:
@@ -144,7 +180,9 @@ class Arithmetic(ABC):
         return self.pi / 2 / self.agm(self.number(1), self.sqrt(complement))
 
     def agm(self, a: Any, b: Any) -> Any:
-        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically from any ratio."""
+        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically
+        from any ratio.
+        """
         while abs(a - b) > 4 * self.epsilon * abs(a):
             a, b = (a + b) / 2, self.sqrt(a * b)
         return (a + b) / 2
@@ -200,7 +238,8 @@ _GUARD = 6
 
 
 class Decimals:
-    """The four operations and square roots on decimals of the standard library, ten times as fast as those of mpmath.
+    """The four operations and square roots on decimals of the standard library, ten times as fast
+    as those of mpmath.
 
     Operators round to these digits ``with`` it only, in this thread.
     """
@@ -209,7 +248,9 @@ class Decimals:
         self.digits = digits
         self.epsilon = decimal.Decimal((0, (1,), -digits))
         trapped = [decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow]
-        self._context = decimal.Context(digits + _GUARD, "ROUND_HALF_EVEN", decimal.MIN_EMIN, decimal.MAX_EMAX, traps=trapped)
+        self._context = decimal.Context(
+            digits + _GUARD, "ROUND_HALF_EVEN", decimal.MIN_EMIN, decimal.MAX_EMAX, traps=trapped
+        )
         self._outer = decimal.Context()
 
     def __enter__(self) -> Decimals:
@@ -240,7 +281,9 @@ _DECIMAL_SQRT = np.frompyfunc(lambda x: x.sqrt(), 1, 1)
 
 
 class Extended(Arithmetic):
-    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least 20)."""
+    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least
+    20).
+    """
 
     def __init__(self, digits: int) -> None:
         self._context = mpmath.MPContext()
@@ -260,7 +303,9 @@ class Extended(Arithmetic):
     def number(self, value: Any) -> Any:
         """Return one number, rounded to this precision."""
         if isinstance(value, (Fraction, decimal.Decimal)):
-            return self._context.make_mpf(from_rational(*value.as_integer_ratio(), self._context.prec, "n"))
+            return self._context.make_mpf(
+                from_rational(*value.as_integer_ratio(), self._context.prec, "n")
+            )
         return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
@@ -269,7 +314,9 @@ class Extended(Arithmetic):
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""
-        return np.array(self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object)
+        return np.array(
+            self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object
+        )
 
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
@@ -277,7 +324,9 @@ class Extended(Arithmetic):
 
 
 class _ExtendedOfThread(threading.local):
-    """The extended arithmetics of one thread: an mpmath context changes its own precision while it works."""
+    """The extended arithmetics of one thread: an mpmath context changes its own precision while it
+    works.
+    """
 
     def __init__(self) -> None:
         self.by_digits: dict[int, Extended] = {}
@@ -287,7 +336,9 @@ _extended_of_thread = _ExtendedOfThread()
 
 
 def extended_arithmetic(digits: int) -> Extended:
-    """Return this thread's extended arithmetic of the given digits; making one costs a millisecond."""
+    """Return this thread's extended arithmetic of the given digits; making one costs
+    a millisecond.
+    """
     known = _extended_of_thread.by_digits
     if digits not in known:
         known[digits] = Extended(digits)

@@ -1,7 +1,8 @@
 """Ball arithmetic: every number is an interval, midpoint ± radius, that holds the exact value.
 
-The numbers are Arb's, through python-flint, whose precision is one global of the process: this file alone touches it. Work
-in balls goes inside ``with balls(digits):``, which sets the precision, keeps other threads out, and nests.
+The numbers are Arb's, through python-flint, whose precision is one global of the process: this file
+alone touches it. Work in balls goes inside ``with balls(digits):``, which sets the precision, keeps
+other threads out, and nests.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ __all__ = ["Balls", "balls"]
 #: Guard digits within the working precision.
 _GUARD = 6
 
-#: Digits of quantities that only bound others, and terms beyond those that the decay of a series asks for.
-_COARSE_DIGITS, _EXTRA_TERMS = 20, 6
+#: Digits of quantities that only bound others, and terms beyond those that the decay of a series
+#: asks for.
+_COARSE_DIGITS = 20
+_EXTRA_TERMS = 6
 
 #: Nodes from which series are formed by products of polynomials.
 _MANY_NODES = 300
@@ -38,9 +41,12 @@ _DIGITS_PER_TURN = 0.151
 _EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 _UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 
-#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero, and their power of ten.
-_UNASKED_DIGITS, _UNASKED = 5, 10**5
-_HALF, _ZERO = _UNASKED // 2, Decimal(0)
+#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero, and
+#: their power of ten.
+_UNASKED_DIGITS = 5
+_UNASKED = 10**5
+_HALF = _UNASKED // 2
+_ZERO = Decimal(0)
 
 _global = threading.RLock()
 
@@ -50,7 +56,9 @@ def _entrywise(method: str) -> Any:
 
 
 class Balls(Arithmetic):
-    """Real balls with at least the given number of decimal digits; a function of a ball holds all its values there."""
+    """Real balls with at least the given number of decimal digits; a function of a ball holds all
+    its values there.
+    """
 
     has_radii: ClassVar[bool] = True
     exp = staticmethod(_entrywise("exp"))
@@ -65,7 +73,8 @@ class Balls(Arithmetic):
     floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
 
     def __init__(self, digits: int, certified: bool) -> None:
-        self.digits, self.certified = digits, certified
+        self.digits = digits
+        self.certified = certified
         self._bits = math.ceil((digits + _GUARD) * math.log2(10))
         self._before: list[int] = []
         with self:
@@ -83,7 +92,9 @@ class Balls(Arithmetic):
         _global.release()
 
     def number(self, value: Any) -> Any:
-        """Return a ball that holds a rational or a decimal, that of a float or mpmath number exactly, or the given ball."""
+        """Return a ball that holds a rational or a decimal, that of a float or mpmath number
+        exactly, or the given ball.
+        """
         if isinstance(value, (Fraction, Decimal)):
             return flint.arb(flint.fmpq(*value.as_integer_ratio()))
         if isinstance(value, np.generic):
@@ -93,10 +104,19 @@ class Balls(Arithmetic):
             return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
-    def polynomial_roots(self, coefficients: Sequence[Fraction]) -> list[tuple[Fraction, Fraction, int]]:
-        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of a real one is 0."""
-        polynomial: Any = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in coefficients])
-        return [(self.rational(root.real), self.rational(root.imag), count) for root, count in polynomial.complex_roots()]
+    def polynomial_roots(
+        self, coefficients: Sequence[Fraction]
+    ) -> list[tuple[Fraction, Fraction, int]]:
+        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of
+        a real one is 0.
+        """
+        polynomial: Any = flint.fmpq_poly(
+            [flint.fmpq(c.numerator, c.denominator) for c in coefficients]
+        )
+        return [
+            (self.rational(root.real), self.rational(root.imag), count)
+            for root, count in polynomial.complex_roots()
+        ]
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z)."""
@@ -107,7 +127,9 @@ class Balls(Arithmetic):
         return flint.arb(a).agm(flint.arb(b))
 
     def inverse(self, matrix: Values) -> Values:
-        """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a singular one."""
+        """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a
+        singular one.
+        """
         return self._array(_matrix(matrix).inv())
 
     def determinant(self, matrix: Values) -> Any:
@@ -152,7 +174,9 @@ class Balls(Arithmetic):
         return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
-        """Return (midpoints rounded to so many significant digits, radii that cover the rounding), arrays of Decimal."""
+        """Return (midpoints rounded to so many significant digits, radii that cover the rounding),
+        arrays of Decimal.
+        """
         pairs = np.frompyfunc(lambda x: _decimal(x, digits), 1, 2)(values)
         return np.asarray(pairs[0], dtype=object), np.asarray(pairs[1], dtype=object)
 
@@ -168,16 +192,19 @@ class Balls(Arithmetic):
         return lambda psi: series(psi, "real")
 
     def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as values.
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
+        values.
 
-        Many nodes take one product of polynomials a row (Bluestein): w^{m(2j+1)} = w^{m²+m} w^{j²} w^{−(m−j)²}, w = e^{iπ/2N}.
+        Many nodes take one product of polynomials a row (Bluestein): w^{m(2j+1)} = w^{m²+m} w^{j²}
+        w^{−(m−j)²}, w = e^{iπ/2N}.
         """
         count = values.shape[-1]
         if count < _MANY_NODES:
             return super().cosine_series(values)
         order = np.arange(count)
         roots = self.turns(self.array(list(range(4 * count))) / (4 * count))
-        chirp, ends = roots[order**2 % (4 * count)], roots[(order**2 + order) % (4 * count)]
+        chirp = roots[order**2 % (4 * count)]
+        ends = roots[(order**2 + order) % (4 * count)]
         kernel = flint.acb_poly(_conjugate(chirp)[np.abs(np.arange(1 - count, count))].tolist())
         result = np.empty((values.size // count, count), dtype=object)
         for row, out in zip(values.reshape(-1, count), result, strict=True):
@@ -192,11 +219,14 @@ class Balls(Arithmetic):
         return np.asarray(_turn(2 * z))
 
     def powers(self, exponents: Values, bases: Values) -> Values:
-        """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive bases (N, g)."""
+        """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive
+        bases (N, g).
+        """
         return _products(exponents, bases, lambda w: 1 / w)
 
     def exponentials(self, modes: Values, turns: Values) -> tuple[Values, Values]:
-        """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) = e^{2πiz}.
+        """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) =
+        e^{2πiz}.
 
         A power comes from up to log₂|m| products in a row, each of which loses up to half a bit.
         """
@@ -212,16 +242,18 @@ class Balls(Arithmetic):
 class _Series:
     """The sums Σ_m c_smk e^{imψ_s}, m = 0…M−1, by Horner's rule.
 
-    Complex balls are rectangles, which grow by √2 with every turn: so midpoints alone go through the rule, with digits for
-    that growth, and the radii of ψ and of the coefficients enter by Σ|m c_m| and as they are. At a lower precision than the
-    coefficients', fewer terms are summed.
+    Complex balls are rectangles, which grow by √2 with every turn: so midpoints alone go through
+    the rule, with digits for that growth, and the radii of ψ and of the coefficients enter by Σ|m
+    c_m| and as they are. At a lower precision than the coefficients', fewer terms are summed.
     """
 
     def __init__(self, arithmetic: Balls, coefficients: Values) -> None:
         genus, self._terms, number = coefficients.shape
         middle = _midpoint(coefficients)
         self._arithmetic = arithmetic
-        self._polynomials = [[flint.acb_poly(middle[s, :, k].tolist()) for k in range(number)] for s in range(genus)]
+        self._polynomials = [
+            [flint.acb_poly(middle[s, :, k].tolist()) for k in range(number)] for s in range(genus)
+        ]
         with arithmetic.at(_COARSE_DIGITS):
             size = np.abs(middle + flint.arb(0))
             self._slack = np.sum(_around_zero(coefficients - middle), axis=1).T
@@ -230,7 +262,8 @@ class _Series:
 
     def __call__(self, psi: Values, part: str) -> Values:
         """Return the real or imaginary parts, shape (N, K, g)."""
-        genus, number = psi.shape[1], len(self._polynomials[0])
+        genus = psi.shape[1]
+        number = len(self._polynomials[0])
         result = np.empty((psi.shape[0], number, genus), dtype=object)
         centre = _midpoint(psi)
         spread = _around_zero(psi - centre)
@@ -258,7 +291,9 @@ _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
 def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
-    """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many digits."""
+    """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many
+    digits.
+    """
     if not isinstance(x, flint.arb):
         x = flint.arb(x)
     if not x.is_finite():
@@ -271,7 +306,9 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
 
 
 def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Values]) -> Values:
-    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g); w^m is w^{⌊m/2⌋} times the rest."""
+    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g); w^m is w^{⌊m/2⌋}
+    times the rest.
+    """
     factors = []
     for column, base in zip(exponents.T, bases.T, strict=True):
         powers = [1 + 0 * base, base]
@@ -289,8 +326,10 @@ def _matrix(values: Values) -> Any:
 
 @lru_cache(maxsize=64)
 def balls(digits: int, certified: bool = True) -> Balls:
-    """Return the ball arithmetic of the given digits; use it as a context manager around all work in it.
+    """Return the ball arithmetic of the given digits; use it as a context manager around all work
+    in it.
 
-    ``certified``: truncations are bounded, otherwise estimated from the last terms of each series, which takes half of them.
+    ``certified``: truncations are bounded, otherwise estimated from the last terms of each series,
+    which takes half of them.
     """
     return Balls(digits, certified)

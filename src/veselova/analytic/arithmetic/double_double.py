@@ -1,7 +1,9 @@
-"""Numbers of some thirty digits as sums of two doubles, entrywise on arrays: enough for narrow gaps, at the speed of NumPy.
+"""Numbers of some thirty digits as sums of two doubles, entrywise on arrays: enough for narrow
+gaps, at the speed of NumPy.
 
-Every operation is built of sums and products whose rounding is known exactly (Knuth, Dekker), so it is right to 2^−102 of its
-result, additions of either sign included. Entries have to stay within 1e±150 or so: the errors of products must be doubles.
+Every operation is built of sums and products whose rounding is known exactly (Knuth, Dekker), so it
+is right to 2^−102 of its result, additions of either sign included. Entries have to stay within
+1e±150 or so: the errors of products must be doubles.
 """
 
 from __future__ import annotations
@@ -65,7 +67,9 @@ class DoubleDouble:
     def __mul__(self, other: Any) -> DoubleDouble:
         other = DoubleDouble.of(other)
         high, error = exact_product(self.high, other.high)
-        return DoubleDouble(*_fast_two_sum(high, error + (self.high * other.low + self.low * other.high)))
+        return DoubleDouble(
+            *_fast_two_sum(high, error + (self.high * other.low + self.low * other.high))
+        )
 
     __rmul__ = __mul__
 
@@ -80,7 +84,9 @@ class DoubleDouble:
         return DoubleDouble.of(other) / self
 
     def sqrt(self) -> DoubleDouble:
-        """Return the roots of positive numbers, by one step of Newton's method from that of the double."""
+        """Return the roots of positive numbers, by one step of Newton's method from that of the
+        double.
+        """
         first = DoubleDouble.of(np.sqrt(self.high))
         return first + (self - first * first).high / (2 * first.high)
 
@@ -94,19 +100,27 @@ class DoubleDouble:
 
 def stack_double_doubles(values: Sequence[DoubleDouble]) -> DoubleDouble:
     """Return numbers along a new last axis."""
-    return DoubleDouble(np.stack([x.high for x in values], axis=-1), np.stack([x.low for x in values], axis=-1))
+    return DoubleDouble(
+        np.stack([x.high for x in values], axis=-1), np.stack([x.low for x in values], axis=-1)
+    )
 
 
 def where(condition: Any, chosen: DoubleDouble, other: DoubleDouble) -> DoubleDouble:
     """Return the chosen number where the condition holds, and the other one elsewhere."""
-    return DoubleDouble(np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low))
+    return DoubleDouble(
+        np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low)
+    )
 
 
-def exact_product(a: Array, b: Array, halves_of_b: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
+def exact_product(
+    a: Array, b: Array, halves_of_b: tuple[Array, Array] | None = None
+) -> tuple[Array, Array]:
     """Return (p, e) with a·b = p + e exactly, p the rounded product."""
     product = a * b
     (a_high, a_low), (b_high, b_low) = halves(a), halves_of_b or halves(b)
-    return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+    return product, a_low * b_low - (
+        ((product - a_high * b_high) - a_low * b_high) - a_high * b_low
+    )
 
 
 def halves(x: Array) -> tuple[Array, Array]:

@@ -1,4 +1,6 @@
-"""Trigonometric sums in double precision from powers of each e^{iφ}: a product costs a tenth of a sine and a cosine."""
+"""Trigonometric sums in double precision from powers of each e^{iφ}: a product costs a tenth of a
+sine and a cosine.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
-#: Waves of which each takes its own sine and cosine: the fewer calls are worth more than what they cost.
+#: Waves of which each takes its own sine and cosine: the fewer calls are worth more than what they
+#: cost.
 _FEW = 600
 
 
@@ -35,7 +38,9 @@ def powers(angles: Array, count: int) -> Complex:
 
 
 def turns(angles: Array, largest: int) -> Complex:
-    """Return e^{ikφ_j}, k = 0 … largest, −largest … −1, for angles (N, d), shape (2 largest + 1, d, N): k is the index."""
+    """Return e^{ikφ_j}, k = 0 … largest, −largest … −1, for angles (N, d), shape (2 largest + 1, d,
+    N): k is the index.
+    """
     forward = powers(angles.T, max(largest, 1))[: largest + 1]
     return np.concatenate([forward, np.conj(forward[:0:-1])])
 
@@ -49,7 +54,9 @@ def exponentials(turns: Complex, orders: Integers) -> Complex:
 
 
 def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = None) -> Array:
-    """Return cos k·φ and sin k·φ for angles (N, d) and orders (K, d) of entries to ``largest``, shape (2, K, N)."""
+    """Return cos k·φ and sin k·φ for angles (N, d) and orders (K, d) of entries to ``largest``,
+    shape (2, K, N).
+    """
     result = np.empty((2, orders.shape[0], angles.shape[0])) if out is None else out
     if angles.shape[0] * orders.shape[0] > _FEW:
         found = exponentials(turns(angles, largest), orders)
@@ -62,13 +69,18 @@ def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = 
 
 
 def sine_sums(coefficients: Array) -> Callable[[Array], Array]:
-    """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for coefficients (g, M, K)."""
-    count, flat = coefficients.shape[1], np.swapaxes(coefficients, 0, 1).reshape(-1, coefficients.shape[2])
+    """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
+    coefficients (g, M, K).
+    """
+    count = coefficients.shape[1]
+    flat = np.swapaxes(coefficients, 0, 1).reshape(-1, coefficients.shape[2])
     return lambda psi: np.asarray(powers(psi.T, count)[1:].imag.reshape(-1, psi.shape[0]).T @ flat)
 
 
 def cosine_sums(coefficients: Array) -> Callable[[Array], Array]:
-    """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for coefficients (g, M, K)."""
+    """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
+    coefficients (g, M, K).
+    """
     highest = coefficients.shape[1] - 1
 
     def sums(psi: Array) -> Array:

@@ -1,4 +1,6 @@
-"""The body's frame in ball arithmetic: from the normals along its moving directions to e_1 … e_n along the principal axes."""
+"""The body's frame in ball arithmetic: from the normals along its moving directions to e_1 … e_n
+along the principal axes.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,16 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["BodyFrame"]
 
-#: A column of the natural frame in double precision this near to a normal, or to a direction that rests, is that one. Beyond,
-#: constants of motion are so close together that the frame in double precision is taken for a given one.
+#: A column of the natural frame in double precision this near to a normal, or to a direction that
+#: rests, is that one. Beyond, constants of motion are so close together that the frame in double
+#: precision is taken for a given one.
 _NEARLY_NATURAL = 1e-9
 
 
 @dataclass(frozen=True)
 class BodyFrame:
-    """The frame of a problem, (e_2 … e_n) = D N ℜ + R: D the directions that move, N the normals along them, ℜ and R constant.
+    """The frame of a problem, (e_2 … e_n) = D N ℜ + R: D the directions that move, N the normals
+    along them, ℜ and R constant.
 
     q (m,), normals (m, g): those of the start, along the directions that move
     """
@@ -42,7 +46,9 @@ class BodyFrame:
         return directions(self.moving, self.arithmetic)
 
     def to_axes(self, vectors: Values) -> Values:
-        """Return vectors (N, m, …) along the directions that move by their components along the principal axes, (N, n, …)."""
+        """Return vectors (N, m, …) along the directions that move by their components along the
+        principal axes, (N, n, …).
+        """
         return to_axes(self.moving, self.directions, vectors)
 
     def frames(self, attitude: Attitude) -> Values:
@@ -57,8 +63,11 @@ class BodyFrame:
 
     @cached_property
     def start(self) -> Values:
-        """Return e_2 … e_n at the start, (n, n−1): normals and resting directions exactly, other columns made orthonormal."""
-        xp, columns = self.arithmetic, np.empty((self.moving.n, self.moving.n - 1), dtype=object)
+        """Return e_2 … e_n at the start, (n, n−1): normals and resting directions exactly, other
+        columns made orthonormal.
+        """
+        xp = self.arithmetic
+        columns = np.empty((self.moving.n, self.moving.n - 1), dtype=object)
         for j, (k, sign) in self.exact.items():
             columns[:, j] = sign * (self.directions @ self.normals[:, k])
         rest = [j for j in range(self.moving.n - 1) if j not in self.exact]
@@ -77,12 +86,18 @@ class BodyFrame:
 
     @property
     def _rows(self) -> Any:
-        return self.problem.exact.frame if self.problem.exact.frame is not None else self.problem.frame
+        return (
+            self.problem.exact.frame if self.problem.exact.frame is not None else self.problem.frame
+        )
 
     @cached_property
     def _along_normals(self) -> NDArray[np.float64]:
-        """Return the columns of the natural frame in double precision along the normals, (g, n−1)."""
-        return np.asarray(self.normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:])
+        """Return the columns of the natural frame in double precision along the
+        normals, (g, n−1).
+        """
+        return np.asarray(
+            self.normals.astype(float).T @ self.moving.directions.T @ self.problem.frame[:, 1:]
+        )
 
     @cached_property
     def exact(self) -> dict[int, tuple[int, int]]:
@@ -91,7 +106,9 @@ class BodyFrame:
             return {}
         signs = np.rint(self._along_normals)
         found = {}
-        for j in np.flatnonzero(np.max(np.abs(self._along_normals - signs), axis=0, initial=0) < _NEARLY_NATURAL).tolist():
+        for j in np.flatnonzero(
+            np.max(np.abs(self._along_normals - signs), axis=0, initial=0) < _NEARLY_NATURAL
+        ).tolist():
             (places,) = np.nonzero(signs[:, j])
             if places.size == 1:
                 found[j] = int(places[0]), int(signs[places[0], j])
@@ -99,11 +116,16 @@ class BodyFrame:
 
     @cached_property
     def _resting(self) -> dict[int, NDArray[np.intp]]:
-        """Return which columns rest within the axes of one A, and these axes: eigenvectors of A⁻¹ that the motion never feels."""
+        """Return which columns rest within the axes of one A, and these axes: eigenvectors of A⁻¹
+        that the motion never feels.
+        """
         if not self.problem.exact.natural:
             return {}
-        values, found = self.problem.exact.A, {}
-        for j in np.flatnonzero(np.max(np.abs(self._along_normals), axis=0, initial=0) < _NEARLY_NATURAL).tolist():
+        values = self.problem.exact.A
+        found = {}
+        for j in np.flatnonzero(
+            np.max(np.abs(self._along_normals), axis=0, initial=0) < _NEARLY_NATURAL
+        ).tolist():
             column = self.problem.frame[:, j + 1]
             value = values[int(np.argmax(np.abs(column)))]
             within = np.array([a == value for a in values])
@@ -114,7 +136,9 @@ class BodyFrame:
     @cached_property
     def given(self) -> list[int]:
         """Return the columns that are taken as given."""
-        return [j for j in range(self.moving.n - 1) if j not in self.exact and j not in self._resting]
+        return [
+            j for j in range(self.moving.n - 1) if j not in self.exact and j not in self._resting
+        ]
 
     @cached_property
     def _rotation(self) -> Values:
@@ -130,12 +154,14 @@ class BodyFrame:
     def turn(self, matrix: Any, constants: Values, other: Values) -> Any:
         """Return a bound of how far this frame is from that of another start, as operators.
 
-        matrix: how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors normals are · constants (g,): its eigenvalues, c_1
-        first · other (n,): the other start's q, along the principal axes. An eigenvector turns by at most 2√2 δT over the
-        distance of its eigenvalue (Davis, Kahan; Yu, Wang, Samworth). Columns that are given are projected along the others,
-        which are at most so far away, and made orthonormal, which at most doubles what that makes of them.
+        matrix: how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors normals are · constants
+        (g,): its eigenvalues, c_1 first · other (n,): the other start's q, along the principal
+        axes. An eigenvector turns by at most 2√2 δT over the distance of its eigenvalue (Davis,
+        Kahan; Yu, Wang, Samworth). Columns that are given are projected along the others, which are
+        at most so far away, and made orthonormal, which at most doubles what that makes of them.
         """
-        xp, g = self.arithmetic, len(constants)
+        xp = self.arithmetic
+        g = len(constants)
         result = xp.number(0)
         if self.exact:
             normals = {(k + 1) % g for k, _ in self.exact.values()}  # c_2 … c_g, c_1

@@ -1,16 +1,19 @@
-"""The whole attitude from the angles: q, the normals n_k, γ and q' in closed form (equations (S_n) and (wurzel)).
+"""The whole attitude from the angles: q, the normals n_k, γ and q' in closed form (equations (S_n)
+and (wurzel)).
 
 Write m_s for the unit eigenvectors of A⁻¹ on q⊥ (eigenvalue λ_s). With signed roots
 
     q_i = ς_i √(|U(I_i)/Ψ'(I_i)|),   v_k = (q', n_k) = √(|U(c_k)/ψ'(c_k)|),
-    y_s = √(|Ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   x_s = (q', m_s) = √(|ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   λ_s' = 2 x_s y_s,
+    y_s = √(|Ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   x_s = (q', m_s) = √(|ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   λ_s'
+        = 2 x_s y_s,
 
-the two orthogonal matrices (m_s)_i = q_i y_s/(λ_s−I_i) and (n_k, m_s) = x_s v_k/(λ_s−c_k) multiply to
-(n_k)_i = Σ_s (m_s)_i (n_k, m_s), the sum in (wurzel). U(r) = Π(r−λ_s), Ψ(r) = Π(r−I_i), ψ(r) = Π(r−c_k).
+the two orthogonal matrices (m_s)_i = q_i y_s/(λ_s−I_i) and (n_k, m_s) = x_s v_k/(λ_s−c_k) multiply
+to (n_k)_i = Σ_s (m_s)_i (n_k, m_s), the sum in (wurzel). U(r) = Π(r−λ_s), Ψ(r) = Π(r−I_i), ψ(r) =
+Π(r−c_k).
 
-Each root is a product of ratios at most one, taken along the interlacing I_s, c_s ≤ λ_s ≤ I_{s+1}, c_{s+1}; the factor of a
-cut's own end comes from sn or cn and carries the sign, so all entries are analytic in the angles and keep their relative
-accuracy where a coordinate turns.
+Each root is a product of ratios at most one, taken along the interlacing I_s, c_s ≤ λ_s ≤ I_{s+1},
+c_{s+1}; the factor of a cut's own end comes from sn or cn and carries the sign, so all entries are
+analytic in the angles and keep their relative accuracy where a coordinate turns.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ _BLOCK = 2_000_000
 class Attitude:
     """The body at N points of the torus, along sorted principal axes.
 
-    q (N, n) · normals (N, n, g) columns n_2 … n_{n−1}, γ · components (N, g) of q' along them · spheroconic (N, g)
+    q (N, n) · normals (N, n, g) columns n_2 … n_{n−1}, γ · components (N, g) of q' along them ·
+    spheroconic (N, g)
     """
 
     q: Values
@@ -59,25 +63,36 @@ class Attitude:
     @classmethod
     def concatenate(cls, parts: list[Attitude]) -> Attitude:
         """Return the attitudes one after the other."""
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+        return cls(
+            *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls))
+        )
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The closed formula of the frame for one curve; ``signs`` (n,) are the ς_i, constants of the motion."""
+    """The closed formula of the frame for one curve; ``signs`` (n,) are the ς_i, constants of the
+    motion.
+    """
 
     periods: Periods
     signs: Values
 
     def at(self, psi: Values) -> Attitude:
-        """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π as they do in time."""
+        """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π
+        as they do in time.
+        """
         size = max(1, _BLOCK // (self.periods.genus * (2 * self.periods.genus + 1)))
-        blocks = [_attitude(self, psi[first : first + size]) for first in range(0, max(psi.shape[0], 1), size)]
+        blocks = [
+            _attitude(self, psi[first : first + size])
+            for first in range(0, max(psi.shape[0], 1), size)
+        ]
         return blocks[0] if len(blocks) == 1 else Attitude.concatenate(blocks)
 
     def at_each(self, *sets: Values) -> list[Attitude]:
         """Return the attitudes at sets of angles, in one evaluation."""
-        at, first, parts = self.at(np.concatenate(sets)), 0, []
+        at = self.at(np.concatenate(sets))
+        first = 0
+        parts = []
         for psi in sets:
             parts.append(at.part(slice(first, first + len(psi))))
             first += len(psi)
@@ -85,12 +100,18 @@ class Frame:
 
     @cached_property
     def half_periods(self) -> Values:
-        """Return ν ∈ {0, 1}^g, (2^g, g): at the angles πν, the half periods z = ½ν, every λ_s is a branch point."""
+        """Return ν ∈ {0, 1}^g, (2^g, g): at the angles πν, the half periods z = ½ν, every λ_s is a
+        branch point.
+        """
         genus = self.periods.genus
-        return self.periods.arithmetic.array(np.arange(2**genus)[:, None] >> np.arange(genus)[::-1] & 1)
+        return self.periods.arithmetic.array(
+            np.arange(2**genus)[:, None] >> np.arange(genus)[::-1] & 1
+        )
 
     def slopes(self, psi: Values, directions: Values) -> Values:
-        """Return the derivatives of all frame entries along directions (N, g, d) of the angles, shape (N, n², d)."""
+        """Return the derivatives of all frame entries along directions (N, g, d) of the angles,
+        shape (N, n², d).
+        """
         return slopes(self.at, psi, directions)
 
 
@@ -103,30 +124,41 @@ class Differences:
 
     @cached_property
     def _lengths(self) -> Values:
-        # Where angles are ill-conditioned their directions are long, and a fixed step would lead out of the neighbourhood.
+        # Where angles are ill-conditioned their directions are long, and a fixed step would lead
+        # out of the neighbourhood.
         return np.asarray(_STEP / np.maximum(1.0, np.max(np.abs(self.directions), axis=1)))
 
     @property
     def ends(self) -> Values:
-        """Return the points between which differences are taken, shape ((1+d)N, g): these points, and one in each direction."""
+        """Return the points between which differences are taken, shape ((1+d)N, g): these points,
+        and one in each direction.
+        """
         steps = np.moveaxis(self.directions * self._lengths[:, None, :], 2, 0)
-        return np.concatenate([self.points[None], self.points + steps]).reshape(-1, self.points.shape[1])
+        return np.concatenate([self.points[None], self.points + steps]).reshape(
+            -1, self.points.shape[1]
+        )
 
     def slopes(self, at: Attitude) -> Values:
-        """Return the derivatives of all frame entries, shape (N, n², d), from the attitudes at the ends."""
+        """Return the derivatives of all frame entries, shape (N, n², d), from the attitudes at the
+        ends.
+        """
         return self.quotients(np.concatenate([at.q[:, :, None], at.normals], axis=2))
 
     def quotients(self, values: Values) -> Values:
-        """Return the derivatives of K numbers, shape (N, K, d), from their values at the ends, shape ((1+d)N, …)."""
+        """Return the derivatives of K numbers, shape (N, K, d), from their values at the ends,
+        shape ((1+d)N, …).
+        """
         count, _, number = self.directions.shape
         entries = values.reshape(1 + number, count, -1)
         return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
 
 
 def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
-    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g), shape (N, n², d).
+    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g),
+    shape (N, n², d).
 
-    To about 1e-7 of the largest; next to a separatrix, where frames turn within little, to less (1e-5 beside a gap of 1e-6).
+    To about 1e-7 of the largest; next to a separatrix, where frames turn within little, to less
+    (1e-5 beside a gap of 1e-6).
     """
     differences = Differences(points, directions)
     return differences.slopes(attitude(differences.ends))
@@ -134,7 +166,9 @@ def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: V
 
 @dataclass(frozen=True)
 class _Point:
-    """The distances and signed roots at given angles, shared by the products. Axes: s = 1…g, branch points b_i, N points."""
+    """The distances and signed roots at given angles, shared by the products. Axes: s = 1…g, branch
+    points b_i, N points.
+    """
 
     frame: Frame
     psi: Values
@@ -146,7 +180,9 @@ class _Point:
 
     @cached_property
     def own_roots(self) -> Values:
-        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one for b_0, (2g+1, N)."""
+        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, along sn or cn, and one
+        for b_0, (2g+1, N).
+        """
         below, above = self.frame.periods.roots_on_cuts(self.psi)
         result = np.full((2 * len(below) + 1, self.psi.shape[0]), self.curve.arithmetic.number(1))
         result[1::2], result[2::2] = below, above
@@ -161,16 +197,20 @@ class _Point:
     @cached_property
     def roots(self) -> Values:
         """Return √|λ_s−b_i|, (g, 2g+1, N), one where b_i ends cut s."""
-        distances, cuts = self.frame.periods.all_cuts.to_branch_points(*self.on_cuts), np.arange(self.curve.genus)
+        distances = self.frame.periods.all_cuts.to_branch_points(*self.on_cuts)
+        cuts = np.arange(self.curve.genus)
         for end in (1, 2):
             distances[cuts, 2 * cuts + end] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(distances))
 
     @cached_property
     def roots_between(self) -> Values:
-        """Return √|λ_s−λ_j|, (g, g, N), one for s = j: of what is above λ_s on its cut, the stretch between, and below λ_j."""
+        """Return √|λ_s−λ_j|, (g, g, N), one for s = j: of what is above λ_s on its cut, the stretch
+        between, and below λ_j.
+        """
         (below, above), g = self.on_cuts, self.curve.genus
-        cuts, time_rate = np.arange(g), self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
+        cuts = np.arange(g)
+        time_rate = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
         forward = above[:, None] + time_rate[:, :, None] + below
         result = np.where((cuts[:, None] < cuts)[:, :, None], forward, np.swapaxes(forward, 0, 1))
         result[cuts, cuts] = self.curve.arithmetic.number(1)
@@ -178,8 +218,11 @@ class _Point:
 
 
 def _attitude(frame: Frame, psi: Values) -> Attitude:
-    """Return the attitude at a block of angles: q and v are columns of the two matrices, the normals their product."""
-    point, g = _Point(frame, psi), frame.periods.genus
+    """Return the attitude at a block of angles: q and v are columns of the two matrices, the
+    normals their product.
+    """
+    point = _Point(frame, psi)
+    g = frame.periods.genus
     q, position = _orthogonal(point, "I", frame.signs)
     v, velocity = _orthogonal(point, "c", None)
     order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
@@ -188,23 +231,34 @@ def _attitude(frame: Frame, psi: Values) -> Attitude:
     return Attitude(q.T, normals, v[order].T, lower_ends + point.on_cuts[0].T)
 
 
-def _orthogonal(point: _Point, kind: Literal["I", "c"], signs: Values | None) -> tuple[Values, Values]:
-    """Return the signed column values (q_i or v_k), (m, N), and the matrix column·row/(λ_s−b), (g, m, N), for one kind of b."""
-    curve, layout = point.curve, point.curve.layout(kind)
-    near, own = point.roots[:, layout.places], point.own_roots[layout.places]
-    # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond each λ_s.
+def _orthogonal(
+    point: _Point, kind: Literal["I", "c"], signs: Values | None
+) -> tuple[Values, Values]:
+    """Return the signed column values (q_i or v_k), (m, N), and the matrix column·row/(λ_s−b), (g,
+    m, N), for one kind of b.
+    """
+    curve = point.curve
+    layout = point.curve.layout(kind)
+    near = point.roots[:, layout.places]
+    own = point.own_roots[layout.places]
+    # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond
+    # each λ_s.
     columns = np.prod(near / curve.root_stretches(kind)[:, :, None], axis=0)
     if signs is not None:
         columns = columns * signs[:, None]
-    # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or I_1 and I_n) have no partner.
-    ratios, cuts = near.copy(), np.arange(curve.genus)[:, None]
+    # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or
+    # I_1 and I_n) have no partner.
+    ratios = near.copy()
+    cuts = np.arange(curve.genus)[:, None]
     ratios[:, 1 : curve.genus] /= point.roots_between[cuts, layout.partners]
     rows = np.prod(ratios, axis=1)
-    whole_rows, values = rows.copy(), columns * own
+    whole_rows = rows.copy()
+    values = columns * own
     for k, s, _ in layout.ends:
         whole_rows[s] *= own[k]
     matrix = layout.sides[:, :, None] * (values / near) * (whole_rows[:, None] / near)
-    # The root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other end stays.
+    # The root of |λ_s−b| stands in both factors and cancels the quotient; that of the cut's other
+    # end stays.
     for k, s, mate in layout.ends:
         entry = layout.sides[s, k] * columns[k] * rows[s]
         matrix[s, k] = entry if mate < 0 else entry * own[mate]

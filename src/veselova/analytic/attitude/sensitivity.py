@@ -14,9 +14,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The largest derivatives of numbers x of a state, such as the entries of its frame, over points of the torus.
+    """The largest derivatives of numbers x of a state, such as the entries of its frame, over
+    points of the torus.
 
-    by_phase (g,) |∂x/∂z_k| · along_flow |dx/dτ₁| · together √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k ∂x/∂z_k|
+    by_phase (g,) |∂x/∂z_k| · along_flow |dx/dτ₁| · together √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k
+    ∂x/∂z_k|
     """
 
     by_phase: Array
@@ -28,9 +30,12 @@ class Sensitivity:
     def of(cls, slopes: Array, rates: Array) -> Sensitivity:
         """Return it from derivatives in every phase, shape (N, K, g)."""
         sizes = np.abs(slopes)
-        together, by_rates = np.max(np.sum(sizes * sizes, axis=2)), np.max(sizes @ np.abs(rates))
+        together = np.max(np.sum(sizes * sizes, axis=2))
+        by_rates = np.max(sizes @ np.abs(rates))
         along_flow = float(np.max(np.abs(slopes @ rates)))
-        return cls(np.max(sizes, axis=(0, 1)), along_flow, float(np.sqrt(together)), float(by_rates))
+        return cls(
+            np.max(sizes, axis=(0, 1)), along_flow, float(np.sqrt(together)), float(by_rates)
+        )
 
     def maximum(self, other: Sensitivity) -> Sensitivity:
         """Return the larger of both."""

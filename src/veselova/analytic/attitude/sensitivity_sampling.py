@@ -1,7 +1,7 @@
 """What every motion asks of the frame, in one evaluation: a call costs what hundreds of points do.
 
-These are the attitude at the start, those at half periods, from which theta quotients have their constants, and the difference
-quotients that say how steep the frame is.
+These are the attitude at the start, those at half periods, from which theta quotients have their
+constants, and the difference quotients that say how steep the frame is.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ __all__ = ["BETWEEN", "FEW", "SensitivitySampling", "sample_phases"]
 
 Array = NDArray[np.float64]
 
-#: Points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer points in as many directions.
-_SAMPLES, FEW, _FEW_SAMPLES = 48, 16, 4
+#: Points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer points
+#: in as many directions.
+_SAMPLES = 48
+FEW = 16
+_FEW_SAMPLES = 4
 
 
 #: By how much the steepness between the sampled points may be larger than at them.
@@ -32,7 +35,9 @@ BETWEEN = 1.25
 
 @lru_cache
 def _sample_angles(genus: int) -> Array:
-    """Return the points of the torus at which the steepness is sampled, (N, g), always the same ones, read-only."""
+    """Return the points of the torus at which the steepness is sampled, (N, g), always the same
+    ones, read-only.
+    """
     count = _SAMPLES if genus <= FEW else _FEW_SAMPLES
     result = np.random.default_rng(genus).uniform(0.0, 2 * np.pi, (count, genus))
     result.flags.writeable = False
@@ -48,8 +53,9 @@ def sample_phases(genus: int) -> Array:
 class SensitivitySampling:
     """The frame around a torus, from the angles (g,) of its start.
 
-    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half periods, and the steepness, are
-    wanted · point: what the positions q (N, m) are normals at, the point of a geodesic; None for other motions
+    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half
+    periods, and the steepness, are wanted · point: what the positions q (N, m) are normals at, the
+    point of a geodesic; None for other motions
     """
 
     frame: Frame
@@ -67,7 +73,11 @@ class SensitivitySampling:
         half_periods = np.pi * self.frame.half_periods if self.half_periods else start[:0]
         ends = start[:0] if differences is None else differences.ends
         at_start, at_half_periods, at_ends = self.frame.at_each(start, half_periods, ends)
-        sensitivity = None if differences is None else self._sensitivity(BETWEEN * differences.slopes(at_ends))
+        sensitivity = (
+            None
+            if differences is None
+            else self._sensitivity(BETWEEN * differences.slopes(at_ends))
+        )
         of_point = None
         if differences is not None and self.point is not None:
             of_point = self._sensitivity(BETWEEN * differences.quotients(self.point(at_ends.q)))
@@ -85,12 +95,16 @@ class SensitivitySampling:
 
     @property
     def sensitivity(self) -> Sensitivity | None:
-        """Return how fast the frame turns with the phases, and more for what lies between the sampled points; None as above."""
+        """Return how fast the frame turns with the phases, and more for what lies between the
+        sampled points; None as above.
+        """
         return self._found[2]
 
     @property
     def steepness_of_point(self) -> Sensitivity | None:
-        """Return how fast the point of ``point`` moves with the phases, in the same way; None where there is none."""
+        """Return how fast the point of ``point`` moves with the phases, in the same way; None where
+        there is none.
+        """
         return self._found[3]
 
     def _differences(self) -> Differences:
@@ -109,4 +123,9 @@ class SensitivitySampling:
         # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
         spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
         by_phase = np.full(genus, spread / np.sqrt(genus))
-        return Sensitivity(by_phase, float(np.max(np.abs(slopes[:, :, -1]))), spread, float(np.abs(self.rates) @ by_phase))
+        return Sensitivity(
+            by_phase,
+            float(np.max(np.abs(slopes[:, :, -1]))),
+            spread,
+            float(np.abs(self.rates) @ by_phase),
+        )

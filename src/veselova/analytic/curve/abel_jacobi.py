@@ -1,7 +1,7 @@
 """The Abel–Jacobi map in real angles, both ways: ψ ↦ z = Σ_s G_s(ψ_s) and Newton's method back.
 
-ψ_s is the elliptic angle of λ_s on its cut. The map is a real-analytic diffeomorphism of the torus, z_k = ψ_k/2π plus a
-periodic part, so ψ = 2πz starts the iteration.
+ψ_s is the elliptic angle of λ_s on its cut. The map is a real-analytic diffeomorphism of the torus,
+z_k = ψ_k/2π plus a periodic part, so ψ = 2πz starts the iteration.
 """
 
 from __future__ import annotations
@@ -19,22 +19,28 @@ from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["NARROW_GAP", "AbelJacobi"]
 
-#: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches its neighbour.
+#: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches
+#: its neighbour.
 _MOST_STEPS = 100
 
-#: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near such a gap, phases hardly
-#: move with the angles.
+#: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near
+#: such a gap, phases hardly move with the angles.
 NARROW_GAP = 1e-6
 
-#: Digits of the angles from which an inversion in balls starts, and those that a doubling by Newton's method loses to the slopes.
+#: Digits of the angles from which an inversion in balls starts, and those that a doubling by
+#: Newton's method loses to the slopes.
 _COARSE_DIGITS = 12
 _LOST_DIGITS = 2
 
-#: A residual of this many ε per unit of z is rounding, and one of this many times that, which no step betters.
-_SETTLED, _STALLED = 8.0, 1e4
+#: A residual of this many ε per unit of z is rounding, and one of this many times that, which no
+#: step betters.
+_SETTLED = 8.0
+_STALLED = 1e4
 
-#: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each of its stations.
-_FIRST_STRETCH, _LEAST_STRETCH = 0.25, 1e-9
+#: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each
+#: of its stations.
+_FIRST_STRETCH = 0.25
+_LEAST_STRETCH = 1e-9
 _NEAR_STEPS = 12
 
 
@@ -43,7 +49,9 @@ P = TypeVar("P", bound=AngleSeries)
 
 @dataclass(frozen=True)
 class AbelJacobi(Generic[P]):
-    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls starts."""
+    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls
+    starts.
+    """
 
     periods: P
     coarse: AbelJacobi[P] | None = None
@@ -63,7 +71,9 @@ class AbelJacobi(Generic[P]):
     @cached_property
     def _cosines(self) -> Sums:
         """Return ψ ↦ ∂z_k/∂ψ_s, whose coefficients have the axes s, m, k."""
-        return self.arithmetic.cosine_sums(np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0)))
+        return self.arithmetic.cosine_sums(
+            np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0))
+        )
 
     def map(self, psi: Values) -> Values:
         """Return z for angles ψ of shape (N, g); ψ_s + 2π adds one to z_s."""
@@ -75,12 +85,18 @@ class AbelJacobi(Generic[P]):
 
     def _complete(self, sums: Values) -> Values:
         """Return sums of series, last axis k, with what they leave out."""
-        return self.arithmetic.add_error(sums, self.periods.series_truncation) if self.arithmetic.has_radii else sums
+        return (
+            self.arithmetic.add_error(sums, self.periods.series_truncation)
+            if self.arithmetic.has_radii
+            else sums
+        )
 
     def invert(self, z: Values) -> Values:
-        """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole of ℝ^g.
+        """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole
+        of ℝ^g.
 
-        Raises Unsolved where the iteration does not settle for a gap that is too narrow (InternalContradiction otherwise).
+        Raises Unsolved where the iteration does not settle for a gap that is too narrow
+        (InternalContradiction otherwise).
         """
         xp = self.arithmetic
         cycles = xp.floor(z)
@@ -100,41 +116,56 @@ class AbelJacobi(Generic[P]):
             if open_.size == 0:
                 return psi
             try:
-                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[:, :, 0]
+                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[
+                    :, :, 0
+                ]
             except np.linalg.LinAlgError:
                 break
             trial = psi[open_] - step_fraction[open_, None] * step
             trial_residual = self.map(trial) - z[open_]
-            better = np.max(np.abs(trial_residual), axis=1) < np.max(np.abs(residual[open_]), axis=1)
+            better = np.max(np.abs(trial_residual), axis=1) < np.max(
+                np.abs(residual[open_]), axis=1
+            )
             accepted = open_[better]
             psi[accepted], residual[accepted] = trial[better], trial_residual[better]
             step_fraction[accepted] = np.minimum(1.0, 4 * step_fraction[accepted])
             step_fraction[open_[~better]] /= 4
-            # A full step that no longer improves has met the rounding of the sums, which grows with their length.
-            stalled = open_[~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)]
+            # A full step that no longer improves has met the rounding of the sums, which grows with
+            # their length.
+            stalled = open_[
+                ~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)
+            ]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
         for i in open_:
             psi[i] = self._continue_angles(z[i])
         return psi
 
     def _continue_angles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the angles of one point, led there along the line of phases from those of 2πz: the map is one-to-one.
+        """Return the angles of one point, led there along the line of phases from those of 2πz: the
+        map is one-to-one.
 
-        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar loses its way. It serves in a
-        bent valley as narrow as the gap, which a tangent leaves at once: a cubic through the last two stations follows it.
+        Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar
+        loses its way. It serves in a
+        bent valley as narrow as the gap, which a tangent leaves at once: a cubic through the last
+        two stations follows it.
         """
         psi = 2 * np.pi * z
-        begin, done, step = self.map(psi[None])[0], 0.0, _FIRST_STRETCH
+        begin = self.map(psi[None])[0]
+        done = 0.0
+        step = _FIRST_STRETCH
         stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         while done < 1 and step > _LEAST_STRETCH:
             reached = min(1.0, done + step)
             found = self._iterate_newton(
-                _extrapolate(stations, reached) if len(stations) == 2 else psi, begin + reached * (z - begin)
+                _extrapolate(stations, reached) if len(stations) == 2 else psi,
+                begin + reached * (z - begin),
             )
             if found is None:
                 step /= 4
                 continue
-            psi, done, step = found, reached, 2 * step
+            psi = found
+            done = reached
+            step = 2 * step
             slope = np.linalg.lstsq(self.jacobian(psi[None])[0], z - begin, rcond=None)[0]
             stations = [*stations[-1:], (done, psi, slope)]
         if done == 1:
@@ -142,13 +173,20 @@ class AbelJacobi(Generic[P]):
         gap = self.periods.narrowest_gap
         if gap < NARROW_GAP:
             raise Unsolved(
-                "narrow-gap", f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients serve to n = 8"
+                "narrow-gap",
+                f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients "
+                "serve to n = 8",
             )
         raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
 
-    def _iterate_newton(self, psi: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Return the angles to which plain Newton steps from nearby settle, None where they do not."""
-        tolerance, last = _SETTLED * DOUBLE.epsilon, np.inf
+    def _iterate_newton(
+        self, psi: NDArray[np.float64], z: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return the angles to which plain Newton steps from nearby settle, None
+        where they do not.
+        """
+        tolerance = _SETTLED * DOUBLE.epsilon
+        last = np.inf
         for _ in range(_NEAR_STEPS):
             residual = self.map(psi[None])[0] - z
             size = float(np.max(np.abs(residual)))
@@ -164,16 +202,20 @@ class AbelJacobi(Generic[P]):
         return None
 
     def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
-        """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the map has but one."""
+        """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the
+        map has but one.
+        """
         xp: Any = self.arithmetic
         centre = xp.midpoints(z)
         nearest = coarse.invert(DOUBLE.array(centre))
-        psi, inverses = xp.array(nearest), xp.array(np.linalg.inv(coarse.jacobian(nearest)))
+        psi = xp.array(nearest)
+        inverses = xp.array(np.linalg.inv(coarse.jacobian(nearest)))
         digits = known = _COARSE_DIGITS  # of the angles, and of the inverse slopes
         while 2 * digits < xp.digits + _LOST_DIGITS:
             if digits >= 2 * known:
                 with xp.at(digits) as working:
-                    inverses, known = _inverses(self.jacobian(psi), working), digits
+                    inverses = _inverses(self.jacobian(psi), working)
+                    known = digits
             digits += known - _LOST_DIGITS
             with xp.at(digits + _LOST_DIGITS) as working:
                 psi = working.midpoints(psi - _apply(inverses, self.map(psi) - centre))
@@ -185,24 +227,37 @@ class AbelJacobi(Generic[P]):
             rest = _apply(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
         step = rest - _apply(inverses, excess)
         if not xp.contained_in(step, reach).all():
-            raise Unsolved("not-enclosed", "the Abel–Jacobi inversion: no box could be shown to hold the angles")
+            raise Unsolved(
+                "not-enclosed",
+                "the Abel–Jacobi inversion: no box could be shown to hold the angles",
+            )
         return np.asarray(psi + step)
 
 
-def _extrapolate(stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float) -> NDArray[np.float64]:
-    """Return the value at ``reached`` of the cubic with the values and slopes of two stations (place, value, slope)."""
+def _extrapolate(
+    stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]], reached: float
+) -> NDArray[np.float64]:
+    """Return the value at ``reached`` of the cubic with the values and slopes of two stations
+    (place, value, slope).
+    """
     (first, early, rise), (second, late, climb) = stations
     length = second - first
     x = (reached - second) / length
     chord = (late - early) / length
-    # The divided differences of Hermite's interpolation, at the second station twice, then at the first.
+    # The divided differences of Hermite's interpolation, at the second station twice, then at the
+    # first.
     bend = climb - chord
     twist = climb - 2 * chord + rise
     return np.asarray(late + (reached - second) * (climb + x * (bend + (x + 1) * twist)))
 
 
 def _inverses(matrices: Values, arithmetic: Any) -> Values:
-    return np.stack([arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix))) for matrix in matrices])
+    return np.stack(
+        [
+            arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix)))
+            for matrix in matrices
+        ]
+    )
 
 
 def _apply(matrices: Values, vectors: Values) -> Values:

@@ -1,4 +1,6 @@
-"""What periods make of the cosine series of their forms: cycles a, frequencies f and the series of the Abel–Jacobi map."""
+"""What periods make of the cosine series of their forms: cycles a, frequencies f and the series of
+the Abel–Jacobi map.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ __all__ = ["AngleSeries"]
 
 
 class AngleSeries(ABC):
-    """The period data of g cuts, on each of which the forms du_1 … du_g are cosine series in its angle ψ_s.
+    """The period data of g cuts, on each of which the forms du_1 … du_g are cosine series in its
+    angle ψ_s.
 
     Where they are those of many curves, every array has a first axis for these.
     """
@@ -46,7 +49,9 @@ class AngleSeries(ABC):
     @cached_property
     def cycles(self) -> Values:
         """Return a, shape (g, g)."""
-        return np.stack([2 * self.arithmetic.pi * series[..., 0] for series in self.cut_series], axis=-1)
+        return np.stack(
+            [2 * self.arithmetic.pi * series[..., 0] for series in self.cut_series], axis=-1
+        )
 
     @cached_property
     def inverse_cycles(self) -> Values:
@@ -65,7 +70,9 @@ class AngleSeries(ABC):
 
     @cached_property
     def angle_series(self) -> Values:
-        """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the longest cut."""
+        """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the
+        longest cut.
+        """
         padded = np.zeros((*self.cycles.shape, self.longest), dtype=self.cycles.dtype)
         for s, series in enumerate(self.cut_series):
             padded[..., s, : series.shape[-1]] = self.inverse_cycles @ series

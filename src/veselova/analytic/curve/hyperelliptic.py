@@ -1,4 +1,6 @@
-"""The hyperelliptic curve w² = R(λ) = −Π(λ−I_i) Π(λ−c_k), equation (Rad), of genus g = n−1; c_1 = 0 but for Neumann's system."""
+"""The hyperelliptic curve w² = R(λ) = −Π(λ−I_i) Π(λ−c_k), equation (Rad), of genus g = n−1; c_1 = 0
+but for Neumann's system.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,15 @@ from veselova.analytic.spectrum.branch_points import Spectrum
 __all__ = ["BranchPoint", "Curve", "Layout", "places_of"]
 
 #: Layouts that are kept, and the most branch points of such.
-_MOST_KEPT, _LARGEST_KEPT = 64, 33
+_MOST_KEPT = 64
+_LARGEST_KEPT = 33
 
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """Where a branch point comes from: ``I`` with ``index`` the sorted body axis (from 0), or ``c`` with c_1 at index 0."""
+    """Where a branch point comes from: ``I`` with ``index`` the sorted body axis (from 0), or ``c``
+    with c_1 at index 0.
+    """
 
     kind: Literal["I", "c"]
     index: int
@@ -31,10 +36,12 @@ class Layout:
     """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
 
     places (m,) their indices j · sides (g, m) the sign of λ_s − b_k
-    beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k (m where there is none)
-    partners (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with those below, the others with those
-    above
-    ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1 where that is of the other kind
+    beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k
+    (m where there is none)
+    partners (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with those
+    below, the others with those above
+    ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1 where
+    that is of the other kind
     """
 
     places: NDArray[np.intp]
@@ -46,11 +53,13 @@ class Layout:
 
 @dataclass(frozen=True)
 class Curve:
-    """The branch points b_0 < b_1 < … < b_{2g} and all their differences, each rounded once from more digits.
+    """The branch points b_0 < b_1 < … < b_{2g} and all their differences, each rounded once from
+    more digits.
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
-    differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c.
-    In doubles it may be N curves whose branch points come from the same in the same order, along a first axis of both arrays.
+    differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c. In doubles it may be
+    N curves whose branch points come from the same in the same order, along a first axis of both
+    arrays.
     """
 
     arithmetic: Arithmetic
@@ -89,7 +98,9 @@ class Curve:
         return (_kept_layouts if len(self.origins) <= _LARGEST_KEPT else _layouts)(self.origins)
 
     def root_stretches(self, kind: Literal["I", "c"]) -> Values:
-        """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m); one where there is none."""
+        """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m);
+        one where there is none.
+        """
         return self._root_stretches[kind]
 
     @cached_property
@@ -97,39 +108,59 @@ class Curve:
         result: dict[Literal["I", "c"], Values] = {}
         for kind, layout in self._layouts.items():
             inside = layout.beyond < layout.places.size
-            distances = abs(self.differences[layout.places, layout.places[np.where(inside, layout.beyond, 0)]])
-            result[kind] = self.arithmetic.sqrt(np.where(inside, distances, self.arithmetic.number(1)))
+            distances = abs(
+                self.differences[layout.places, layout.places[np.where(inside, layout.beyond, 0)]]
+            )
+            result[kind] = self.arithmetic.sqrt(
+                np.where(inside, distances, self.arithmetic.number(1))
+            )
         return result
 
     def width(self, j: int) -> Any:
         """Return b_{j+1} − b_j; of many curves with an axis for angles, (N, 1)."""
-        return self.differences[j, j + 1] if self.branch_points.ndim == 1 else self.differences[:, j, j + 1, None]
+        return (
+            self.differences[j, j + 1]
+            if self.branch_points.ndim == 1
+            else self.differences[:, j, j + 1, None]
+        )
 
     def point(self, j: int) -> Any:
         """Return b_j in the same way."""
-        return self.branch_points[j] if self.branch_points.ndim == 1 else self.branch_points[:, j, None]
+        return (
+            self.branch_points[j]
+            if self.branch_points.ndim == 1
+            else self.branch_points[:, j, None]
+        )
 
     @staticmethod
     def cut_of(j: Any) -> Any:
-        """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for b_0, which ends none."""
+        """Return the cut s = 1…g that ends at b_j, j ≥ 1 (an index, or an array of them); 0 for
+        b_0, which ends none.
+        """
         return (j + 1) // 2
 
     @cached_property
     def midpoints(self) -> Values:
-        """Return ζ_l − b_j, shape (2g+1, g−1), with ζ_l the midpoint of gap l = 1…g−1: the zeros of the nodal differentials."""
+        """Return ζ_l − b_j, shape (2g+1, g−1), with ζ_l the midpoint of gap l = 1…g−1: the zeros of
+        the nodal differentials.
+        """
         even = np.arange(2, 2 * self.genus, 2)
         return (self.differences[..., even] + self.differences[..., even + 1]) / 2
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least gap that can close against the wider of its two cuts: how near a separatrix is; 1 without any.
+        """Return the least gap that can close against the wider of its two cuts: how near a
+        separatrix is; 1 without any.
 
-        The first gap is one between c_1 = 0 and the least I, but for Neumann's system, where it may close as the others may.
+        The first gap is one between c_1 = 0 and the least I, but for Neumann's system, where it may
+        close as the others may.
         """
         widths = [self.differences[j, j + 1] for j in range(2 * self.genus)]
         first = 2 if self.branch_points[0] == 0 else 0
         ratios = [
-            float(widths[j] / (widths[j] + max(widths[j + 1], widths[j - 1] if j else widths[j + 1])))
+            float(
+                widths[j] / (widths[j] + max(widths[j + 1], widths[j - 1] if j else widths[j + 1]))
+            )
             for j in range(first, 2 * self.genus, 2)
         ]
         return min(ratios, default=1.0)
@@ -154,13 +185,16 @@ _kept_layouts = lru_cache(_MOST_KEPT)(_layouts)
 
 
 def _layout(origins: tuple[BranchPoint, ...], kind: Literal["I", "c"]) -> Layout:
-    genus, place = (len(origins) - 1) // 2, places_of(origins)
-    places, ends = [place[kind, index] for index in range(genus + (kind == "I"))], list[tuple[int, int, int]]()
+    genus = (len(origins) - 1) // 2
+    place = places_of(origins)
+    places = [place[kind, index] for index in range(genus + (kind == "I"))]
+    ends = list[tuple[int, int, int]]()
     for k, j in enumerate(places):
         if j > 0:
             other = origins[j + 1 if j % 2 == 1 else j - 1]
             ends.append((k, Curve.cut_of(j) - 1, other.index if other.kind == kind else -1))
-    cuts, inner = np.arange(genus)[:, None], np.arange(1, genus)
+    cuts = np.arange(genus)[:, None]
+    inner = np.arange(1, genus)
     beyond = np.where(cuts < np.arange(len(places)), cuts, cuts + 1)
     sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
     arrays = np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner)

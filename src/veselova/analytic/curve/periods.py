@@ -1,9 +1,12 @@
-"""Periods of the nodal differentials over cuts and gaps, the Riemann matrix, and the angle integrals G_s(ψ).
+"""Periods of the nodal differentials over cuts and gaps, the Riemann matrix, and the angle
+integrals G_s(ψ).
 
-    a_{ks} = (−1)^{g−s} ∮_{cut s} p_k dλ/(2√|R|),   B_{ks} = Σ_{gaps j<s} (−1)^{g−j+1} ∮ p_k dλ/(2√|R|)
+    a_{ks} = (−1)^{g−s} ∮_{cut s} p_k dλ/(2√|R|),   B_{ks} = Σ_{gaps j<s} (−1)^{g−j+1} ∮ p_k
+        dλ/(2√|R|)
     T = a⁻¹B is real, symmetric, positive definite; the Riemann matrix is τ = iT;  f = a⁻¹e_g
 
-On cut s the integral of a⁻¹(p_1…p_g) from b_{2s−1} is g_{s0}ψ + Σ_m g_{sm} sin(mψ)/m, one cosine series for each s.
+On cut s the integral of a⁻¹(p_1…p_g) from b_{2s−1} is g_{s0}ψ + Σ_m g_{sm} sin(mψ)/m, one cosine
+series for each s.
 """
 
 from __future__ import annotations
@@ -29,11 +32,12 @@ __all__ = ["Periods", "resolve_periods"]
 #: Nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
-#: Entries at one node of the forms of intervals that are evaluated side by side: with all nodes they stay in the cache.
+#: Entries at one node of the forms of intervals that are evaluated side by side: with all nodes
+#: they stay in the cache.
 _BLOCK = 10_000
 
-#: Branch points nearer than 10 to minus this count as one where two narrower intervals are neighbours: their widths then have a
-#: product, as moduli ask for.
+#: Branch points nearer than 10 to minus this count as one where two narrower intervals are
+#: neighbours: their widths then have a product, as moduli ask for.
 _COINCIDE_BESIDE = 140
 
 #: Nodes of an interval in balls: a minute.
@@ -42,7 +46,9 @@ _MOST_NODES = 100_000
 
 @dataclass(frozen=True)
 class Periods(AngleSeries):
-    """The period data of a curve in the curve's arithmetic; of many at once, then ``nodes`` are those of every interval."""
+    """The period data of a curve in the curve's arithmetic; of many at once, then ``nodes`` are
+    those of every interval.
+    """
 
     curve: Curve
     nodes: int | None = None
@@ -71,7 +77,10 @@ class Periods(AngleSeries):
     def all_cuts(self) -> Interval:
         """Return the cuts of one curve side by side."""
         lefts = tuple(range(1, 2 * self.genus, 2))
-        return next((block for block in self.blocks_of_cuts if block.left == lefts), Interval(self.curve, lefts))
+        return next(
+            (block for block in self.blocks_of_cuts if block.left == lefts),
+            Interval(self.curve, lefts),
+        )
 
     def roots_on_cuts(self, psi: Values) -> tuple[Values, Values]:
         """Return the ``roots`` of every cut of one curve at angles (N, g), each (g, N)."""
@@ -82,12 +91,16 @@ class Periods(AngleSeries):
 
     @property
     def _together(self) -> bool:
-        """Return whether intervals are evaluated side by side: of one curve in doubles, where calls cost more than numbers."""
+        """Return whether intervals are evaluated side by side: of one curve in doubles, where calls
+        cost more than numbers.
+        """
         return self.arithmetic is DOUBLE and self.curve.branch_points.ndim == 1
 
     @cached_property
     def _blocks(self) -> tuple[Interval, ...]:
-        """Return all intervals of one curve in doubles, as many of them side by side as fill a block."""
+        """Return all intervals of one curve in doubles, as many of them side by side as fill a
+        block.
+        """
         return self._side_by_side(range(2 * self.genus))
 
     @cached_property
@@ -97,11 +110,16 @@ class Periods(AngleSeries):
 
     def _side_by_side(self, lefts: range) -> tuple[Interval, ...]:
         size = max(1, _BLOCK // (self.genus * (2 * self.genus + 1)))
-        return tuple(Interval(self.curve, tuple(lefts[first : first + size])) for first in range(0, len(lefts), size))
+        return tuple(
+            Interval(self.curve, tuple(lefts[first : first + size]))
+            for first in range(0, len(lefts), size)
+        )
 
     @property
     def has_moduli(self) -> bool:
-        """Return whether k'² of every interval, which has the widths of both its neighbours as factors, is a double."""
+        """Return whether k'² of every interval, which has the widths of both its neighbours as
+        factors, is a double.
+        """
         return all(np.min(block.jacobi.complement) >= sys.float_info.min for block in self._blocks)
 
     @property
@@ -115,9 +133,11 @@ class Periods(AngleSeries):
         return sum(int(series.shape[-1]) for series in self.cut_series)
 
     def node_count(self, interval: Interval) -> int:
-        """Return the number of midpoint nodes whose interpolating cosine series holds the forms to the working precision.
+        """Return the number of midpoint nodes whose interpolating cosine series holds the forms to
+        the working precision.
 
-        Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the digits. Where errors are to be
+        Coefficients fall like e^(−π m K'/K); the means, with error e^(−2πN K'/K), have twice the
+        digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
         return self.nodes if self.nodes is not None else int(np.max(self.count_nodes(interval)))
@@ -128,11 +148,14 @@ class Periods(AngleSeries):
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
     def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
-        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an interval's series."""
+        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an
+        interval's series.
+        """
         count = self.node_count(interval)
         if self.arithmetic.has_radii and count > _MOST_NODES:
             wanted = (
-                f"{self.arithmetic.digits} digits take series of {count} terms beside a relative gap of {self.narrowest_gap:.2g}"
+                f"{self.arithmetic.digits} digits take series of {count} terms beside a "
+                f"relative gap of {self.narrowest_gap:.2g}"
             )
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
         below, above = interval.distances(self.arithmetic.nodes(count))
@@ -140,7 +163,9 @@ class Periods(AngleSeries):
 
     @cached_property
     def _in_blocks(self) -> list[tuple[int, Values, Values]]:
-        """Return how many coefficients hold the forms, λ−b_1, and the forms, on all intervals of one curve in doubles."""
+        """Return how many coefficients hold the forms, λ−b_1, and the forms, on all intervals of
+        one curve in doubles.
+        """
         found = list[tuple[int, Values, Values]]()
         for block in self._blocks:
             counts = self.count_nodes(block)[:, 0].astype(int).tolist()
@@ -149,13 +174,17 @@ class Periods(AngleSeries):
 
     @cached_property
     def forms_at_nodes(self) -> tuple[tuple[Values, Values], ...]:
-        """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its series."""
+        """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its
+        series.
+        """
         if self._together:
             return tuple((below, forms) for _, below, forms in self._in_blocks[1::2])
         return tuple(self._forms_at_nodes(cut) for cut in self.cuts)
 
     def _series(self, interval: Interval, forms: Values) -> Values:
-        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value = Σ_m h_m cos mψ."""
+        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value =
+        Σ_m h_m cos mψ.
+        """
         coefficients = self.arithmetic.cosine_series(forms)
         if self.arithmetic.certified:
             coefficients[:, 0] = self._mean(interval, forms)
@@ -164,39 +193,67 @@ class Periods(AngleSeries):
     def _mean(self, interval: Interval, forms: Values) -> Values:
         """Return h_0, shape (..., g)."""
         mean = np.sum(forms, axis=-1) / forms.shape[-1]
-        return np.asarray(self.arithmetic.add_error(mean, self._bound(interval, 2)) if self.arithmetic.certified else mean)
+        return np.asarray(
+            self.arithmetic.add_error(mean, self._bound(interval, 2))
+            if self.arithmetic.certified
+            else mean
+        )
 
     def _bound(self, interval: Interval, times: int) -> Values:
-        """Return the bound of what the forms' series leave out after times·N coefficients, shape (g,).
+        """Return the bound of what the forms' series leave out after times·N coefficients, shape
+        (g,).
 
-        With times = 1 that is the error of N coefficients at any real ψ; the alias in h_0 alone is below that with times = 2.
+        With times = 1 that is the error of N coefficients at any real ψ; the alias in h_0 alone is
+        below that with times = 2.
         """
-        xp, count = self.arithmetic, self.node_count(interval)
+        xp = self.arithmetic
+        count = self.node_count(interval)
         decay = xp.exp(xp.number(-interval.strip))
         return np.asarray(xp.bound_tail(interval.bound_in_strip(), decay, times * count))
 
     @cached_property
     def series_truncation(self) -> Values:
-        """Return what the angle series leave out of z_k, and of ∂z_k/∂ψ_s for all s together, at most, shape (g,).
+        """Return what the angle series leave out of z_k, and of ∂z_k/∂ψ_s for all s together, at
+        most, shape (g,).
 
         A bound where the arithmetic is certified; otherwise a multiple of the last terms.
         """
         if self.arithmetic.certified:
-            return np.asarray(sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts))
-        return np.asarray(sum(np.abs(self.inverse_cycles) @ self.arithmetic.estimate_tail(series) for series in self.cut_series))
+            return np.asarray(
+                sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts)
+            )
+        return np.asarray(
+            sum(
+                np.abs(self.inverse_cycles) @ self.arithmetic.estimate_tail(series)
+                for series in self.cut_series
+            )
+        )
 
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
-        found = [self._series(cut, forms) for cut, (_, forms) in zip(self.cuts, self.forms_at_nodes, strict=True)]
+        found = [
+            self._series(cut, forms)
+            for cut, (_, forms) in zip(self.cuts, self.forms_at_nodes, strict=True)
+        ]
         if self._together:
-            found = [series[:, :count] for series, (count, _, _) in zip(found, self._in_blocks[1::2], strict=True)]
+            found = [
+                series[:, :count]
+                for series, (count, _, _) in zip(found, self._in_blocks[1::2], strict=True)
+            ]
         return tuple((-1) ** (self.genus - s) * series for s, series in enumerate(found, start=1))
 
     @cached_property
     def cancellation(self) -> Values:
-        """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's over many orders cancel."""
-        return np.asarray(sum(np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=1) for series in self.cut_series))
+        """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's
+        over many orders cancel.
+        """
+        return np.asarray(
+            sum(
+                np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=1)
+                for series in self.cut_series
+            )
+        )
 
     @cached_property
     def conjugate_cycles(self) -> Values:
@@ -214,7 +271,9 @@ class Periods(AngleSeries):
 
     @cached_property
     def riemann_matrix_residual(self) -> float:
-        """Return max |T − Tᵀ|/max |T| before symmetrisation: the bilinear relation, a check of all periods at once."""
+        """Return max |T − Tᵀ|/max |T| before symmetrisation: the bilinear relation, a check of all
+        periods at once.
+        """
         raw = self.inverse_cycles @ self.conjugate_cycles
         return float(np.max(np.abs(raw - raw.T)) / np.max(np.abs(raw)))
 
@@ -226,7 +285,8 @@ class Periods(AngleSeries):
 
 
 def resolve_periods(moving: Moving, distance: Fraction | None) -> tuple[Resolved, Periods]:
-    """Return the spectrum of what moves, and the periods of its curve in doubles, whose moduli are doubles too.
+    """Return the spectrum of what moves, and the periods of its curve in doubles, whose moduli are
+    doubles too.
 
     ``distance`` is that of ``resolved``.
     """

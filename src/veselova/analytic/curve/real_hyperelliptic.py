@@ -1,11 +1,13 @@
-"""A hyperelliptic curve with real branch points, brought to w² = −Π(μ−β_j), j = 0 … 2g, whose bounded ovals lie over the cuts.
+"""A hyperelliptic curve with real branch points, brought to w² = −Π(μ−β_j), j = 0 … 2g, whose
+bounded ovals lie over the cuts.
 
     w² = −Π_{2g+1}(λ−b_j)     μ = λ
     w² = +Π_{2g+1}(λ−b_j)     μ = −λ
     w² = +Π_{2g+2}(λ−b_j)     μ = 1/(e−λ), e the last branch point, which goes to infinity
     w² = −Π_{2g+2}(λ−b_j)     μ = 1/(λ−e), e the last branch point
 
-Differences of β's are products and quotients of exact differences, so that near branch points keep their digits.
+Differences of β's are products and quotients of exact differences, so that near branch points keep
+their digits.
 """
 
 from __future__ import annotations
@@ -32,13 +34,18 @@ __all__ = ["RealCurve"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Nodes of Gauss' rule on a path, at first and at most, and the relative change at which it has converged.
-_FEWEST_NODES, _MOST_NODES, _QUADRATURE = 32, 1024, 1e-13
+#: Nodes of Gauss' rule on a path, at first and at most, and the relative change at which it has
+#: converged.
+_FEWEST_NODES = 32
+_MOST_NODES = 1024
+_QUADRATURE = 1e-13
 
 
 @dataclass(frozen=True)
 class RealCurve:
-    """The curve w² = sign·Π(λ−b_j) of distinct rationals b_j, increasing, and its data in the coordinate μ."""
+    """The curve w² = sign·Π(λ−b_j) of distinct rationals b_j, increasing, and its data in the
+    coordinate μ.
+    """
 
     points: tuple[Fraction, ...]
     sign: int
@@ -74,9 +81,12 @@ class RealCurve:
     @cached_property
     def periods(self) -> Periods:
         """Return the period data of the nodal differentials in μ."""
-        betas, g = self.betas, self.genus
+        betas = self.betas
+        g = self.genus
         differences = np.array([[float(b - a) for b in betas] for a in betas])
-        origins = tuple(BranchPoint("c" if j % 2 == 0 and j < 2 * g else "I", j) for j in range(2 * g + 1))
+        origins = tuple(
+            BranchPoint("c" if j % 2 == 0 and j < 2 * g else "I", j) for j in range(2 * g + 1)
+        )
         return Periods(Curve(DOUBLE, np.array([float(b) for b in betas]), differences, origins))
 
     @cached_property
@@ -86,7 +96,9 @@ class RealCurve:
 
     @cached_property
     def scale(self) -> float:
-        """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}μ^{g−1}) dμ/v, or of ±λ^{k−1} dμ/v where μ = ±λ."""
+        """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}μ^{g−1}) dμ/v, or of ±λ^{k−1} dμ/v where μ
+        = ±λ.
+        """
         if not self.is_even:
             return -1.0 if self.reverses else 1.0
         *finite, last = self.points
@@ -99,20 +111,25 @@ class RealCurve:
         return np.asarray(float(self.points[-1]) - 1 / mu if self.is_even else mu)
 
     def weights(self, mu: Array, highest: int) -> Array:
-        """Return c·λ^k, times |μ|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …): the forms λ^k dλ/w over dμ/v."""
+        """Return c·λ^k, times |μ|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
+        the forms λ^k dλ/w over dμ/v.
+        """
         point = self.to_lambda(mu)
         common = self.scale * (np.abs(mu) ** (self.genus - 1) if self.is_even else np.ones_like(mu))
         return np.stack([common * point**k for k in range(highest + 1)])
 
     def integrals(self, number: int, highest: int) -> Array:
-        """Return ∫ λ^k dλ/|w| over the interval [β_number, β_{number+1}], upwards in μ, k = 0 … highest."""
+        """Return ∫ λ^k dλ/|w| over the interval [β_number, β_{number+1}], upwards in μ, k = 0 …
+        highest.
+        """
         interval = Interval(self.periods.curve, number)
         # Powers are entire: they take some nodes more than the forms themselves.
         nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
         density = measure / np.prod(of_gaps, axis=-2)
-        beta, width = self.periods.curve.branch_points, self.periods.curve.differences[number, number + 1]
+        beta = self.periods.curve.branch_points
+        width = self.periods.curve.differences[number, number + 1]
         near_left = below <= width / 2
         mu = np.where(near_left, beta[number] + below, beta[number + 1] - above)
         return np.asarray(2 * np.pi * np.mean(self.weights(mu, highest) * density, axis=-1))
@@ -125,13 +142,17 @@ class RealCurve:
         measure, of_gaps = interval.measure(below, above)
         mu = self.periods.curve.branch_points[number] + below
         powers = mu ** np.arange(highest + 1)[:, None]
-        return np.asarray(2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1))
+        return np.asarray(
+            2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1)
+        )
 
     @cached_property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
-        """Return ω, ω', η, η', half the periods of du_k = μ^{k−1}dμ/y and −dr_k over a_s and b_s, (g, g), y² = 4Π(μ−β).
+        """Return ω, ω', η, η', half the periods of du_k = μ^{k−1}dμ/y and −dr_k over a_s and b_s,
+        (g, g), y² = 4Π(μ−β).
 
-        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} μ^j dμ/4y for y² = Σ m_i μ^i (Baker): differentials of the second kind.
+        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} μ^j dμ/4y for y² = Σ m_i μ^i (Baker): differentials
+        of the second kind.
         """
         g = self.genus
         m = 4 * np.poly(np.array([float(b) for b in self.betas]))[::-1]
@@ -143,12 +164,20 @@ class RealCurve:
         over = [kinds @ self.monomial_integrals(number, 2 * g - 1) for number in range(2 * g)]
         # y = 2iv on cuts; on gaps v is i√|R| as in the b-periods of the first kind.
         a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1) / 2j
-        b = np.cumsum(np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1), axis=1) / 2
-        first, second = np.asarray(a, dtype=complex), np.asarray(b, dtype=complex)
+        b = (
+            np.cumsum(
+                np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1), axis=1
+            )
+            / 2
+        )
+        first = np.asarray(a, dtype=complex)
+        second = np.asarray(b, dtype=complex)
         return first[:g], second[:g], first[g:], second[g:]
 
     def cycles(self, highest: int) -> tuple[Array, Array]:
-        """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 … highest."""
+        """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 …
+        highest.
+        """
         g = self.genus
         over = [2 * self.integrals(number, highest) for number in range(2 * g)]
         a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1)
@@ -156,10 +185,13 @@ class RealCurve:
         return a, np.cumsum(gaps, axis=1)
 
     def angles(self, points: Sequence[Sequence[Fraction]], increasing: Array) -> Array:
-        """Return the elliptic angles of points μ (N, g), one on each cut, negative on the way back."""
+        """Return the elliptic angles of points μ (N, g), one on each cut, negative on
+        the way back.
+        """
         found = np.empty((len(points), self.genus))
         for s, interval in enumerate(self.periods.cuts):
-            lower, upper = self.betas[2 * s + 1], self.betas[2 * s + 2]
+            lower = self.betas[2 * s + 1]
+            upper = self.betas[2 * s + 2]
             for i, row in enumerate(points):
                 distances = float(row[s] - lower), float(upper - row[s])
                 found[i, s] = interval.points.angle(*distances, bool(increasing[i, s]))
@@ -171,71 +203,108 @@ class RealCurve:
         return -mu if self.reverses else mu
 
     def place(self, mu: Fraction) -> int:
-        """Return the number of the interval [β_j, β_{j+1}] that holds μ, −1 below β_0 and 2g above β_2g."""
+        """Return the number of the interval [β_j, β_{j+1}] that holds μ, −1 below β_0 and 2g above
+        β_2g.
+        """
         return max(sum(mu > beta for beta in self.betas) - 1, 0 if mu == self.betas[0] else -1)
 
     def from_left_end(self, number: int, points: Sequence[Fraction]) -> Array:
-        """Return a⁻¹∫ p dμ/(2√|R|) from β_number to points of the interval that begins there, (N, g)."""
+        """Return a⁻¹∫ p dμ/(2√|R|) from β_number to points of the interval that begins there, (N,
+        g).
+        """
         interval = Interval(self.periods.curve, number)
-        lower, upper = self.betas[number], self.betas[number + 1]
-        psi = np.array([interval.points.angle(float(mu - lower), float(upper - mu), True) for mu in points])
+        lower = self.betas[number]
+        upper = self.betas[number + 1]
+        psi = np.array(
+            [interval.points.angle(float(mu - lower), float(upper - mu), True) for mu in points]
+        )
         forms = interval.forms(*interval.distances(DOUBLE.nodes(self.periods.node_count(interval))))
         series = DOUBLE.cosine_series(forms)
         orders = np.arange(1, series.shape[1])
-        integrals = psi[:, None] * series[:, 0] + np.sin(psi[:, None] * orders) / orders @ series[:, 1:].T
+        integrals = (
+            psi[:, None] * series[:, 0] + np.sin(psi[:, None] * orders) / orders @ series[:, 1:].T
+        )
         return np.asarray(integrals @ self.periods.inverse_cycles.T)
 
     def from_nearest_end(self, mu: complex) -> tuple[int | None, Complex, complex]:
-        """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a complex μ; the integral is (g,).
+        """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a
+        complex μ; the integral is (g,).
 
         The sheet is that of the returned v.
         """
         betas = self.periods.curve.branch_points
         zeros = (betas[2:-1:2] + betas[3::2]) / 2
-        centre, radius = (betas[0] + betas[-1]) / 2, (betas[-1] - betas[0]) / 2
+        centre = (betas[0] + betas[-1]) / 2
+        radius = (betas[-1] - betas[0]) / 2
         if abs(mu - centre) > 2 * radius:
-            # t = (μ−c)^{−1/2}: v = i t^{−2g−1} Π√(1+(c−β)t²), and each root stays away from its branch line.
+            # t = (μ−c)^{−1/2}: v = i t^{−2g−1} Π√(1+(c−β)t²), and each root stays away from its
+            # branch line.
             end = 1 / np.sqrt(complex(mu - centre))
             powers = np.full(self.genus, 2)
             powers[-1] = 0
 
             def over_t(t: Complex) -> Complex:
                 square = (t * t)[:, None]
-                forms = _without_each(np.asarray(1 + square * (centre - zeros), dtype=complex)) * t ** powers[:, None]
-                return np.asarray(1j * forms / np.prod(np.sqrt(1 + square * (centre - betas)), axis=1))
+                forms = (
+                    _without_each(np.asarray(1 + square * (centre - zeros), dtype=complex))
+                    * t ** powers[:, None]
+                )
+                return np.asarray(
+                    1j * forms / np.prod(np.sqrt(1 + square * (centre - betas)), axis=1)
+                )
 
             v = 1j * end ** (-2 * self.genus - 1) * np.prod(np.sqrt(1 + end**2 * (centre - betas)))
             return None, self.periods.inverse_cycles @ _integral(over_t, end), complex(v)
         j = int(np.argmin(np.abs(mu - betas)))
-        start, below, above = betas[j], betas[:j], betas[j + 1 :]
-        # x = √(μ−β_j): v² = −x² Π_{<}(μ−β) Π_{>}(μ−β), and each root below stays away from its branch line.
-        unit, end = 1j if len(above) % 2 == 0 else 1.0, np.sqrt(complex(mu - start))
+        start = betas[j]
+        below = betas[:j]
+        above = betas[j + 1 :]
+        # x = √(μ−β_j): v² = −x² Π_{<}(μ−β) Π_{>}(μ−β), and each root below stays away from its
+        # branch line.
+        unit = 1j if len(above) % 2 == 0 else 1.0
+        end = np.sqrt(complex(mu - start))
 
         def roots(x: Complex) -> Complex:
             at = (start + x * x)[:, None]
-            return np.asarray(unit * np.prod(np.sqrt(at - below), axis=1) * np.prod(np.sqrt(above - at), axis=1), dtype=complex)
+            return np.asarray(
+                unit * np.prod(np.sqrt(at - below), axis=1) * np.prod(np.sqrt(above - at), axis=1),
+                dtype=complex,
+            )
 
         def over_x(x: Complex) -> Complex:  # dμ/(2v) = dx/(v/x)
-            return np.asarray(_without_each(np.asarray((start + x * x)[:, None] - zeros, dtype=complex)) / roots(x))
+            return np.asarray(
+                _without_each(np.asarray((start + x * x)[:, None] - zeros, dtype=complex))
+                / roots(x)
+            )
 
         v = end * roots(np.array([end]))[0]
         return j, self.periods.inverse_cycles @ _integral(over_x, end), complex(v)
 
 
 def _without_each(factors: Complex) -> Complex:
-    """Return the products of factors (N, g−1) without the k-th, k < g, and of all of them, (g, N)."""
+    """Return the products of factors (N, g−1) without the k-th, k < g, and of all of
+    them, (g, N).
+    """
     count = factors.shape[1]
     products = [np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(count)]
     return np.stack([*products, np.prod(factors, axis=1)])
 
 
 def _integral(integrand: Callable[[Complex], Complex], end: complex) -> Complex:
-    """Return the integrals from 0 straight to ``end`` of functions (g, N), by Gauss' rule with twice the nodes until it stays."""
-    previous, size = None, _FEWEST_NODES
+    """Return the integrals from 0 straight to ``end`` of functions (g, N), by Gauss' rule with
+    twice the nodes until it stays.
+    """
+    previous = None
+    size = _FEWEST_NODES
     while size <= _MOST_NODES:
         nodes, weights = np.polynomial.legendre.leggauss(size)
         total = integrand(np.asarray(end * (nodes + 1) / 2, dtype=complex)) @ weights * end / 2
-        if previous is not None and np.max(np.abs(total - previous)) <= _QUADRATURE * np.max(np.abs(total)):
+        if previous is not None and np.max(np.abs(total - previous)) <= _QUADRATURE * np.max(
+            np.abs(total)
+        ):
             return np.asarray(total)
-        previous, size = total, 2 * size
-    raise Unsolved("narrow-gap", "the path to a point passes too near a branch point for its quadrature")
+        previous = total
+        size = 2 * size
+    raise Unsolved(
+        "narrow-gap", "the path to a point passes too near a branch point for its quadrature"
+    )

@@ -1,4 +1,6 @@
-"""Windows that adjoin from τ₁ = 0 on: dt/dτ₁ at their nodes tells the time, and no clock needs nodes of its own."""
+"""Windows that adjoin from τ₁ = 0 on: dt/dτ₁ at their nodes tells the time, and no clock needs
+nodes of its own.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.chebyshev_window import (
+    MOST_HALVINGS,
+    Evaluation,
+    WindowBatch,
+    WindowGrid,
+)
 from veselova.analytic.dense_output.output_array import OutputArray
 from veselova.analytic.dense_output.piecewise_polynomial import ORDER, PiecewisePolynomial
 from veselova.analytic.time_map.chebyshev_panels import Panels
@@ -34,15 +41,25 @@ class AdjoiningWindows:
     """A motion on windows that adjoin, each resolved in so many pieces or halved."""
 
     def __init__(self, output: OutputArray, evaluation: Evaluation, in_tau1: LinearFlow) -> None:
-        self._output, self._evaluation, self._in_tau1 = output, evaluation, in_tau1
+        self._output = output
+        self._evaluation = evaluation
+        self._in_tau1 = in_tau1
         self._parts: list[_Part] = []
         self._selected = self._columns = 0
 
     def batch(self, window_grid: WindowGrid) -> WindowBatch:
         """Return windows of Neumann time."""
-        z, rates = self._in_tau1.phases(window_grid.starts), self._in_tau1.rates
+        z = self._in_tau1.phases(window_grid.starts)
+        rates = self._in_tau1.rates
         batch = self._output.count_evaluations(
-            WindowBatch.of(self._evaluation, window_grid.starts, z, window_grid.length, rates, window_grid.tails)
+            WindowBatch.of(
+                self._evaluation,
+                window_grid.starts,
+                z,
+                window_grid.length,
+                rates,
+                window_grid.tails,
+            )
         )
         self._columns = 1 + batch.series.shape[2]
         return batch
@@ -62,21 +79,34 @@ class AdjoiningWindows:
         batch = self.batch(window_grid)
         polynomials, tails = batch.in_pieces(count)
         resolved = batch.is_resolved(tails)
-        starts, rates = batch.starts[resolved], batch.rates[resolved]
-        panels = (starts, np.full(starts.size, batch.length_tau1), rates, batch.rate_tails[resolved], rates[:, 0])
+        starts = batch.starts[resolved]
+        rates = batch.rates[resolved]
+        panels = (
+            starts,
+            np.full(starts.size, batch.length_tau1),
+            rates,
+            batch.rate_tails[resolved],
+            rates[:, 0],
+        )
         self._parts.append(_Part(panels, polynomials[resolved], tails[resolved]))
         self._selected += starts.size * count * ORDER * self._columns
         return WindowGrid(window_grid.length, window_grid.starts, tails)[~resolved]
 
     def panels(self) -> Panels:
         """Return t(τ₁) on the windows."""
-        return Panels.of(*(np.concatenate(columns) for columns in zip(*(part.panels for part in self._parts), strict=True)))
+        return Panels.of(
+            *(
+                np.concatenate(columns)
+                for columns in zip(*(part.panels for part in self._parts), strict=True)
+            )
+        )
 
     def fill(self, times: Array, panels: Panels) -> None:
         """Fill the answer at increasing times within the windows."""
         for part in self._parts:
             k = np.searchsorted(panels.borders, part.panels[0])
-            low, high = panels.values[k], panels.values[k + 1]
+            low = panels.values[k]
+            high = panels.values[k + 1]
             first, last = np.searchsorted(times, [low, high])
             last[high == panels.values[-1]] = times.size
             self._output.fill(part.polynomials, first, last, low, np.zeros_like(low), part.tails)

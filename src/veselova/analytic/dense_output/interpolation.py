@@ -1,12 +1,13 @@
 """A motion at many times from few: Chebyshev windows of time along its orbit.
 
-Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t − u and the phases there come
-from the clock, exact however far out, and no window hands its error to the next. A window takes one sum of the clock, at its
-start, and one evaluation of the motion at each of its nodes; on its pieces the series become polynomials in t (analytic.pieces).
-All times in it are sums of these, whatever the genus and the route.
+Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t
+− u and the phases there come from the clock, exact however far out, and no window hands its error
+to the next. A window takes one sum of the clock, at its start, and one evaluation of the motion at
+each of its nodes; on its pieces the series become polynomials in t (analytic.pieces). All times in
+it are sums of these, whatever the genus and the route.
 
-A clock by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time then, and t is the running sum of
-their dt/dτ₁ (analytic.track), as it is of panels.
+A clock by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time
+then, and t is the running sum of their dt/dτ₁ (analytic.track), as it is of panels.
 """
 
 from __future__ import annotations
@@ -20,7 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.dense_output.adjoining_windows import AdjoiningWindows
-from veselova.analytic.dense_output.chebyshev_window import MOST_HALVINGS, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.chebyshev_window import (
+    MOST_HALVINGS,
+    Evaluation,
+    WindowBatch,
+    WindowGrid,
+)
 from veselova.analytic.dense_output.output_array import AT_ONCE, OutputArray, Samples
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap
@@ -32,9 +38,11 @@ Array = NDArray[np.float64]
 #: Times below which windows are not worth their overhead.
 FEW_TIMES = 500
 
-#: Cycles of the fastest phase in a window at first; lengths that are tried, and how many before they are halved.
+#: Cycles of the fastest phase in a window at first; lengths that are tried, and how many before
+#: they are halved.
 _CYCLES = 2.0
-_MOST_LENGTHS, _CLOSE_LENGTHS = 16, 6
+_MOST_LENGTHS = 16
+_CLOSE_LENGTHS = 6
 
 #: Pieces of a window, the fewest that serve.
 _PIECES = (6, 8, 16, 32)
@@ -45,13 +53,16 @@ _FARTHEST = 2.0**32
 #: Windows tried before all of the same length.
 _FIRST_WINDOWS = 8
 
-#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes dt/dτ₁ from them.
+#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes
+#: dt/dτ₁ from them.
 _COVERED = 0.7
 
 
 @dataclass(frozen=True)
 class _Stretches:
-    """Where times lie densely: the first and the last one of each stretch; the windows in all of them, and the times."""
+    """Where times lie densely: the first and the last one of each stretch; the windows in all of
+    them, and the times.
+    """
 
     first: NDArray[np.intp]
     last: NDArray[np.intp]
@@ -65,12 +76,18 @@ _NONE = _Stretches(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), 0, 0)
 class Windows:
     """The windows of one orbit at increasing times.
 
-    ``fastest`` is the most cycles that a phase makes in a unit of time, ``fewest`` the times that make a window worth its while.
+    ``fastest`` is the most cycles that a phase makes in a unit of time, ``fewest`` the times that
+    make a window worth its while.
     ``remainders`` are what exact times are beyond the doubles.
     """
 
-    def __init__(self, times: Array, fastest: float, fewest: int, remainders: Array | None = None) -> None:
-        self._times, self._fastest, self._fewest, self._remainders = times, fastest, fewest, remainders
+    def __init__(
+        self, times: Array, fastest: float, fewest: int, remainders: Array | None = None
+    ) -> None:
+        self._times = times
+        self._fastest = fastest
+        self._fewest = fewest
+        self._remainders = remainders
 
     @cached_property
     def _length(self) -> float:
@@ -80,7 +97,8 @@ class Windows:
     def _stretches(self) -> _Stretches:
         if self._times.size < FEW_TIMES:
             return _NONE
-        times, length = self._times, self._length
+        times = self._times
+        length = self._length
         low, high = np.floor(times[[0, -1]] / length)
         if high - low < times.size:
             keys = np.arange(low, high + 1)
@@ -90,7 +108,9 @@ class Windows:
             borders = np.concatenate([[0], np.flatnonzero(np.diff(keys)) + 1, [keys.size]])
             keys = keys[borders[:-1]]
         dense = (np.diff(borders) >= self._fewest) & (np.abs(keys) < _FARTHEST)
-        first, last, keys = borders[:-1][dense], borders[1:][dense] - 1, keys[dense]
+        first = borders[:-1][dense]
+        last = borders[1:][dense] - 1
+        keys = keys[dense]
         begins = np.flatnonzero(np.diff(keys, prepend=-np.inf) > 1)
         ends = np.flatnonzero(np.diff(keys, append=np.inf) > 1)
         return _Stretches(first[begins], last[ends], int(keys.size), int(np.sum(last - first + 1)))
@@ -103,7 +123,9 @@ class Windows:
 
     @property
     def inversions(self) -> int:
-        """Return how often the clock will be asked at least: at the starts of windows, and at times in none."""
+        """Return how often the clock will be asked at least: at the starts of windows, and at times
+        in none.
+        """
         return int(self._times.size) - self._stretches.held + self._stretches.windows
 
     def interpolate(self, time_map: TimeMap, rates: Array, evaluation: Evaluation) -> Samples:
@@ -111,13 +133,18 @@ class Windows:
         if not self._stretches.windows and self._times.size <= AT_ONCE:
             tau1, z = time_map.tau1(self._times, self._remainders)
             return Samples(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
-        output = OutputArray(self._times, self._fewest, time_map, rates, evaluation, self._remainders)
+        output = OutputArray(
+            self._times, self._fewest, time_map, rates, evaluation, self._remainders
+        )
         if self._stretches.windows and not (
-            isinstance(time_map, ChebyshevTimeMap) and self._fill_adjoining(output, time_map, evaluation)
+            isinstance(time_map, ChebyshevTimeMap)
+            and self._fill_adjoining(output, time_map, evaluation)
         ):
             window_grid, count = self._over_stretches(output, time_map)
             for _ in range(MOST_HALVINGS):
-                window_grid = window_grid.remaining(lambda some: output.by_windows(some, count)).halve()
+                window_grid = window_grid.remaining(
+                    lambda some: output.by_windows(some, count)
+                ).halve()
                 if not len(window_grid):
                     break
         return output.complete()
@@ -134,26 +161,45 @@ class Windows:
 
         return _resolving(over, output.batch, self._length)
 
-    def _fill_adjoining(self, output: OutputArray, time_map: ChebyshevTimeMap, evaluation: Evaluation) -> bool:
-        """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether that could be done."""
+    def _fill_adjoining(
+        self, output: OutputArray, time_map: ChebyshevTimeMap, evaluation: Evaluation
+    ) -> bool:
+        """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether
+        that could be done.
+        """
         ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
         if self._stretches.windows < _COVERED * float(np.ptp(ends)) / self._length:
             return False
         low, high = ends / time_map.mean
 
         def over(length: float, tail: float) -> WindowGrid:
-            return WindowGrid.uniform(length, math.floor(low / length), math.ceil(high / length), tail)
+            return WindowGrid.uniform(
+                length, math.floor(low / length), math.ceil(high / length), tail
+            )
 
         adjoining = AdjoiningWindows(output, evaluation, time_map.in_tau1)
-        window_grid, count = _resolving(over, adjoining.batch, _few_bits(self._length / time_map.mean))
+        window_grid, count = _resolving(
+            over, adjoining.batch, _few_bits(self._length / time_map.mean)
+        )
         while len(window_grid):
             if not adjoining.extend(window_grid, count):
                 return False
             panels = adjoining.panels()
-            length, (first, last) = window_grid.length, np.rint(panels.borders[[0, -1]] / window_grid.length).astype(int).tolist()
+            length, (first, last) = (
+                window_grid.length,
+                np.rint(panels.borders[[0, -1]] / window_grid.length).astype(int).tolist(),
+            )
             more = max(1, (last - first) // 8)  # the ends were those of the mean clock
-            before = WindowGrid.uniform(length, first - more, first) if panels.values[0] > self._times[0] else window_grid[:0]
-            after = WindowGrid.uniform(length, last, last + more) if panels.values[-1] < self._times[-1] else window_grid[:0]
+            before = (
+                WindowGrid.uniform(length, first - more, first)
+                if panels.values[0] > self._times[0]
+                else window_grid[:0]
+            )
+            after = (
+                WindowGrid.uniform(length, last, last + more)
+                if panels.values[-1] < self._times[-1]
+                else window_grid[:0]
+            )
             window_grid = WindowGrid.concatenate([before, after])
         time_map.panels = panels
         adjoining.fill(self._times, panels)
@@ -161,20 +207,28 @@ class Windows:
 
 
 def _resolving(
-    over: Callable[[float, float], WindowGrid], batch: Callable[[WindowGrid], WindowBatch], length: float
+    over: Callable[[float, float], WindowGrid],
+    batch: Callable[[WindowGrid], WindowBatch],
+    length: float,
 ) -> tuple[WindowGrid, int]:
-    """Return the windows ``over`` all times of a length, the first tried or below, at which most are resolved, and in how many
-    pieces; ``over`` takes the length, and the tail of the ones before."""
-    tail, count = np.inf, _PIECES[-1]
+    """Return the windows ``over`` all times of a length, the first tried or below, at which most
+    are resolved, and in how many pieces; ``over`` takes the length, and the tail of the ones
+    before.
+    """
+    tail = np.inf
+    count = _PIECES[-1]
     for k in range(_MOST_LENGTHS):
         window_grid = over(length, tail)
-        tried = batch(window_grid[np.unique(np.linspace(0, len(window_grid) - 1, _FIRST_WINDOWS).astype(int))])
+        tried = batch(
+            window_grid[np.unique(np.linspace(0, len(window_grid) - 1, _FIRST_WINDOWS).astype(int))]
+        )
         enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
         if np.mean(tried.is_resolved(tried.tails)) >= enough:
             for count in _PIECES:
                 if np.mean(tried.is_resolved(tried.in_pieces(count)[1])) >= enough:
                     return window_grid, count
-        tail, length = float(np.max(tried.tails)), _shorter(length) if k < _CLOSE_LENGTHS else length / 2
+        tail = float(np.max(tried.tails))
+        length = _shorter(length) if k < _CLOSE_LENGTHS else length / 2
     return window_grid, count
 
 
@@ -187,4 +241,8 @@ def _few_bits(length: float) -> float:
 def _shorter(length: float) -> float:
     """Return the next length of three bits."""
     mantissa, exponent = math.frexp(length)
-    return math.ldexp(mantissa - 0.125, exponent) if mantissa > 0.5 else math.ldexp(0.875, exponent - 1)
+    return (
+        math.ldexp(mantissa - 0.125, exponent)
+        if mantissa > 0.5
+        else math.ldexp(0.875, exponent - 1)
+    )

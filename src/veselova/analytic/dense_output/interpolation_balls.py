@@ -1,7 +1,8 @@
 """A motion at many times in balls, from few: Chebyshev series of time on windows of one length.
 
-The series pass through midpoints alone. What the values at the nodes leave open enters times the Lebesgue constant of the nodes,
-by which interpolation magnifies at most; what a series leaves out follows from its last coefficients, so no window is certified.
+The series pass through midpoints alone. What the values at the nodes leave open enters times the
+Lebesgue constant of the nodes, by which interpolation magnifies at most; what a series leaves out
+follows from its last coefficients, so no window is certified.
 """
 
 from __future__ import annotations
@@ -25,20 +26,28 @@ __all__ = ["WindowsInBalls"]
 Array = NDArray[np.float64]
 
 #: Windows looked at for that, and times below which none is.
-_SAMPLED, _FEW_TIMES = 40, 300
+_SAMPLED = 40
+_FEW_TIMES = 300
 
-#: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n = 3 to 6, 30 to 100 digits.
-_NODE, _TERM = 1.2, 1 / 600
+#: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n =
+#: 3 to 6, 30 to 100 digits.
+_NODE = 1.2
+_TERM = 1 / 600
 
-#: Nodes taken over those expected, at so many working digits: series fall more slowly than they begin, so it grows with the
-#: logarithm of the digits, and is below one at fewer than 32. Of 330 random motions with n = 3 … 5 and 30 … 100 digits, 8 needed
-#: more, 1.22 times those expected at most.
-_SPARE, _SPARE_DIGITS, _SPARE_GROWTH = 1.08, 59, 0.13
+#: Nodes taken over those expected, at so many working digits: series fall more slowly than they
+#: begin, so it grows with the logarithm of the digits, and is below one at fewer than 32. Of 330
+#: random motions with n = 3 … 5 and 30 … 100 digits, 8 needed more, 1.22 times those expected at
+#: most.
+_SPARE = 1.08
+_SPARE_DIGITS = 59
+_SPARE_GROWTH = 0.13
 
 
 @dataclass(frozen=True)
 class WindowsInBalls:
-    """``count`` windows from ``first`` on, each 2·half long with so many Chebyshev points: t = centre − half·cos θ."""
+    """``count`` windows from ``first`` on, each 2·half long with so many Chebyshev points: t =
+    centre − half·cos θ.
+    """
 
     arithmetic: Any
     first: Any
@@ -50,7 +59,8 @@ class WindowsInBalls:
     def worth_while(
         cls, times: Values, cycles: float, sampled: Callable[[Array], Array], arithmetic: Any
     ) -> WindowsInBalls | None:
-        """Return the windows by which increasing times (N,), over so many cycles of the fastest phase, cost least; None without.
+        """Return the windows by which increasing times (N,), over so many cycles of the fastest
+        phase, cost least; None without.
 
         ``sampled``: the motion in double precision at increasing times, columns (N, K) of size one.
         """
@@ -58,10 +68,13 @@ class WindowsInBalls:
             return None
         xp = arithmetic
         first, last = (float(x) for x in (times[0], times[-1]))
-        spare, choices = _SPARE + _SPARE_GROWTH * math.log(xp.digits / _SPARE_DIGITS), {}
+        spare = _SPARE + _SPARE_GROWTH * math.log(xp.digits / _SPARE_DIGITS)
+        choices = {}
         for length in (2.0, 1.0, 0.5, 0.25):
             count = max(1, math.ceil(cycles / length))
-            nodes = math.ceil(spare * estimate_terms(_samples(first, last, count, sampled), xp.digits))
+            nodes = math.ceil(
+                spare * estimate_terms(_samples(first, last, count, sampled), xp.digits)
+            )
             choices[len(times) * nodes * _TERM + count * nodes * _NODE] = count, nodes
         cost = min(choices)
         if not cost < len(times):
@@ -81,13 +94,20 @@ class WindowsInBalls:
     def times(self) -> Values:
         """Return the nodes, exact numbers, shape (count·nodes,), increasing."""
         xp = self.arithmetic
-        return np.asarray(xp.midpoints(self._centres[:, None] - self.half * xp.cos(xp.nodes(self.nodes))).ravel())
+        return np.asarray(
+            xp.midpoints(self._centres[:, None] - self.half * xp.cos(xp.nodes(self.nodes))).ravel()
+        )
 
     def at(self, times: Values, values: Values) -> Values | None:
-        """Return a motion at times (N,) from its values at the nodes, (count·nodes, K); None where it is not resolved."""
-        xp, columns = self.arithmetic, values.shape[1]
+        """Return a motion at times (N,) from its values at the nodes, (count·nodes, K); None where
+        it is not resolved.
+        """
+        xp = self.arithmetic
+        columns = values.shape[1]
         result = np.empty((len(times), columns), dtype=object)
-        table = np.moveaxis(values.reshape(self.count, self.nodes, columns), 1, 2).reshape(-1, self.nodes)
+        table = np.moveaxis(values.reshape(self.count, self.nodes, columns), 1, 2).reshape(
+            -1, self.nodes
+        )
         middle = xp.midpoints(table)
         open_ = np.max(xp.upper_bound(table - middle), axis=1)
         series = xp.cosine_series(middle)
@@ -95,7 +115,8 @@ class WindowsInBalls:
             return None
         # Lebesgue's constant of n Chebyshev points is at most 1 + (2/π) log n.
         slack = (1 + 2 / math.pi * math.log(self.nodes)) * open_ + xp.estimate_tail(series)
-        sums, slack = ChebyshevSeriesInBalls(series.reshape(self.count, columns, -1), xp), slack.reshape(self.count, columns)
+        sums = ChebyshevSeriesInBalls(series.reshape(self.count, columns, -1), xp)
+        slack = slack.reshape(self.count, columns)
         for w, rows in self._rows(times):
             x = (self._centres[w] - times[rows]) / self.half
             result[rows] = xp.add_error(sums(w, x), slack[w])
@@ -103,7 +124,9 @@ class WindowsInBalls:
 
     def _rows(self, times: Values) -> Iterator[tuple[int, slice]]:
         """Return the windows that hold times, and which."""
-        places = np.clip(np.floor(((times - self.first) / (2 * self.half)).astype(float)), 0, self.count - 1)
+        places = np.clip(
+            np.floor(((times - self.first) / (2 * self.half)).astype(float)), 0, self.count - 1
+        )
         borders = np.searchsorted(places, np.arange(self.count + 1)).tolist()
         for w, (first, last) in enumerate(pairwise(borders)):
             if first < last:

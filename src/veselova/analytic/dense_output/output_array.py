@@ -1,4 +1,6 @@
-"""The states of a motion at many times while they are filled in: by windows (analytic.windows) first, then time by time."""
+"""The states of a motion at many times while they are filled in: by windows (analytic.windows)
+first, then time by time.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.chebyshev_window import SUM_ROUNDING, Evaluation, WindowBatch, WindowGrid
+from veselova.analytic.dense_output.chebyshev_window import (
+    SUM_ROUNDING,
+    Evaluation,
+    WindowBatch,
+    WindowGrid,
+)
 from veselova.analytic.dense_output.piecewise_polynomial import PiecewisePolynomial
 from veselova.analytic.time_map.rate import TimeMap
 
@@ -23,7 +30,8 @@ AT_ONCE = 32768
 
 @dataclass(frozen=True)
 class Samples:
-    """A motion at N times: τ₁ (N,), its series, and the error (N,) that interpolation adds, relative to their size.
+    """A motion at N times: τ₁ (N,), its series, and the error (N,) that interpolation adds,
+    relative to their size.
 
     evaluations: how often the motion was evaluated
     """
@@ -35,9 +43,11 @@ class Samples:
 
 
 class OutputArray:
-    """The answer while it is filled: a row for τ₁ and one for every component of the series, along the times.
+    """The answer while it is filled: a row for τ₁ and one for every component of the series, along
+    the times.
 
-    So the answer is written by long rows, in three fifths of the time of short ones, and functions of many states run along them.
+    So the answer is written by long rows, in three fifths of the time of short ones, and functions
+    of many states run along them.
     """
 
     def __init__(
@@ -49,7 +59,11 @@ class OutputArray:
         evaluation: Evaluation,
         remainders: Array | None = None,
     ) -> None:
-        self._times, self._fewest, self._time_map, self._rates, self._evaluation = times, fewest, time_map, rates, evaluation
+        self._times = times
+        self._fewest = fewest
+        self._time_map = time_map
+        self._rates = rates
+        self._evaluation = evaluation
         self._remainders = remainders
         self._error, self._open = np.zeros(times.size), np.ones(times.size, dtype=bool)
         self._shapes: list[tuple[int, ...]] = []
@@ -69,7 +83,9 @@ class OutputArray:
             self._evaluations += rows.size
             self._shapes = [part.shape[1:] for part in series]
             self._states[0, rows] = tau1
-            self._states[1:, rows] = np.concatenate([part.reshape(rows.size, -1) for part in series], axis=1).T
+            self._states[1:, rows] = np.concatenate(
+                [part.reshape(rows.size, -1) for part in series], axis=1
+            ).T
         ends = np.cumsum([1, *(int(np.prod(shape)) for shape in self._shapes)])
         series = tuple(
             np.moveaxis(self._states[a:b].reshape(*shape, -1), -1, 0)
@@ -83,7 +99,12 @@ class OutputArray:
         mean = self._time_map.mean
         return self.count_evaluations(
             WindowBatch.of(
-                self._evaluation, window_grid.starts / mean, z, window_grid.length / mean, self._rates, window_grid.tails
+                self._evaluation,
+                window_grid.starts / mean,
+                z,
+                window_grid.length / mean,
+                self._rates,
+                window_grid.tails,
             )
         )
 
@@ -94,30 +115,54 @@ class OutputArray:
         return batch
 
     def by_windows(self, window_grid: WindowGrid, count: int) -> WindowGrid:
-        """Fill the times of the windows that are resolved in so many pieces; return the others that hold times enough."""
+        """Fill the times of the windows that are resolved in so many pieces; return the others that
+        hold times enough.
+        """
         ends, places = np.unique(
-            np.concatenate([window_grid.starts, window_grid.starts + window_grid.length]), return_inverse=True
+            np.concatenate([window_grid.starts, window_grid.starts + window_grid.length]),
+            return_inverse=True,
         )
         ahead, z = self._time_map.ahead(ends)
         first, last = np.searchsorted(self._times, ends + ahead)[places].reshape(2, -1)
         held = last - first >= self._fewest
         if not np.any(held):
             return window_grid[held]
-        window_grid, first, last, places = window_grid[held], first[held], last[held], places[: len(window_grid)][held]
+        window_grid, first, last, places = (
+            window_grid[held],
+            first[held],
+            last[held],
+            places[: len(window_grid)][held],
+        )
         batch = self.batch(window_grid, z[places])
         polynomials, tails = batch.in_pieces(count)
         done = batch.is_resolved(tails)
-        self.fill(polynomials[done], first[done], last[done], window_grid.starts[done], ahead[places][done], tails[done])
+        self.fill(
+            polynomials[done],
+            first[done],
+            last[done],
+            window_grid.starts[done],
+            ahead[places][done],
+            tails[done],
+        )
         return WindowGrid(window_grid.length, window_grid.starts, tails)[~done]
 
     def fill(
-        self, polynomials: PiecewisePolynomial, first: Places, last: Places, starts: Array, ahead: Array, tails: Array
+        self,
+        polynomials: PiecewisePolynomial,
+        first: Places,
+        last: Places,
+        starts: Array,
+        ahead: Array,
+        tails: Array,
     ) -> None:
-        """Fill the times, from the first up to the last, of W windows, which start at starts + ahead; (W,) all of them."""
+        """Fill the times, from the first up to the last, of W windows, which start at starts +
+        ahead; (W,) all of them.
+        """
         begins = np.flatnonzero(first != np.append(-1, last[:-1])).tolist()
         for run in map(slice, begins, [*begins[1:], first.size]):  # windows that adjoin
             rows = slice(first[run][0], last[run][-1])
-            out, remainders = self._states[:, rows], self._remainders_at(rows)
+            out = self._states[:, rows]
+            remainders = self._remainders_at(rows)
             polynomials[run].fill(self._times[rows], starts[run], ahead[run], out, remainders)
             self._open[rows] = False
             self._error[rows] = np.repeat(2 * tails[run] + SUM_ROUNDING, (last - first)[run])

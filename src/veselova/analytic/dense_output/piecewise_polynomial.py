@@ -1,8 +1,9 @@
 """Series along a window of Neumann time, as polynomials in physical time on its pieces.
 
-A window's Chebyshev series in τ₁ go over to each of a few equal pieces by constant matrices. There dt/dτ₁ varies little: t(τ₁) is
-inverted at Chebyshev points in t, and short series in t follow, as powers of x ∈ [−1, 1]. Their coefficients fall fast enough
-(by 5 and more from one to the next) that powers lose no digit, and a power costs one multiplication.
+A window's Chebyshev series in τ₁ go over to each of a few equal pieces by constant matrices. There
+dt/dτ₁ varies little: t(τ₁) is inverted at Chebyshev points in t, and short series in t follow, as
+powers of x ∈ [−1, 1]. Their coefficients fall fast enough (by 5 and more from one to the next) that
+powers lose no digit, and a power costs one multiplication.
 """
 
 from __future__ import annotations
@@ -28,26 +29,33 @@ ORDER = 20
 #: A Newton step of this size, in half pieces, leaves an error of a quarter of its square at most.
 _SETTLED = 2e-8
 
-#: Times that are placed in their pieces at once, and of which powers are formed at once: they stay in the cache.
-#: No power of two: rows so far apart take turns in the same places of a cache.
-_PLACED, _TIMES = 64000, 4000
+#: Times that are placed in their pieces at once, and of which powers are formed at once: they stay
+#: in the cache. No power of two: rows so far apart take turns in the same places of a cache.
+_PLACED = 64000
+_TIMES = 4000
 
 
 #: Chebyshev points of [−1, 1], from 1 downwards, and the matrix from values there to coefficients.
-_X, _TO_COEFFICIENTS = np.cos(DOUBLE.nodes(ORDER)), DOUBLE.cosine_series(np.eye(ORDER)).T
+_X = np.cos(DOUBLE.nodes(ORDER))
+_TO_COEFFICIENTS = DOUBLE.cosine_series(np.eye(ORDER)).T
 #: Integrals of T_0 … T_{ORDER−1} over [−1, 1].
 _INTEGRALS = np.array([2 / (1 - k * k) if k % 2 == 0 else 0.0 for k in range(ORDER)])
-#: x^0 … x^ORDER at the points; and the integrals of those before the last in Taylor series there: the coefficients of x, x², x³.
+#: x^0 … x^ORDER at the points; and the integrals of those before the last in Taylor series there:
+#: the coefficients of x, x², x³.
 _AT_POINTS = polynomial.polyvander(_X, ORDER).T
 _SLOPES = [polynomial.polyval(_X, polynomial.polyder(np.eye(ORDER), m)) for m in (1, 2)]
 _EXPANDED = np.hstack([_AT_POINTS[:-1], _SLOPES[0] / 2, _SLOPES[1] / 6])
 #: From Chebyshev coefficients to those of powers.
-_TO_POWERS = np.stack([np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1)
+_TO_POWERS = np.stack(
+    [np.pad(chebyshev.cheb2poly(row), (0, ORDER))[:ORDER] for row in np.eye(ORDER)], axis=1
+)
 
 
 @lru_cache(maxsize=16)
 def _restriction(nodes: int, count: int) -> Array:
-    """Return the matrix from Chebyshev coefficients on [0, 1] to those on each of ``count`` pieces, (count, ORDER, nodes)."""
+    """Return the matrix from Chebyshev coefficients on [0, 1] to those on each of ``count`` pieces,
+    (count, ORDER, nodes).
+    """
     places = (np.arange(count)[:, None] + (_X + 1) / 2) / count
     return np.asarray(_TO_COEFFICIENTS @ np.moveaxis(_polynomials(2 * places - 1, nodes), 0, -1))
 
@@ -56,8 +64,9 @@ def _restriction(nodes: int, count: int) -> Array:
 class PiecewisePolynomial:
     """The pieces of W windows.
 
-    borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers; the first row is the part of
-    the window's Neumann time that has passed · tails (W,) the largest of the last Chebyshev coefficients, against their sizes
+    borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers;
+    the first row is the part of the window's Neumann time that has passed · tails (W,) the largest
+    of the last Chebyshev coefficients, against their sizes
     """
 
     borders: Array
@@ -65,33 +74,49 @@ class PiecewisePolynomial:
     tails: Array
 
     @classmethod
-    def of(cls, rates: Array, series: Array, sizes: Array, length_tau1: float, count: int) -> PiecewisePolynomial:
-        """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of series (W, nodes, columns).
+    def of(
+        cls, rates: Array, series: Array, sizes: Array, length_tau1: float, count: int
+    ) -> PiecewisePolynomial:
+        """Return the pieces from Chebyshev coefficients over windows: of dt/dτ₁ (W, nodes), of
+        series (W, nodes, columns).
 
         sizes (columns,) of the series · stretch: how long a window is in τ₁
         """
         windows, nodes = rates.shape
-        restriction, half = _restriction(nodes, count), length_tau1 / (2 * count)
+        restriction = _restriction(nodes, count)
+        half = length_tau1 / (2 * count)
         pace = np.transpose(restriction @ rates.T, (1, 2, 0)).reshape(ORDER, -1) * half
-        durations, slope = _INTEGRALS @ pace, _TO_POWERS @ pace
+        durations = _INTEGRALS @ pace
+        slope = _TO_POWERS @ pace
         elapsed = polynomial.polyint(slope, lbnd=-1)
         # Axes: the pieces of all windows, the points in time, the columns.
         target = durations[:, None] * ((_X + 1) / 2)
 
         def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
-            value, rise = (polynomial.polyval(x, c[:, rows, None], tensor=False) for c in (elapsed, slope))
+            value, rise = (
+                polynomial.polyval(x, c[:, rows, None], tensor=False) for c in (elapsed, slope)
+            )
             return np.asarray(value - target[rows]), np.asarray(rise)
 
         one = np.ones_like(target)
         value = elapsed.T @ _AT_POINTS - target
-        with np.errstate(all="ignore"):  # from the same points everywhere a first step is made by products of matrices
-            guess = np.clip(_X - value / fourth_order_divisor(value, *np.split(slope.T @ _EXPANDED, 3, axis=1)), -1, 1)
+        # from the same points everywhere a first step is made by products of matrices
+        with np.errstate(all="ignore"):
+            guess = np.clip(
+                _X - value / fourth_order_divisor(value, *np.split(slope.T @ _EXPANDED, 3, axis=1)),
+                -1,
+                1,
+            )
         x = increasing_root(excess, guess, -one, one, _SETTLED)
         in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
         # Points first: the matrices that are the same for all pieces take them at once.
         at_times = np.empty((ORDER, windows * count, 1 + in_tau1.shape[2]))
         at_times[:, :, 0] = ((np.tile(np.arange(count), windows)[:, None] + (x + 1) / 2) / count).T
-        np.matmul(np.moveaxis(_polynomials(x, ORDER), 0, -1), in_tau1, out=np.moveaxis(at_times, 0, 1)[:, :, 1:])
+        np.matmul(
+            np.moveaxis(_polynomials(x, ORDER), 0, -1),
+            in_tau1,
+            out=np.moveaxis(at_times, 0, 1)[:, :, 1:],
+        )
         coefficients = _TO_COEFFICIENTS @ at_times.reshape(ORDER, -1)
         borders = np.zeros((windows, count + 1))
         np.cumsum(durations.reshape(windows, count), axis=1, out=borders[:, 1:])
@@ -105,13 +130,18 @@ class PiecewisePolynomial:
             return self
         return PiecewisePolynomial(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
-    def fill(self, times: Array, starts: Array, ahead: Array, out: Array, remainders: Array | None = None) -> None:
-        """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start at starts + ahead, (W,) both.
+    def fill(
+        self, times: Array, starts: Array, ahead: Array, out: Array, remainders: Array | None = None
+    ) -> None:
+        """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start
+        at starts + ahead, (W,) both.
 
-        Starts of few bits are taken from the times exactly; only then comes what has all its digits, remainders of times too.
+        Starts of few bits are taken from the times exactly; only then comes what has all its
+        digits, remainders of times too.
         """
         begins = np.repeat(starts, self.borders.shape[1] - 1)
-        offsets, scales = (ahead[:, None] + self.borders[:, :-1]).ravel(), (2 / np.diff(self.borders)).ravel()
+        offsets = (ahead[:, None] + self.borders[:, :-1]).ravel()
+        scales = (2 / np.diff(self.borders)).ravel()
         ends = np.append(_first_from(times, begins[1:], offsets[1:]), times.size)
         for first in range(0, times.size, _PLACED):
             block = times[first : first + _PLACED]
@@ -126,19 +156,28 @@ class PiecewisePolynomial:
 
     def _sum(self, x: Array, counts: NDArray[np.intp], out: Array) -> None:
         """Fill ``out`` (C, N) with the sums of powers at x (N,), so many of them in each piece."""
-        tables, ends = self.tables.reshape(-1, *self.tables.shape[2:]), np.cumsum(counts)
+        tables = self.tables.reshape(-1, *self.tables.shape[2:])
+        ends = np.cumsum(counts)
         cuts = np.unique(np.concatenate([[0], ends, np.arange(0, x.size, _TIMES)]))
-        polynomials, room = np.searchsorted(ends, cuts[:-1], side="right").tolist(), np.empty((ORDER, min(x.size, _TIMES)))
-        for piece, begin, end in zip(polynomials, cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        polynomials = np.searchsorted(ends, cuts[:-1], side="right").tolist()
+        room = np.empty((ORDER, min(x.size, _TIMES)))
+        for piece, begin, end in zip(
+            polynomials, cuts[:-1].tolist(), cuts[1:].tolist(), strict=True
+        ):
             if begin % _TIMES == 0:
-                base, powers = begin, _powers(x[begin : begin + _TIMES], room)
+                base = begin
+                powers = _powers(x[begin : begin + _TIMES], room)
             np.matmul(tables[piece], powers[:, begin - base : end - base], out=out[:, begin:end])
 
 
 def _first_from(times: Array, begins: Array, offsets: Array) -> NDArray[np.intp]:
-    """Return the first of increasing times that is not before each begin + offset, as if these were not rounded."""
+    """Return the first of increasing times that is not before each begin + offset, as if these were
+    not rounded.
+    """
     sums, rest = exact_sum(begins, offsets)
-    return np.maximum.accumulate(np.searchsorted(times, np.where(rest > 0, np.nextafter(sums, np.inf), sums)))
+    return np.maximum.accumulate(
+        np.searchsorted(times, np.where(rest > 0, np.nextafter(sums, np.inf), sums))
+    )
 
 
 def _powers(x: Array, room: Array) -> Array:
@@ -153,7 +192,8 @@ def _powers(x: Array, room: Array) -> Array:
 def _polynomials(x: Array, count: int) -> Array:
     """Return T_0 … T_{count−1} at points of [−1, 1], the order first.
 
-    Near 1 differences T_k − T_{k−1} keep the digits that the recurrence loses there (Reinsch); T_k is even or odd.
+    Near 1 differences T_k − T_{k−1} keep the digits that the recurrence loses there (Reinsch); T_k
+    is even or odd.
     """
     result = np.empty((count, *x.shape))
     size = np.abs(x)

@@ -1,4 +1,6 @@
-"""A motion in closed form that can be asked for times: what rest, provenance and pickling are for every kind of it."""
+"""A motion in closed form that can be asked for times: what rest, provenance and pickling are for
+every kind of it.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,16 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.trajectory import Trajectory
 
 __all__ = ["Motion"]
 
 Array = NDArray[np.float64]
 
-#: What bounds made of samples and of typical rounding may miss: with it the true error is at most the reported one. Largest true
-#: error over an error without it, in all draws of ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
+#: What bounds made of samples and of typical rounding may miss: with it the true error is at most
+#: the reported one. Largest true error over an error without it, in all draws of
+#: ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
 _SAFETY = 2.0
 
 P = TypeVar("P", bound=Problem)
@@ -28,7 +32,9 @@ P = TypeVar("P", bound=Problem)
 
 @dataclass(frozen=True)
 class Motion(ABC, Generic[P]):
-    """The motion of a problem; what was computed for it is kept, and made again where it was left behind by pickling."""
+    """The motion of a problem; what was computed for it is kept, and made again where it was left
+    behind by pickling.
+    """
 
     problem: P
 
@@ -56,4 +62,6 @@ class Motion(ABC, Generic[P]):
 
     @abstractmethod
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        """Return the series of a problem that moves, their error before the safety factor, the method and its details."""
+        """Return the series of a problem that moves, their error before the safety factor, the
+        method and its details.
+        """

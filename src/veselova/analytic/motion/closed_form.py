@@ -1,4 +1,6 @@
-"""The closed form of a motion as a document: the numbers of its solution, and of its time map, by their names."""
+"""The closed form of a motion as a document: the numbers of its solution, and of its time map, by
+their names.
+"""
 
 from __future__ import annotations
 
@@ -24,47 +26,74 @@ __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
 
-#: Accuracies that may be asked for: below the first, coefficients are rounding; above the last, nothing is left of the motion.
-_FINEST, _COARSEST = 1e-15, 1e-2
+#: Accuracies that may be asked for: below the first, coefficients are rounding; above the last,
+#: nothing is left of the motion.
+_FINEST = 1e-15
+_COARSEST = 1e-2
 
 #: Modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
 
-#: Least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above exp(−π/(4·0.2)) = 0.02 of θ(0).
+#: Least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above exp(−π/(4·0.2))
+#: = 0.02 of θ(0).
 _LEAST_EIGENVALUE = 0.2
 
-#: Cycles of the fastest phase over which the growth of the error is taken: fewer than those from which the engine carries
-#: frequencies with more digits than a document has.
+#: Cycles of the fastest phase over which the growth of the error is taken: fewer than those from
+#: which the engine carries frequencies with more digits than a document has.
 _CYCLES = 100.0
 
-#: By how much the document's own arithmetic may be off more than the engine's: products of times and rates are rounded once more.
+#: By how much the document's own arithmetic may be off more than the engine's: products of times
+#: and rates are rounded once more.
 _OWN_ROUNDING = 2.0
 
 
 def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
     """Return the motion of a problem as a document in double precision.
 
-    ``accuracy``: the error that modes left out of the time map may make in q and the frame. Raises InvalidInput for another
-    number, Unsolved at rest, on a separatrix (``no-closed-form``) and where theta functions or modes are too many.
+    ``accuracy``: the error that modes left out of the time map may make in q and the frame. Raises
+    InvalidInput for another number, Unsolved at rest, on a separatrix (``no-closed-form``) and
+    where theta functions or modes are too many.
     """
-    if isinstance(accuracy, bool) or not isinstance(accuracy, (int, float)) or not _FINEST <= accuracy <= _COARSEST:
-        raise InvalidInput(("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy))
+    if (
+        isinstance(accuracy, bool)
+        or not isinstance(accuracy, (int, float))
+        or not _FINEST <= accuracy <= _COARSEST
+    ):
+        raise InvalidInput(
+            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
+        )
     problem = on_torus(given)
     solution = Solution(problem)
     if solution.separatrices:
-        reason = "the start lies on a separatrix, which no torus describes for long; solve at times instead"
+        reason = (
+            "the start lies on a separatrix, which no torus describes for long; solve at "
+            "times instead"
+        )
         raise Unsolved("no-closed-form", reason)
     head = {"format": ClosedForm.format, "version": __version__, "time": problem.time, "digits": 15}
-    # The problem stands last, so that a reader without a JSON parser finds the field that it looks for.
-    parts = {**_attitude(solution), **_time_map(solution, accuracy), "error": _error(solution, accuracy)}
+    # The problem stands last, so that a reader without a JSON parser finds the field that it looks
+    # for.
+    parts = {
+        **_attitude(solution),
+        **_time_map(solution, accuracy),
+        "error": _error(solution, accuracy),
+    }
     return ClosedForm({**head, **parts, "problem": given.as_dict()})
 
 
 def _attitude(solution: Solution) -> dict[str, Any]:
     """Return the fields from phases to the attitude."""
-    quotients, unit, axes = solution.quotients, solution.tau1_unit, solution.problem.axes
-    g, m = solution.curve.genus, solution.moving.size
-    pairs = [[place, value] for place, value in zip(quotients.places.tolist(), quotients.constants.tolist(), strict=True)]
+    quotients = solution.quotients
+    unit = solution.tau1_unit
+    axes = solution.problem.axes
+    g = solution.curve.genus
+    m = solution.moving.size
+    pairs = [
+        [place, value]
+        for place, value in zip(
+            quotients.places.tolist(), quotients.constants.tolist(), strict=True
+        )
+    ]
     columns = [pairs[m + g + k :: g] for k in range(g)]
     return {
         "genus": g,
@@ -72,20 +101,25 @@ def _attitude(solution: Solution) -> dict[str, Any]:
         "axes": None if axes is None else axes.tolist(),
         "riemann_matrix": np.asarray(solution.periods.riemann_matrix).tolist(),
         "reduction": _reduction(solution),
-        "characteristics": [[[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions],
+        "characteristics": [
+            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
+        ],
         "q": pairs[:m],
         "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
         "normals": columns[:-1],
         "gamma": columns[-1],
         "rotation": solution.rotation.tolist(),
         "directions": solution.moving.directions.tolist(),
-        "frozen": (solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part).tolist(),
+        "frozen": (
+            solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part
+        ).tolist(),
     }
 
 
 def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
-    unit, time = solution.tau1_unit, solution.problem.time
+    unit = solution.tau1_unit
+    time = solution.problem.time
     modes, coefficients = _modes(solution, accuracy)
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
@@ -94,16 +128,22 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
         "mean_rate": solution.mean_rate / unit,
         "modes": modes.tolist(),
         "coefficients": coefficients,
-        "rate": {"characteristic": of_gamma, "constant": solution.rate_constant / unit, "power": TIME_RATE_POWERS[time]},
+        "rate": {
+            "characteristic": of_gamma,
+            "constant": solution.rate_constant / unit,
+            "power": TIME_RATE_POWERS[time],
+        },
         "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
     }
 
 
 def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
-    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the problem's τ₁.
+    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
+    problem's τ₁.
 
-    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow times that. The smallest
-    are left out as long as their sum is below the accuracy. Coefficients are rounded to what it asks for as well.
+    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow
+    times that. The smallest are left out as long as their sum is below the accuracy. Coefficients
+    are rounded to what it asks for as well.
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
@@ -111,24 +151,38 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
     modes, coefficients, *_ = find_modes(solution.rate)
     pace = np.abs(modes @ solution.in_tau1.rates)
-    reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate) * solution.sensitivity.along_flow
+    reach = (
+        2
+        / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate)
+        * solution.sensitivity.along_flow
+    )
     effects = np.abs(coefficients) * reach
     order = np.argsort(-effects)
     left_out = np.cumsum(effects[order][::-1])[::-1]
     selected = order[left_out > accuracy / 2]
     if len(selected) > _MOST_MODES:
         raise Unsolved(
-            "too-many-modes", f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} can be kept"
+            "too-many-modes",
+            f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} "
+            "can be kept",
         )
     # Each may be off by its part of what is left of the accuracy.
-    finest = accuracy / (4 * max(1, len(selected)) * np.maximum(reach[selected], np.finfo(float).tiny)) / solution.tau1_unit
+    finest = (
+        accuracy
+        / (4 * max(1, len(selected)) * np.maximum(reach[selected], np.finfo(float).tiny))
+        / solution.tau1_unit
+    )
     values = coefficients[selected] / solution.tau1_unit
     places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
-    return modes[selected], [round(float(value), place) for value, place in zip(values, places, strict=True)]
+    return modes[selected], [
+        round(float(value), place) for value, place in zip(values, places, strict=True)
+    ]
 
 
 def _reduction(solution: Solution) -> dict[str, Any] | None:
-    """Return the basis and the waves in which theta sums do not cancel, where the plain sum would; None elsewhere."""
+    """Return the basis and the waves in which theta sums do not cancel, where the plain sum would;
+    None elsewhere.
+    """
     T = np.asarray(solution.periods.riemann_matrix)
     if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
         return None
@@ -137,12 +191,19 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
 
 
 def _error(solution: Solution, accuracy: float) -> dict[str, float]:
-    """Return the bound of q and the frame: that of the engine at t = 0, and how it grows, and what modes left out may make."""
-    evaluator, far = Evaluator(solution, "theta"), _CYCLES / solution.fastest
+    """Return the bound of q and the frame: that of the engine at t = 0, and how it grows, and what
+    modes left out may make.
+    """
+    evaluator = Evaluator(solution, "theta")
+    far = _CYCLES / solution.fastest
     errors = []
     for time in (0.0, far):
         plan = evaluator.to(TimeGrid.of([time]))
         name = None if solution.problem.time == "tau1" else "fourier"
         errors.append(_OWN_ROUNDING * float(evaluator.evaluate(plan, plan.time_map(name))[1][0]))
     growth = max(0.0, errors[1] - errors[0])
-    return {"at_start": errors[0] + accuracy, "per_unit_time": growth / far, "per_cycle": growth / _CYCLES}
+    return {
+        "at_start": errors[0] + accuracy,
+        "per_unit_time": growth / far,
+        "per_cycle": growth / _CYCLES,
+    }

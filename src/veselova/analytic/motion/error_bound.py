@@ -1,4 +1,6 @@
-"""The error of a closed-form state: rounding of the evaluation, and phase errors times the steepness of the attitude in them."""
+"""The error of a closed-form state: rounding of the evaluation, and phase errors times the
+steepness of the attitude in them.
+"""
 
 from __future__ import annotations
 
@@ -19,61 +21,84 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Rounding of one evaluation of the attitude, in ε, largest seen over the problem tables: 8 by angles, 20 by theta quotients, and
-#: there for each unit of the largest entry of T, whose rounding stands in an exponent. That of transforms comes on top.
+#: Rounding of one evaluation of the attitude, in ε, largest seen over the problem tables: 8 by
+#: angles, 20 by theta quotients, and there for each unit of the largest entry of T, whose rounding
+#: stands in an exponent. That of transforms comes on top.
 _EVALUATION = {"angles": 8.0, "theta": 20.0, "products": 20.0, "nufft": 20.0}
 
-#: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of different phases add in squares.
+#: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of
+#: different phases add in squares.
 _PHASE = {"angles": 4.0, "theta": 2.0, "products": 2.0, "nufft": 2.0}
 
 #: Rounding of a phase at the start in ε, the Abel map, as clocks take it.
 _START_PHASE = 4.0
 
-#: Relative rounding of f, F_0 and the clock in ε; periods of random problems agree with extended precision to 2 ε.
+#: Relative rounding of f, F_0 and the clock in ε; periods of random problems agree with extended
+#: precision to 2 ε.
 _RATE = 2.0
 
 #: The same where they carry guard digits: 30 digits in the leading and the following double.
 _GUARDED_RATE = 1e-30
 
-#: Times at which the steepness of the attitude is looked at besides, near a separatrix and for wide A's.
+#: Times at which the steepness of the attitude is looked at besides, near a separatrix and for wide
+#: A's.
 _ON_ORBIT = 24
 
-#: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of them.
-_WIDE, _MANY = 10.0, 10_000
+#: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of
+#: them.
+_WIDE = 10.0
+_MANY = 10_000
 
-#: Rounding of the principal axes and of a given frame along them, in ε, besides one for each term of a scalar product.
+#: Rounding of the principal axes and of a given frame along them, in ε, besides one for each term
+#: of a scalar product.
 _AXES_ROUNDING = 8.0
 
 
 @dataclass(frozen=True)
 class ErrorBound:
-    """A bound on every component of q and frame of one solution by one method; what does not depend on times is kept."""
+    """A bound on every component of q and frame of one solution by one method; what does not depend
+    on times is kept.
+    """
 
     solution: Solution
     method: str
 
     def at(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap) -> Array:
         """Return the bound at each time of a horizon, (N,), from the Neumann times there."""
-        solution, sensitivity, at_once = self.solution, self.solution.sensitivity, self._at_once
+        solution = self.solution
+        sensitivity = self.solution.sensitivity
+        at_once = self._at_once
         if self._is_looked_at:
             rows = np.linspace(0, tau1.size - 1, min(tau1.size, _ON_ORBIT)).astype(int)
-            sensitivity = sensitivity.maximum(solution.steepness_at(solution.in_tau1.phases(tau1[rows])))
+            sensitivity = sensitivity.maximum(
+                solution.steepness_at(solution.in_tau1.phases(tau1[rows]))
+            )
             at_once = self._of_one_evaluation(sensitivity)
         rounding = _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
         lag = self._lag(plan, tau1, time_map, rounding)
-        error = self._of_point(tau1, lag, rounding) if solution.problem.time == "s" else np.zeros_like(tau1)
-        if (slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))) is not None:
+        error = (
+            self._of_point(tau1, lag, rounding)
+            if solution.problem.time == "s"
+            else np.zeros_like(tau1)
+        )
+        if (
+            slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))
+        ) is not None:
             lag *= slowness
-        # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the flow.
+        # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the
+        # flow.
         lag *= sensitivity.along_flow
         lag += (rounding * sensitivity.by_rates) * np.abs(tau1) + at_once
         np.maximum(error, lag, out=error)
-        if solution.problem.axes is not None:  # back along the body axes, scalar products of n terms
+        # back along the body axes, scalar products of n terms
+        if solution.problem.axes is not None:
             error += (solution.problem.n + _AXES_ROUNDING) * _EPSILON
         return error
 
     def _lag(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap, rounding: float) -> Array:
-        """Return the error of t over F_0, (N,): the rounding of dt/dτ₁ is one of the time elapsed, not of F_0|τ₁|."""
+        """Return the error of t over F_0, (N,): the rounding of dt/dτ₁ is one of the time elapsed,
+        not of F_0|τ₁|.
+        """
         of_clock, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
         result = np.abs(plan.times / self.solution.mean_rate)
         result *= rounding + drift
@@ -81,12 +106,17 @@ class ErrorBound:
         return result
 
     def _of_point(self, tau1: Array, lag: Array, rounding: float) -> Array:
-        """Return the error of the point of a geodesic, (N,), which moves with unit speed however fast its normal turns.
+        """Return the error of the point of a geodesic, (N,), which moves with unit speed however
+        fast its normal turns.
 
-        X_i is as accurate relative to √A_i as the normal is: on a flat side both q_i and √(q,Aq) are small.
+        X_i is as accurate relative to √A_i as the normal is: on a flat side both q_i and √(q,Aq)
+        are small.
         """
-        solution, sensitivity = self.solution, self.solution.steepness_of_point
-        at_once = self._of_one_evaluation(sensitivity, size=float(np.sqrt(np.max(solution.problem.A))))
+        solution = self.solution
+        sensitivity = self.solution.steepness_of_point
+        at_once = self._of_one_evaluation(
+            sensitivity, size=float(np.sqrt(np.max(solution.problem.A)))
+        )
         moved = (rounding * sensitivity.by_rates) * np.abs(tau1)
         return np.asarray(lag * solution.mean_rate + moved + at_once)
 
@@ -108,23 +138,30 @@ class ErrorBound:
         return self._of_one_evaluation(self.solution.sensitivity)
 
     def _of_one_evaluation(self, sensitivity: Sensitivity, size: float = 1.0) -> float:
-        """Return the error of one evaluation at phases that are known to a few roundings, of numbers of that size.
+        """Return the error of one evaluation at phases that are known to a few roundings, of
+        numbers of that size.
 
-        Angles take a rounding of the start's angles to the phases and back again; theta functions see the phases as they are, and
-        so does the clock.
+        Angles take a rounding of the start's angles to the phases and back again; theta functions
+        see the phases as they are, and so does the clock.
         """
-        solution, evaluation = self.solution, size * _EVALUATION[self.method]
+        solution = self.solution
+        evaluation = size * _EVALUATION[self.method]
         result = _PHASE[self.method] * _EPSILON * sensitivity.together
         if self.method == "angles":
             return result + evaluation * _EPSILON
-        result += float(solution.start_rounding @ sensitivity.by_phase) + size * solution.quotients.rounding
+        result += (
+            float(solution.start_rounding @ sensitivity.by_phase)
+            + size * solution.quotients.rounding
+        )
         return result + evaluation * max(1.0, solution.largest_period) * _EPSILON
 
 
 def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:
-    """Return F_0 over dt/dτ₁, where that is more than one, for A's by which the rate varies much; None for others.
+    """Return F_0 over dt/dτ₁, where that is more than one, for A's by which the rate varies much;
+    None for others.
 
-    An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the mean.
+    An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the
+    mean.
     """
     if solution.moving.rate_variation < _WIDE:
         return None

@@ -1,4 +1,6 @@
-"""One solution by one method: its states at given times, and how far they may be off. What does not depend on times is kept."""
+"""One solution by one method: its states at given times, and how far they may be off. What does not
+depend on times is kept.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ __all__ = ["METHODS", "Evaluator"]
 
 Array = NDArray[np.float64]
 
-#: The routes from phases to attitude; sums at every time, by products of matrices or transforms, are never cheaper than windows.
+#: The routes from phases to attitude; sums at every time, by products of matrices or transforms,
+#: are never cheaper than windows.
 METHODS = ("theta", "products", "nufft", "angles")
 
 
@@ -40,10 +43,11 @@ class Evaluator:
         return EvaluationPlan(self.solution, times.doubles, self.given, times.remainders)
 
     def evaluate(self, plan: EvaluationPlan, time_map: TimeMap) -> tuple[Samples, Array]:
-        """Return the motion, (q̇, frame) its series, after them λ where the angles of few times have it; and its error.
+        """Return the motion, (q̇, frame) its series, after them λ where the angles of few times
+        have it; and its error.
 
-        Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet they turn sharply, and the rest
-        does not.
+        Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet
+        they turn sharply, and the rest does not.
         """
         windows = plan.windows(time_map.name)
         with_coordinates = self.method == "angles" and windows.inversions == plan.times.size
@@ -65,11 +69,14 @@ class Evaluator:
         """Return the terms of a theta sum, or of the transforms; zero in angles."""
         if self.method == "angles":
             return 0
-        return (self.solution.transforms if self.method == "nufft" else self.solution.quotients.theta).size
+        return (
+            self.solution.transforms if self.method == "nufft" else self.solution.quotients.theta
+        ).size
 
     @cached_property
     def _pace_in_angles(self) -> bool:
-        # Windows alone ask for dt/dτ₁: products and nufft have none, and angles have it from the attitude.
+        # Windows alone ask for dt/dτ₁: products and nufft have none, and angles have it from the
+        # attitude.
         return self.method == "theta" and self.solution.takes_rate_from_angles(self.method)
 
     def _states(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
@@ -82,7 +89,10 @@ class Evaluator:
         else:
             attitude = solution.attitude(z, self.method)
         rate, *series = solution.states(attitude)
-        return solution.rate_at(z, in_angles=True) if self._pace_in_angles else 1 / rate, (*series, *further)
+        return solution.rate_at(z, in_angles=True) if self._pace_in_angles else 1 / rate, (
+            *series,
+            *further,
+        )
 
     def _with_coordinates(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
         """Return dt/dτ₁, and q̇, the frame and λ, in angles."""

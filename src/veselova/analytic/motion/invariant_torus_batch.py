@@ -1,7 +1,8 @@
-"""The invariant tori of many Veselova problems of one dimension at once: what analytic.torus finds for one, without its matrices.
+"""The invariant tori of many Veselova problems of one dimension at once: what analytic.torus finds
+for one, without its matrices.
 
-Curves whose branch points come in one order, with one number of nodes, are computed as one stack of arrays. No number depends
-on which other problems are in it.
+Curves whose branch points come in one order, with one number of nodes, are computed as one stack of
+arrays. No number depends on which other problems are in it.
 """
 
 from __future__ import annotations
@@ -26,15 +27,16 @@ __all__ = ["Tori", "tori"]
 
 Array = NDArray[np.float64]
 
-#: Neighbouring branch points nearer than this part of the largest are left to analytic.torus. Down to here, their differences
-#: have twenty digits.
+#: Neighbouring branch points nearer than this part of the largest are left to analytic.torus. Down
+#: to here, their differences have twenty digits.
 _NARROWEST = 1e-12
 
-#: Numbers of nodes are rounded up to one of these; who needs more has a gap that is worth a call of its own.
+#: Numbers of nodes are rounded up to one of these; who needs more has a gap that is worth a call of
+#: its own.
 _NODES = np.array([12, 16, 20, 24, 32, 40, 52, 64])
 
-#: Largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i: products of them, and what these round,
-#: stay floats.
+#: Largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i: products of
+#: them, and what these round, stay floats.
 _MOST_BINARY_DIGITS = 150
 
 #: Largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
@@ -43,7 +45,8 @@ _MOST_DIMENSIONS = 9
 
 @dataclass(frozen=True)
 class Tori:
-    """What tori have in numbers, first axis the N problems; g = n−1. Names and units are those of ``Torus``.
+    """What tori have in numbers, first axis the N problems; g = n−1. Names and units are those of
+    ``Torus``.
 
     known (N,) which problems were computed; the others have NaN
     """
@@ -64,14 +67,17 @@ class Tori:
 def tori(A: Any, q: Any, q_dot: Any) -> Tori:
     """Return the tori of Veselova problems given by arrays (N, n) of doubles, exact as they stand.
 
-    q needs no length, and q̇ may have a part along q. Equal A's, directions that do not move or start at q_i = 0, branch points
-    nearer than 1e-12 of the largest, and dimensions above nine are not for this function. Digits: those of ``torus``, to
-    1e-14 of every number (of a cycle for phases), tested for n = 2…7. Where A's are orders of magnitude apart the map to phases
+    q needs no length, and q̇ may have a part along q. Equal A's, directions that do not move or
+    start at q_i = 0, branch points nearer than 1e-12 of the largest, and dimensions above nine are
+    not for this function. Digits: those of ``torus``, to 1e-14 of every number (of a cycle for
+    phases), tested for n = 2…7. Where A's are orders of magnitude apart the map to phases
     cancels, here as there: over nine of them phases differ by 2e-13.
     """
     A, q, q_dot = (np.asarray(x, dtype=np.float64) for x in (A, q, q_dot))
     count, n = A.shape
-    chosen = np.flatnonzero(_plain(A, q, q_dot)) if n <= _MOST_DIMENSIONS else np.empty(0, dtype=np.intp)
+    chosen = (
+        np.flatnonzero(_plain(A, q, q_dot)) if n <= _MOST_DIMENSIONS else np.empty(0, dtype=np.intp)
+    )
     found = _nothing(count, n)
     if chosen.size:
         spectra = Spectra.of(A[chosen], q[chosen], q_dot[chosen])
@@ -90,17 +96,28 @@ def _nothing(count: int, n: int) -> Tori:
         for field in fields(Tori)
         if field.name not in ("known", "origins")
     }
-    return Tori(known=np.zeros(count, dtype=bool), origins=np.zeros((count, 2 * n - 1), dtype="U3"), **values)
+    return Tori(
+        known=np.zeros(count, dtype=bool),
+        origins=np.zeros((count, 2 * n - 1), dtype="U3"),
+        **values,
+    )
 
 
 def _plain(A: Array, q: Array, q_dot: Array) -> NDArray[np.bool_]:
     """Return which problems are of moderate size, with A's apart and no q_i = 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = np.stack([np.sum(np.abs(np.log2(A)), axis=1), *(np.max(np.abs(np.log2(np.abs(x))), axis=1) for x in (A, q))])
+        sizes = np.stack(
+            [
+                np.sum(np.abs(np.log2(A)), axis=1),
+                *(np.max(np.abs(np.log2(np.abs(x))), axis=1) for x in (A, q)),
+            ]
+        )
         largest = np.abs(np.log2(np.max(np.abs(q_dot), axis=1)))
     ordered = np.sort(A, axis=1)
     apart = np.all(np.diff(ordered, axis=1) > 0, axis=1)
-    return np.asarray(np.all(sizes < _MOST_BINARY_DIGITS, axis=0) & (largest < _MOST_BINARY_DIGITS) & apart)
+    return np.asarray(
+        np.all(sizes < _MOST_BINARY_DIGITS, axis=0) & (largest < _MOST_BINARY_DIGITS) & apart
+    )
 
 
 def _stacks(spectra: Spectra) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]]]:
@@ -111,38 +128,51 @@ def _stacks(spectra: Spectra) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]
         members = np.flatnonzero(spectra.known & (order == code))
         points, origins = _branch_points(spectra, members, lower[members[0]])
         wide = np.min((points[:, 1:] - points[:, :-1]).high, axis=1) > _NARROWEST
-        members, points = members[wide], points[wide]
+        members = members[wide]
+        points = points[wide]
         curves = Curve(DOUBLE, points.high, (points[:, None, :] - points[:, :, None]).high, origins)
         nodes = _node_counts(Periods(curves))
         for count in np.unique(nodes[nodes > 0]):
             chosen = np.flatnonzero(nodes == count)
             stack = Curve(DOUBLE, points.high[chosen], curves.differences[chosen], origins)
-            yield members[chosen], _numbers(spectra, members[chosen], points[chosen], Periods(stack, int(count)))
+            yield (
+                members[chosen],
+                _numbers(spectra, members[chosen], points[chosen], Periods(stack, int(count))),
+            )
 
 
 def _branch_points(
     spectra: Spectra, members: NDArray[np.intp], lower: NDArray[np.bool_]
 ) -> tuple[DoubleDouble, tuple[BranchPoint, ...]]:
-    """Return b_0 < … < b_{2g} and where they come from, where c_s < I_s for the s = 2…g that ``lower`` marks."""
+    """Return b_0 < … < b_{2g} and where they come from, where c_s < I_s for the s = 2…g that
+    ``lower`` marks.
+    """
     order = [BranchPoint("c", 0), BranchPoint("I", 0)]
     for s, constant_first in enumerate(lower, start=1):
         pair = [BranchPoint("c", s), BranchPoint("I", s)]
         order += pair if constant_first else pair[::-1]
     order.append(BranchPoint("I", lower.size + 1))
     values = {"c": spectra.constants[members], "I": spectra.inverse[members]}
-    return stack_double_doubles([values[origin.kind][:, origin.index] for origin in order]), tuple(order)
+    return stack_double_doubles([values[origin.kind][:, origin.index] for origin in order]), tuple(
+        order
+    )
 
 
 def _node_counts(periods: Periods) -> NDArray[np.int_]:
-    """Return how many nodes each of many curves needs on its intervals, 0 where that is too many."""
+    """Return how many nodes each of many curves needs on its intervals, 0 where that
+    is too many.
+    """
     needed = np.max([periods.count_nodes(cut)[:, 0] for cut in periods.cuts], axis=0)
     place = np.searchsorted(_NODES, needed)
     return np.asarray(np.append(_NODES, 0)[place])
 
 
-def _numbers(spectra: Spectra, members: NDArray[np.intp], points: DoubleDouble, periods: Periods) -> dict[str, Any]:
+def _numbers(
+    spectra: Spectra, members: NDArray[np.intp], points: DoubleDouble, periods: Periods
+) -> dict[str, Any]:
     """Return the fields of ``Tori`` for the members of one stack."""
-    unit, spheroconic = spectra.unit[members, None], spectra.spheroconic[members]
+    unit = spectra.unit[members, None]
+    spheroconic = spectra.spheroconic[members]
     root = np.sqrt(unit)
     rate = _clock_rate(spectra.time_rate[members], spheroconic, periods)
     mean = np.asarray(rate.mean)[:, None]
@@ -150,7 +180,10 @@ def _numbers(spectra: Spectra, members: NDArray[np.intp], points: DoubleDouble, 
     start = _phases(_angles(spheroconic, points, spectra.increasing[members], periods), periods)
     in_time = frequencies / mean
     axes = spectra.axes[members] + 1
-    numbers = [axes[:, o.index] if o.kind == "I" else np.full(axes.shape[0], o.index + 1) for o in periods.curve.origins]
+    numbers = [
+        axes[:, o.index] if o.kind == "I" else np.full(axes.shape[0], o.index + 1)
+        for o in periods.curve.origins
+    ]
     kinds = [origin.kind for origin in periods.curve.origins]
     return {
         "known": True,
@@ -175,12 +208,15 @@ def _clock_rate(at_start: Array, spheroconic: DoubleDouble, periods: Periods) ->
     return TimeRate(AbelJacobi(periods), 1 / product[:, 0], "t")
 
 
-def _angles(spheroconic: DoubleDouble, points: DoubleDouble, increasing: NDArray[np.bool_], periods: Periods) -> Array:
+def _angles(
+    spheroconic: DoubleDouble, points: DoubleDouble, increasing: NDArray[np.bool_], periods: Periods
+) -> Array:
     """Return the angles ψ_s of the starts, shape (N, g)."""
     angles = []
     for s, cut in enumerate(periods.cuts):
         place = spheroconic[:, s, None]
-        below, above = (place - points[:, 2 * s + 1, None]).high, (points[:, 2 * s + 2, None] - place).high
+        below = (place - points[:, 2 * s + 1, None]).high
+        above = (points[:, 2 * s + 2, None] - place).high
         angles.append(cut.points.angles(below, above, increasing[:, s, None]))
     return np.concatenate(angles, axis=1)
 

@@ -1,4 +1,6 @@
-"""Motions to more digits than a double has, or with certified errors: digits are added until the answer has those asked for."""
+"""Motions to more digits than a double has, or with certified errors: digits are added until the
+answer has those asked for.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later, Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.version import __version__
 
@@ -41,7 +44,8 @@ _ATTEMPTS = 6
 #: Moving directions up to which theta sums are shorter than inversions.
 _THETA_SIZE = 3
 
-#: Significant digits of the numbers given out, beyond those asked for: the radius of a component of size one is not rounding.
+#: Significant digits of the numbers given out, beyond those asked for: the radius of a component of
+#: size one is not rounding.
 _SHOWN = 3
 
 #: −x to the last digit, whatever the caller's context of decimals.
@@ -50,7 +54,9 @@ _negative = np.frompyfunc(Decimal.copy_negate, 1, 1)
 
 @dataclass(frozen=True)
 class MotionInBalls:
-    """A motion that can be asked for times, with ``digits`` correct digits after the point in q and frame."""
+    """A motion that can be asked for times, with ``digits`` correct digits after the point in q and
+    frame.
+    """
 
     problem: TorusProblem
     digits: int
@@ -60,13 +66,23 @@ class MotionInBalls:
     def __post_init__(self) -> None:
         if self.problem.axes is not None:
             field = "digits" if self.digits > FEWEST_DIGITS else "certified"
-            raise InvalidInput((field,), "A as n numbers (a matrix is diagonalised in double precision)", "A as a matrix")
+            raise InvalidInput(
+                (field,),
+                "A as n numbers (a matrix is diagonalised in double precision)",
+                "A as a matrix",
+            )
 
     def __call__(self, times: Any) -> Trajectory:
-        """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where digits cannot be reached."""
-        began, asked = time.perf_counter(), TimeGrid.of(times, exact=True)
-        exact, grid = asked.exact, asked.doubles
-        if not (any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)):
+        """Return the trajectory at times; raises Unsolved as EnclosedSolution does, and where
+        digits cannot be reached.
+        """
+        began = time.perf_counter()
+        asked = TimeGrid.of(times, exact=True)
+        exact = asked.exact
+        grid = asked.doubles
+        if not (
+            any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)
+        ):
             return self._resting(asked, began)
         solution = Solution(self.problem)
         plan = EvaluationPlan(solution, grid)
@@ -74,7 +90,8 @@ class MotionInBalls:
         reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
         method = self.method or self._cheaper(solution)
         working = self.digits + _SPARE + math.ceil(math.log10(1 + plan.cycles))
-        if method == "angles" and solution.near_separatrix:  # phases hardly move with the angles there
+        # phases hardly move with the angles there
+        if method == "angles" and solution.near_separatrix:
             working += math.ceil(-math.log10(solution.curve.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
@@ -84,14 +101,24 @@ class MotionInBalls:
                 continue
             missing = found.missing(self.digits, working)
             if missing <= 0:
-                details = {"regime": solution.regime, "working_digits": working, "certified": self.certified, **details}
+                details = {
+                    "regime": solution.regime,
+                    "working_digits": working,
+                    "certified": self.certified,
+                    **details,
+                }
                 return self._trajectory(method, asked, found, details, began)
             working += missing + _MORE
-        raise Unsolved("no-digit-left", f"{self.digits} digits were not reached with {working} working digits")
+        raise Unsolved(
+            "no-digit-left", f"{self.digits} digits were not reached with {working} working digits"
+        )
 
     def _cheaper(self, coarse: Solution) -> str:
-        """Return the route that takes less: theta sums are short for n = 3, and near a separatrix at any n, but not bounded."""
-        size = moving_part(self.problem).size  # beside a direction that doubles do not see sums cancel
+        """Return the route that takes less: theta sums are short for n = 3, and near a separatrix
+        at any n, but not bounded.
+        """
+        # beside a direction that doubles do not see sums cancel
+        size = moving_part(self.problem).size
         harmless = size == coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta"
         short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
         return "theta" if short and not self.certified else "angles"
@@ -99,21 +126,42 @@ class MotionInBalls:
     def _resting(self, asked: TimeGrid, began: float) -> Trajectory:
         working = 2 * self.digits + _SPARE
         with balls(working, self.certified) as xp:
-            found = _Found.of(self.problem, resting_series(self.problem, asked.doubles.size, xp), xp)
+            found = _Found.of(
+                self.problem, resting_series(self.problem, asked.doubles.size, xp), xp
+            )
         details = {"regime": "rest", "working_digits": working, "certified": self.certified}
         return self._trajectory("rest", asked, found, details, began)
 
-    def _trajectory(self, method: str, asked: TimeGrid, found: _Found, details: Mapping[str, Any], began: float) -> Trajectory:
+    def _trajectory(
+        self, method: str, asked: TimeGrid, found: _Found, details: Mapping[str, Any], began: float
+    ) -> Trajectory:
         if asked.places is not None:
             found = found.at(asked.places)
         decimals = found.decimals(self.digits, self.certified)
         arrays = {name: found.round_to_doubles(name) for name in self.problem.stored}
         error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
-        provenance = Provenance("analytic", method, self.digits, __version__, time.perf_counter() - began, details)
-        return Trajectory(self.problem, asked.asked, error, arrays, provenance, self, decimals, asked.asked_remainders)
+        provenance = Provenance(
+            "analytic", method, self.digits, __version__, time.perf_counter() - began, details
+        )
+        return Trajectory(
+            self.problem,
+            asked.asked,
+            error,
+            arrays,
+            provenance,
+            self,
+            decimals,
+            asked.asked_remainders,
+        )
 
     def _attempt(
-        self, coarse: Solution, method: str, working: int, exact: tuple[Fraction | float, ...], time_map: TimeMap, reach: float
+        self,
+        coarse: Solution,
+        method: str,
+        working: int,
+        exact: tuple[Fraction | float, ...],
+        time_map: TimeMap,
+        reach: float,
     ) -> tuple[_Found, Any]:
         solution = SolutionInBalls(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
@@ -123,7 +171,9 @@ class MotionInBalls:
 
 @dataclass(frozen=True)
 class _Found:
-    """The series of a problem in balls of an arithmetic, and the largest radius of those that are bounded at each time, (N,)."""
+    """The series of a problem in balls of an arithmetic, and the largest radius of those that are
+    bounded at each time, (N,).
+    """
 
     problem: TorusProblem
     arithmetic: Balls
@@ -144,11 +194,15 @@ class _Found:
         return _Found(self.problem, self.arithmetic, series, self.spread[places])
 
     def missing(self, digits: int, working: int) -> int:
-        """Return how many digits the largest error is above the one asked for; the rounding of decimals is part of it."""
+        """Return how many digits the largest error is above the one asked for; the rounding of
+        decimals is part of it.
+        """
         if not all(radius.is_finite() for radius in self.spread):
             return working
         with self.arithmetic as xp:
-            (largest,), _ = xp.decimals(np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN)
+            (largest,), _ = xp.decimals(
+                np.array([np.max(self.spread) + xp.number(10) ** (1 - digits - _SHOWN)]), _SHOWN
+            )
         return digits + int(largest.adjusted()) + 1
 
     def round_to_doubles(self, name: str) -> NDArray[np.float64]:
@@ -159,7 +213,8 @@ class _Found:
         """Return the decimals, made when they are asked for."""
         shown = digits + _SHOWN
         pairs: dict[str, Pair | Callable[[], Pair]] = {
-            name: partial(self.arithmetic.decimals, values, shown) for name, values in self.series.items()
+            name: partial(self.arithmetic.decimals, values, shown)
+            for name, values in self.series.items()
         }
         if "omega" in self.series:
             pairs["omega"] = partial(_skew, self.arithmetic, self.series["omega"], shown)
@@ -174,7 +229,9 @@ def _skew(arithmetic: Balls, omega: Values, digits: int) -> Pair:
 
 
 def _square(above: Values, below: Values, upper: tuple[Values, Values]) -> Values:
-    """Return matrices (N, n, n) with zero diagonals from what stands above and below, (N, n(n−1)/2)."""
+    """Return matrices (N, n, n) with zero diagonals from what stands above and below, (N,
+    n(n−1)/2).
+    """
     size = int(upper[1][-1]) + 1
     result = np.full((len(above), size, size), Decimal(0))
     result[:, upper[0], upper[1]], result[:, upper[1], upper[0]] = above, below

@@ -1,4 +1,6 @@
-"""The Veselova system on T SO(3) without potential, (Ω,γ) = 0, in closed form: the rank-one problem with A = 𝓘⁻¹."""
+"""The Veselova system on T SO(3) without potential, (Ω,γ) = 0, in closed form: the rank-one problem
+with A = 𝓘⁻¹.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +19,23 @@ __all__ = ["motion_of_body"]
 
 
 def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
-    """Return the motion of the body whose rank-one problem moves along a trajectory: the same frame, and Ω = γ̇×γ."""
+    """Return the motion of the body whose rank-one problem moves along a trajectory: the same
+    frame, and Ω = γ̇×γ.
+    """
     frame = point.series("frame")
     series = {"Omega": np.cross(point.series("q_dot"), frame[:, :, 0]), "frame": frame}
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     decimals = None if point.decimals is None else _decimals(problem, point.decimals)
-    return Trajectory(problem, point.times, point.error, series, point.provenance, dense, decimals, point.remainders)
+    return Trajectory(
+        problem,
+        point.times,
+        point.error,
+        series,
+        point.provenance,
+        dense,
+        decimals,
+        point.remainders,
+    )
 
 
 def _motion_at(problem: VeselovaSO3, dense: Callable[[Any], Trajectory], times: Any) -> Trajectory:
@@ -30,19 +43,26 @@ def _motion_at(problem: VeselovaSO3, dense: Callable[[Any], Trajectory], times: 
 
 
 def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
-    """Return the decimals of the body; Ω and what follows from it are made when they are asked for."""
+    """Return the decimals of the body; Ω and what follows from it are made when they
+    are asked for.
+    """
     pairs: dict[str, Pair | Callable[[], Pair]] = {
         "Omega": partial(_angular_velocity, point),
         "frame": lambda: (point.midpoints["frame"], point.radii["frame"]),
     }
-    middles, radii = Later(pairs, 0), Later(pairs, 1)
+    middles = Later(pairs, 0)
+    radii = Later(pairs, 1)
     for name in problem.derived:
         pairs[name] = partial(problem.derive_decimals, name, middles, radii, point.digits)
     ordered = {name: pairs[name] for name in problem.outputs}
-    return Decimals(point.digits, point.certified, Later(ordered, 0), Later(ordered, 1), problem.bounded)
+    return Decimals(
+        point.digits, point.certified, Later(ordered, 0), Later(ordered, 1), problem.bounded
+    )
 
 
 def _angular_velocity(point: Decimals) -> Pair:
     balls = DecimalBalls(point.digits)
-    velocity, frame = (balls.array(point.midpoints[name], point.radii[name]) for name in ("q_dot", "frame"))
+    velocity, frame = (
+        balls.array(point.midpoints[name], point.radii[name]) for name in ("q_dot", "frame")
+    )
     return balls.pair(cross(velocity, frame[:, :, 0]))

@@ -20,12 +20,15 @@ __all__ = ["resting_series"]
 
 
 def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mapping[str, Values]:
-    """Return the series of a problem at rest, by name, at ``count`` times; raises Unsolved where no frame can be known.
+    """Return the series of a problem at rest, by name, at ``count`` times; raises Unsolved where no
+    frame can be known.
 
-    Neumann's point rests where q is an eigenvector of A: so are the others, and the natural frame is one of axes. A body rests
-    anywhere, and its natural frame is known in double precision only.
+    Neumann's point rests where q is an eigenvector of A: so are the others, and the natural frame
+    is one of axes. A body rests anywhere, and its natural frame is known in double precision only.
     """
-    xp, exact, moving = arithmetic, problem.exact, moving_part(problem)
+    xp = arithmetic
+    exact = problem.exact
+    moving = moving_part(problem)
     q = xp.array(exact.q)
     q = q / xp.sqrt(np.sum(q * q))
     if exact.frame is not None:
@@ -34,8 +37,19 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
         body = BodyFrame(problem, moving, xp.array([1]), xp.array(np.zeros((1, 0))), xp)
         frame = np.column_stack([q, body.start])
     else:
-        raise Unsolved("at-rest", "q_dot = 0: a resting body's natural frame is known in double precision only; give a frame")
-    points = resting_spheroconic(moving, xp) / xp.number(moving.unit) if moving.size > 1 else xp.array(np.zeros(0))
-    frames, coordinates = (np.stack([x] * count) for x in (frame, to_all_directions(points[None], moving.frozen, xp)[0]))
+        raise Unsolved(
+            "at-rest",
+            "q_dot = 0: a resting body's natural frame is known in double precision only; "
+            "give a frame",
+        )
+    points = (
+        resting_spheroconic(moving, xp) / xp.number(moving.unit)
+        if moving.size > 1
+        else xp.array(np.zeros(0))
+    )
+    frames, coordinates = (
+        np.stack([x] * count)
+        for x in (frame, to_all_directions(points[None], moving.frozen, xp)[0])
+    )
     zeros = xp.array(np.zeros((count, problem.n)))
     return series_of(problem, States(zeros[:, 0], zeros, frames, coordinates), xp)

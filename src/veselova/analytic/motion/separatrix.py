@@ -1,8 +1,9 @@
 """How far motions part from a start on a separatrix: a bound that is a function of time alone.
 
-A start a rounding away leaves the separatrix like e^(rate·|t|), and comes back to it when all motions dwell at the same
-equilibrium. What is lost on the way stays lost. So the bound is the largest difference from neighbouring motions at fixed
-instants up to the one after |t|; it never decreases with |t|, and no other time that is asked for enters it.
+A start a rounding away leaves the separatrix like e^(rate·|t|), and comes back to it when all
+motions dwell at the same equilibrium. What is lost on the way stays lost. So the bound is the
+largest difference from neighbouring motions at fixed instants up to the one after |t|; it never
+decreases with |t|, and no other time that is asked for enters it.
 """
 
 from __future__ import annotations
@@ -17,13 +18,17 @@ __all__ = ["DepartureBound"]
 
 Array = NDArray[np.float64]
 
-#: Radians of turning between instants, how many are equally far apart, and by how much the following ones are farther off.
-_STEP, _EVEN, _GROWTH = 0.25, 256, 1.02
+#: Radians of turning between instants, how many are equally far apart, and by how much the
+#: following ones are farther off.
+_STEP = 0.25
+_EVEN = 256
+_GROWTH = 1.02
 
 #: Instants evaluated at once.
 _BLOCK = 128
 
-#: Between instants a difference may be larger than at both; largest seen there over that at the later one: 1.3.
+#: Between instants a difference may be larger than at both; largest seen there over that at the
+#: later one: 1.3.
 _BETWEEN = 2.0
 
 
@@ -31,8 +36,10 @@ _BETWEEN = 2.0
 class DepartureBound:
     """The bound of one motion, extended when times ask for it.
 
-    frames: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n) · turning: radians a unit of time
-    lost: the difference beyond which nothing is known; instants after the first such one are not evaluated
+    frames: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n) ·
+    turning: radians a unit of time
+    lost: the difference beyond which nothing is known; instants after the first such one are not
+    evaluated
     """
 
     frames: Callable[[Array], Sequence[Array]]
@@ -48,25 +55,39 @@ class DepartureBound:
             if rows.any():
                 instants, bounds = self._until(side, float(np.max(times[rows] * side)))
                 places = np.searchsorted(instants, times[rows] * side)
-                result[rows] = np.where(places < len(bounds), bounds[np.minimum(places, len(bounds) - 1)], np.inf)
+                result[rows] = np.where(
+                    places < len(bounds), bounds[np.minimum(places, len(bounds) - 1)], np.inf
+                )
         return result
 
     def _until(self, side: float, farthest: float) -> tuple[Array, Array]:
-        """Return the instants on one side of t = 0, increasing, and the bounds there, to the farthest time or the last digit."""
+        """Return the instants on one side of t = 0, increasing, and the bounds there, to the
+        farthest time or the last digit.
+        """
         instants, bounds = self._known.get(side, (np.zeros(1), np.zeros(1)))
         while instants[-1] < farthest and bounds[-1] <= self.lost:
             further = _instants(len(instants), _BLOCK) / self.turning
             first, *others = self.frames(further * side if side > 0 else further[::-1] * side)
-            differences = np.max([np.max(np.abs(other - first), axis=(1, 2)) for other in others], axis=0)
+            differences = np.max(
+                [np.max(np.abs(other - first), axis=(1, 2)) for other in others], axis=0
+            )
             differences = differences if side > 0 else differences[::-1]
-            largest = np.maximum.accumulate(np.maximum(bounds[-1], _BETWEEN * np.nan_to_num(differences, nan=np.inf)))
+            largest = np.maximum.accumulate(
+                np.maximum(bounds[-1], _BETWEEN * np.nan_to_num(differences, nan=np.inf))
+            )
             selected = int(np.searchsorted(largest, self.lost, side="right")) + 1
-            instants, bounds = np.append(instants, further[:selected]), np.append(bounds, largest[:selected])
+            instants = np.append(instants, further[:selected])
+            bounds = np.append(bounds, largest[:selected])
         self._known[side] = instants, bounds
         return instants, bounds
 
 
 def _instants(first: int, count: int) -> Array:
-    """Return the instants from number ``first`` on, in radians of turning: evenly apart, then farther and farther."""
+    """Return the instants from number ``first`` on, in radians of turning: evenly apart, then
+    farther and farther.
+    """
     numbers = np.arange(first, first + count)
-    return np.asarray(_STEP * np.where(numbers <= _EVEN, numbers, _EVEN * _GROWTH ** np.maximum(numbers - _EVEN, 0)))
+    return np.asarray(
+        _STEP
+        * np.where(numbers <= _EVEN, numbers, _EVEN * _GROWTH ** np.maximum(numbers - _EVEN, 0))
+    )

@@ -1,4 +1,6 @@
-"""The series of a trajectory in ball arithmetic, under the names of each system, from the states of what moves."""
+"""The series of a trajectory in ball arithmetic, under the names of each system, from the states of
+what moves.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ __all__ = ["States", "series_of", "to_all_directions"]
 class States:
     """States along the principal axes, in units of the problem.
 
-    tau1 (N,) · velocity (N, n): dq/d(time) in the problem's own time · frame (N, n, n) · spheroconic (N, n−1)
+    tau1 (N,) · velocity (N, n): dq/d(time) in the problem's own time · frame (N, n, n) ·
+    spheroconic (N, n−1)
     """
 
     tau1: Values
@@ -29,7 +32,9 @@ class States:
 
 
 def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
-    """Return the λ's of all directions, (N, n−1), increasing, from those of the directions that move, (N, m−1)."""
+    """Return the λ's of all directions, (N, n−1), increasing, from those of the directions that
+    move, (N, m−1).
+    """
     resting = np.tile(arithmetic.array([1 / a for a in frozen]), (len(points), 1))
     coordinates = np.concatenate([points, resting], axis=1)
     order = np.argsort(coordinates.astype(float), axis=1, kind="stable")

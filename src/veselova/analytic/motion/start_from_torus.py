@@ -24,12 +24,16 @@ __all__ = ["start_on_torus"]
 
 Array = NDArray[np.float64]
 
-#: Digits in which branch points are compared; gaps narrower than that part of the largest are no gaps here.
+#: Digits in which branch points are compared; gaps narrower than that part of the largest are no
+#: gaps here.
 _DIGITS = 60
 
 
-def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any) -> tuple[Array, Array]:
-    """Return (q, q̇) along the axes of A, each (n,), for distinct A's and constants that leave every cut open.
+def start_on_torus(
+    A: Any, energy: Any, constants: Any, phases: Any, signs: Any
+) -> tuple[Array, Array]:
+    """Return (q, q̇) along the axes of A, each (n,), for distinct A's and constants that leave
+    every cut open.
 
     Raises InvalidInput where the constants admit no real motion, or a length or a sign is wrong.
     """
@@ -41,7 +45,11 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
     order = sorted(range(n), key=lambda i: -diagonal[i])
     for before, after in itertools.pairwise(order):
         if diagonal[before] == diagonal[after]:
-            raise InvalidInput(("A", after), "distinct entries (phases do not determine a start otherwise)", show(A[after]))
+            raise InvalidInput(
+                ("A", after),
+                "distinct entries (phases do not determine a start otherwise)",
+                show(A[after]),
+            )
     h = exact_number(energy, ("energy",))
     if h <= 0:
         raise InvalidInput(("energy",), "a number greater than 0", show(energy))
@@ -51,16 +59,26 @@ def start_on_torus(A: Any, energy: Any, constants: Any, phases: Any, signs: Any)
     z = np.mod(to_float(exact_vector(phases, ("phases",), n - 1)), 1.0)
     wanted = _signs(signs, n)[order]
     psi = AbelJacobi(Periods(curve)).invert(z[None, :])
-    # The roots of the frame have their own signs at ψ; ς makes q_i, or where it vanishes q̇_i, have the wanted one.
+    # The roots of the frame have their own signs at ψ; ς makes q_i, or where it vanishes q̇_i, have
+    # the wanted one.
     bare = Frame(Periods(curve), np.ones(n)).at(psi)
-    position, velocity = bare.q[0], bare.q_prime[0]
+    position = bare.q[0]
+    velocity = bare.q_prime[0]
     seen = np.where(np.abs(position) > 8 * DOUBLE.epsilon, position, velocity)
     turn = np.where(np.sign(seen) * wanted < 0, -1.0, 1.0)
-    q, v = np.empty(n), np.empty(n)
+    q = np.empty(n)
+    v = np.empty(n)
     q[order], v[order] = turn * position, turn * velocity
-    # dτ₁/dt = √(2h det A/(q,Aq)), by logarithms: det A leaves the float range for large n; A in units of its smallest entry.
+    # dτ₁/dt = √(2h det A/(q,Aq)), by logarithms: det A leaves the float range for large n; A in
+    # units of its smallest entry.
     scaled = to_float([a / unit for a in diagonal])
-    log_rate = math.log(2) + _log(h) + float(np.sum(np.log(scaled))) + (n - 2) * _log(unit) - math.log(float(q**2 @ scaled))
+    log_rate = (
+        math.log(2)
+        + _log(h)
+        + float(np.sum(np.log(scaled)))
+        + (n - 2) * _log(unit)
+        - math.log(float(q**2 @ scaled))
+    )
     return q, v * math.exp(log_rate / 2)
 
 
@@ -69,16 +87,24 @@ def _log(x: Fraction) -> float:
 
 
 def _scale_constants(constants: Any, inverse: Sequence[Fraction], unit: Fraction) -> list[Fraction]:
-    """Return c_2 … c_{n−1} in units of the largest I; raises InvalidInput unless max(c_s, I_s) < min(c_{s+1}, I_{s+1})."""
+    """Return c_2 … c_{n−1} in units of the largest I; raises InvalidInput unless max(c_s, I_s) <
+    min(c_{s+1}, I_{s+1}).
+    """
     n = len(inverse)
     scaled = [c * unit for c in exact_vector(constants, ("constants",), n - 2)]
     c = [Fraction(), *scaled]
     for s in range(n - 1):
-        low, high = max(c[s], inverse[s]), min(c[s + 1], inverse[s + 1]) if s < n - 2 else inverse[s + 1]
+        low = max(c[s], inverse[s])
+        high = min(c[s + 1], inverse[s + 1]) if s < n - 2 else inverse[s + 1]
         if not low < high:
             field = ("constants", min(max(s - 1, 0), n - 3)) if n > 2 else ("A",)
-            required = f"constants with max(c_{s + 1}, I_{s + 1}) < min(c_{s + 2}, I_{s + 2}), I the sorted inverses of A"
-            raise InvalidInput(field, required, f"{float(low / unit):.6g} against {float(high / unit):.6g}")
+            required = (
+                f"constants with max(c_{s + 1}, I_{s + 1}) < min(c_{s + 2}, I_{s + 2}), I "
+                "the sorted inverses of A"
+            )
+            raise InvalidInput(
+                field, required, f"{float(low / unit):.6g} against {float(high / unit):.6g}"
+            )
     for k, value in enumerate(scaled):
         if value in inverse:
             required = "a constant that is not an I_i (a separatrix has no phases)"
@@ -97,5 +123,7 @@ def _signs(signs: Any, n: int) -> Array:
 def _curve(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Curve:
     xp = extended_arithmetic(_DIGITS)
     none = xp.array([])
-    points = Spectrum(xp, xp.array(list(inverse)), none, none, xp.array([0, *constants]), none, None)
+    points = Spectrum(
+        xp, xp.array(list(inverse)), none, none, xp.array([0, *constants]), none, None
+    )
     return Curve.of(points, DOUBLE)

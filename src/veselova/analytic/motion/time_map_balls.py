@@ -1,4 +1,6 @@
-"""The time map in ball arithmetic that costs least at given times: Chebyshev panels, a Fourier series, or a change of units."""
+"""The time map in ball arithmetic that costs least at given times: Chebyshev panels, a Fourier
+series, or a change of units.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +22,27 @@ from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["TimeMap", "UniformTimeMap", "choose_time_map"]
 
-#: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the last for all above: a node of
-#: panels; a mode of the Fourier clock at once, where no cut takes more than _NODES in doubles, and with every time, which costs
-#: more as the genus grows; and a time of that clock.
-_NODE, _MODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}, {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
-_MODE_AT_TIME, _TIME, _NODES = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}, 0.1, 36
+#: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the
+#: last for all above: a node of panels; a mode of the Fourier clock at once, where no cut takes
+#: more than _NODES in doubles, and with every time, which costs more as the genus grows; and a time
+#: of that clock.
+_NODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}
+_MODE = {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
+_MODE_AT_TIME = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}
+_TIME = 0.1
+_NODES = 36
 
-#: The digits of those, by what power of them modes grow, whose sums are in balls for genus 1, and milliseconds beyond which modes
-#: are not begun: minutes.
-_DIGITS, _GROWTH, _LONGEST = 60, {1: 2.5, 2: 1.5, 3: 1.5, 4: 1.5}, 120_000
+#: The digits of those, by what power of them modes grow, whose sums are in balls for genus 1, and
+#: milliseconds beyond which modes are not begun: minutes.
+_DIGITS = 60
+_GROWTH = {1: 2.5, 2: 1.5, 3: 1.5, 4: 1.5}
+_LONGEST = 120_000
 
 
 class UniformTimeMap:
-    """The time map of a motion whose time is Neumann's, in its own unit: τ₁ is the time times dτ₁/d(time)."""
+    """The time map of a motion whose time is Neumann's, in its own unit: τ₁ is the time times
+    dτ₁/d(time).
+    """
 
     name = "uniform"
 
@@ -52,16 +62,20 @@ class UniformTimeMap:
 TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
-def choose_time_map(orbit: Orbit, approximate: NDArray[np.float64], coarse: Solution, moving: Moving) -> TimeMap:
-    """Return the time map of an orbit for approximate Neumann times (N,): the cheaper, or the other where it has too many terms.
+def choose_time_map(
+    orbit: Orbit, approximate: NDArray[np.float64], coarse: Solution, moving: Moving
+) -> TimeMap:
+    """Return the time map of an orbit for approximate Neumann times (N,): the cheaper, or the other
+    where it has too many terms.
 
-    coarse: the solution in double precision · moving: what moves in balls. Only the truncation of panels is bounded.
-    Raises Unsolved where neither reaches as far.
+    coarse: the solution in double precision · moving: what moves in balls. Only the truncation of
+    panels is bounded. Raises Unsolved where neither reaches as far.
     """
     if moving.time == "tau1":
         return UniformTimeMap(orbit)
     xp: Any = orbit.rate.inversion.arithmetic
-    genus, times = moving.size - 1, approximate.size
+    genus = moving.size - 1
+    times = approximate.size
     kind = min(genus, max(_NODE))
     modes = coarse.modes * (xp.digits / DOUBLE.digits) ** genus
     # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.

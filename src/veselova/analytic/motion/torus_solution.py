@@ -1,4 +1,6 @@
-"""The closed-form motion of one problem: everything that does not depend on the times, and the states at any of them."""
+"""The closed-form motion of one problem: everything that does not depend on the times, and the
+states at any of them.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,12 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences, Frame
 from veselova.analytic.attitude.sensitivity import Sensitivity
-from veselova.analytic.attitude.sensitivity_sampling import BETWEEN, FEW, SensitivitySampling, sample_phases
+from veselova.analytic.attitude.sensitivity_sampling import (
+    BETWEEN,
+    FEW,
+    SensitivitySampling,
+    sample_phases,
+)
 from veselova.analytic.curve.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
@@ -34,12 +41,16 @@ __all__ = ["WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
 
-#: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10; for g = 5 it is 24 and 8.
+#: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10;
+#: for g = 5 it is 24 and 8.
 _THETA_GENUS = 4
 
-#: Largest genus at which panels take dt/dτ₁, of two functions, from them; the cycles from which that pays for what is made once
-#: where the attitude has no use for it; and the terms of a sum that cost as much as an inversion.
-_RATE_GENUS, _RATE_CYCLES, _RATE_TERMS = 6, {5: 10.0, 6: 40.0}, 6e4
+#: Largest genus at which panels take dt/dτ₁, of two functions, from them; the cycles from which
+#: that pays for what is made once where the attitude has no use for it; and the terms of a sum that
+#: cost as much as an inversion.
+_RATE_GENUS = 6
+_RATE_CYCLES = {5: 10.0, 6: 40.0}
+_RATE_TERMS = 6e4
 
 #: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
 _LARGE_PERIOD = 8.0
@@ -47,9 +58,10 @@ _LARGE_PERIOD = 8.0
 #: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
 _LARGE_CANCELLATION = 10.0
 
-#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at 1e-12 angles still give 1e-12;
-#: and the largest genus at which theta sums are taken there.
-_NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
+#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at
+#: 1e-12 angles still give 1e-12; and the largest genus at which theta sums are taken there.
+_NARROW_GAP_HIGH_GENUS = 1e-12
+_SEPARATRIX_GENUS = 7
 
 #: By how much dt/dτ₁ may vary for a Fourier clock.
 WIDEST_RATE = 1e10
@@ -59,10 +71,11 @@ _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
 
 class Solution:
-    """The closed-form motion of a moving body: its moving part, in units of its largest I, and the frame around it.
+    """The closed-form motion of a moving body: its moving part, in units of its largest I, and the
+    frame around it.
 
-    ``distance`` moves a start on a separatrix, where branch points coincide, by that much relative to itself (see
-    analytic.reduction). Raises Unsolved at rest, where there is no curve.
+    ``distance`` moves a start on a separatrix, where branch points coincide, by that much relative
+    to itself (see analytic.reduction). Raises Unsolved at rest, where there is no curve.
     """
 
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
@@ -70,17 +83,23 @@ class Solution:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
         found, self.periods = resolve_periods(moving_part(problem), distance)
         self.curve: Curve = self.periods.curve
-        self.problem, self.moving, self.spectrum, self.separatrices = problem, found.moving, found.spectrum, found.separatrices
+        self.problem = problem
+        self.moving = found.moving
+        self.spectrum = found.spectrum
+        self.separatrices = found.separatrices
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, self.start.signs)
         self._origin: Array = self.inversion.map(self.start.angles[None, :])[0]
-        #: √(A that counts as 1): τ₁ in the problem's units is this times τ₁ here, where the largest I is 1.
+        #: √(A that counts as 1): τ₁ in the problem's units is this times τ₁ here, where the largest
+        #: I is 1.
         self.tau1_unit = math.sqrt(found.moving.unit)
 
     @property
     def regime(self) -> str:
-        """Return ``separatrix``, ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
+        """Return ``separatrix``, ``closed-cut`` (two A's coincide, or some direction is frozen) or
+        ``generic``.
+        """
         if self.separatrices:
             return "separatrix"
         return "closed-cut" if self.moving.rotated or self.moving.frozen else "generic"
@@ -94,11 +113,14 @@ class Solution:
         """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions."""
         if in_angles:
             return np.asarray(self.rate.at(self.inversion.invert(z)))
-        return np.asarray(self.rate_constant * self.quotients.time_rate(z) ** TIME_RATE_POWERS[self.problem.time])
+        return np.asarray(
+            self.rate_constant * self.quotients.time_rate(z) ** TIME_RATE_POWERS[self.problem.time]
+        )
 
     def takes_rate_from_angles(self, method: str | None = None, cycles: float = np.inf) -> bool:
-        """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix, always on uneven tori and where
-        that is the method; by what is cheaper where none is given."""
+        """Return whether dt/dτ₁ over so many cycles comes from angles: never near a separatrix,
+        always on uneven tori and where that is the method; by what is cheaper where none is given.
+        """
         if self.near_separatrix:
             return False
         if not self.is_even:
@@ -106,12 +128,18 @@ class Solution:
         genus = self.curve.genus
         if method is not None or genus <= _THETA_GENUS:
             return method == "angles"
-        return genus > _RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
+        return (
+            genus > _RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
+        )
 
     @cached_property
     def rate_constant(self) -> float:
-        """Return dt/dτ₁ over that power of the stretch; its largest value, at a half period, is the scale of the rate."""
-        return float(self.rate.scale) * self.quotients.peak_inverted(TIME_RATE_POWERS[self.problem.time])
+        """Return dt/dτ₁ over that power of the stretch; its largest value, at a half period, is the
+        scale of the rate.
+        """
+        return float(self.rate.scale) * self.quotients.peak_inverted(
+            TIME_RATE_POWERS[self.problem.time]
+        )
 
     @cached_property
     def _rate_of_position(self) -> Callable[[Array], Array]:
@@ -119,7 +147,9 @@ class Solution:
 
     @cached_property
     def near_separatrix(self) -> bool:
-        """Return whether a gap is so narrow that angles near its ends say little of the body, and theta functions serve."""
+        """Return whether a gap is so narrow that angles near its ends say little of the body, and
+        theta functions serve.
+        """
         narrow = NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
         return self.curve.narrowest_gap < narrow and self.curve.genus <= _SEPARATRIX_GENUS
 
@@ -130,9 +160,13 @@ class Solution:
 
     @cached_property
     def start_rounding(self) -> Array:
-        """Return what rounding of the start's angles, and of the map from them, makes of its phases, shape (g,)."""
+        """Return what rounding of the start's angles, and of the map from them, makes of its
+        phases, shape (g,).
+        """
         slopes = np.abs(self.inversion.jacobian(self.start.angles[None, :])[0])
-        return np.asarray((slopes @ np.abs(self.start.angles) + self.periods.cancellation) * DOUBLE.epsilon)
+        return np.asarray(
+            (slopes @ np.abs(self.start.angles) + self.periods.cancellation) * DOUBLE.epsilon
+        )
 
     @cached_property
     def in_tau1(self) -> LinearFlow:
@@ -147,18 +181,27 @@ class Solution:
     @cached_property
     def precise_flows(self) -> tuple[LinearFlow, LinearFlow, float]:
         """Return both flows and F_0 with guard digits, for times far out."""
-        from veselova.analytic.time_map.guard_digits import extended_precision_flows  # loads python-flint
+        # loads python-flint
+        from veselova.analytic.time_map.guard_digits import extended_precision_flows
 
         return extended_precision_flows(self.spectrum, self._origin, self.problem.time)
 
     def fourier_time_map(self, precise_flows: bool) -> FourierTimeMap:
-        """Return the Fourier clock, with guard digits or without; raises Unsolved (``beyond-floats``)."""
+        """Return the Fourier clock, with guard digits or without; raises Unsolved
+        (``beyond-floats``).
+        """
         if (variation := self.moving.rate_variation) > WIDEST_RATE:
             raise Unsolved(
-                "beyond-floats", f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 of its mean"
+                "beyond-floats",
+                f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 "
+                "of its mean",
             )
         if precise_flows not in self._fourier_clocks:
-            flows = self.precise_flows if precise_flows else (self.in_tau1, self.in_time, self.mean_rate)
+            flows = (
+                self.precise_flows
+                if precise_flows
+                else (self.in_tau1, self.in_time, self.mean_rate)
+            )
             self._fourier_clocks[precise_flows] = FourierTimeMap(self.rate, *flows)
         return self._fourier_clocks[precise_flows]
 
@@ -179,18 +222,31 @@ class Solution:
 
     @cached_property
     def _sampling(self) -> SensitivitySampling:
-        half_periods, steep = self.default_method() == "theta", not self.near_separatrix
+        half_periods = self.default_method() == "theta"
+        steep = not self.near_separatrix
         point = self.point if self.problem.time == "s" else None
-        return SensitivitySampling(self.frame, self.inversion, self.start.angles, self.in_tau1.rates, half_periods, steep, point)
+        return SensitivitySampling(
+            self.frame,
+            self.inversion,
+            self.start.angles,
+            self.in_tau1.rates,
+            half_periods,
+            steep,
+            point,
+        )
 
     def point(self, q: Array) -> Array:
-        """Return the points Aq/√(q,Aq) of the ellipsoid with unit normals q (N, m), along the moving directions."""
+        """Return the points Aq/√(q,Aq) of the ellipsoid with unit normals q (N, m), along the
+        moving directions.
+        """
         A = float(self.moving.unit) * to_float(self.moving.A)
         return np.asarray(A * q / np.sqrt((q * q) @ A)[:, None])
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """Return how fast the frame turns with the phases, and more for what lies between the sampled points."""
+        """Return how fast the frame turns with the phases, and more for what lies between the
+        sampled points.
+        """
         if self._sampling.sensitivity is not None:
             return self._sampling.sensitivity
         return self.steepness_at(self._drawn)
@@ -207,25 +263,36 @@ class Solution:
         return np.concatenate([sample_phases(self.curve.genus), self._origin[None, :]])
 
     def steepness_at(self, z: Array) -> Sensitivity:
-        """Return how fast the frame turns at phases z (N, g), and more; doubled near a separatrix, where it varies most."""
+        """Return how fast the frame turns at phases z (N, g), and more; doubled near a separatrix,
+        where it varies most.
+        """
         return self._steepness_between(z)[0]
 
     def _steepness_between(self, z: Array) -> tuple[Sensitivity, Sensitivity]:
-        """Return how fast the frame turns, and the point of a geodesic moves, at phases z (N, g)."""
-        near, rates = self.near_separatrix, self.in_tau1.rates
+        """Return how fast the frame turns, and the point of a geodesic moves, at
+        phases z (N, g).
+        """
+        near = self.near_separatrix
+        rates = self.in_tau1.rates
         points = z if near else self.inversion.invert(z)
         along = np.broadcast_to(np.eye(rates.size), (*z.shape, rates.size))
-        ends = Differences(points, along if near else np.linalg.inv(self.inversion.jacobian(points)))
+        ends = Differences(
+            points, along if near else np.linalg.inv(self.inversion.jacobian(points))
+        )
         attitude: Callable[[Array], Attitude] = self.quotients.at if near else self.frame.at
-        at, between = attitude(ends.ends), 2.0 if near else BETWEEN
-        of_frame, of_point = ends.slopes(at), ends.quotients(self.point(at.q))
+        at = attitude(ends.ends)
+        between = 2.0 if near else BETWEEN
+        of_frame = ends.slopes(at)
+        of_point = ends.quotients(self.point(at.q))
         return Sensitivity.of(between * of_frame, rates), Sensitivity.of(between * of_point, rates)
 
     @cached_property
     def quotients(self) -> ThetaQuotients:
         """Return the theta route of this torus."""
         T = np.asarray(self.periods.riemann_matrix, dtype=np.float64)
-        return replace(ThetaQuotients.of(T, self.frame), at_half_periods=self._sampling.at_half_periods)
+        return replace(
+            ThetaQuotients.of(T, self.frame), at_half_periods=self._sampling.at_half_periods
+        )
 
     @cached_property
     def transforms(self) -> Transforms:
@@ -239,26 +306,39 @@ class Solution:
 
     @cached_property
     def is_even(self) -> bool:
-        """Return whether neither narrow cuts nor wide A's give the phases very different weights; not asked beyond FEW."""
+        """Return whether neither narrow cuts nor wide A's give the phases very different weights;
+        not asked beyond FEW.
+        """
         if self.curve.genus > FEW:
             return True
-        return bool(self.largest_period < _LARGE_PERIOD and np.max(self.periods.cancellation) < _LARGE_CANCELLATION)
+        return bool(
+            self.largest_period < _LARGE_PERIOD
+            and np.max(self.periods.cancellation) < _LARGE_CANCELLATION
+        )
 
     def default_method(self) -> str:
-        """Return theta near a separatrix, angles for a narrow cut or wide A's, and otherwise the cheaper route."""
+        """Return theta near a separatrix, angles for a narrow cut or wide A's, and otherwise the
+        cheaper route.
+        """
         if self.near_separatrix:
             return "theta"
         return "theta" if self.curve.genus <= _THETA_GENUS and self.is_even else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
-        """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by Abel–Jacobi inversion."""
-        return self.frame.at(self.inversion.invert(z)) if method == "angles" else self.quotients.at(z)
+        """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by
+        Abel–Jacobi inversion.
+        """
+        return (
+            self.frame.at(self.inversion.invert(z)) if method == "angles" else self.quotients.at(z)
+        )
 
     @cached_property
     def rotation(self) -> Array:
-        """Return the constant ℜ of (orth): moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, shape (g, n−1).
+        """Return the constant ℜ of (orth): moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, shape (g,
+        n−1).
 
-        For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of that.
+        For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of
+        that.
         """
         normals = self._sampling.start.normals[0]
         along = normals.T @ self.moving.directions.T
@@ -273,15 +353,21 @@ class Solution:
 
     @cached_property
     def frozen_part(self) -> Array:
-        """Return what stays of e_2 … e_n: their components along the directions that do not move."""
-        directions, normals = self.moving.directions, self.problem.frame[:, 1:]
+        """Return what stays of e_2 … e_n: their components along the directions that
+        do not move.
+        """
+        directions = self.moving.directions
+        normals = self.problem.frame[:, 1:]
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     def states(self, attitude: Attitude) -> tuple[Array, Array, Array]:
         """Return dτ₁/dt, q̇ and the frame along the problem's principal axes."""
-        rate, moving, n = self._rate_of_position(attitude.q), self.moving, self.problem.n
+        rate = self._rate_of_position(attitude.q)
+        moving = self.moving
+        n = self.problem.n
         (count, along, genus), frame = attitude.normals.shape, np.empty((attitude.q.shape[0], n, n))
-        rotated = attitude.normals.reshape(-1, genus) @ self.rotation  # one product, not one for every time
+        # one product, not one for every time
+        rotated = attitude.normals.reshape(-1, genus) @ self.rotation
         frame[:, :, 0] = attitude.q @ moving.directions.T
         frame[:, :, 1:] = moving.directions @ rotated.reshape(count, along, -1)
         if moving.frozen:
@@ -291,4 +377,6 @@ class Solution:
     def spheroconic(self, attitude: Attitude) -> Array:
         """Return the λ's of all directions, from an attitude that has those of the moving ones."""
         frozen = np.tile(1 / to_float(self.moving.frozen), (attitude.q.shape[0], 1))
-        return np.sort(np.concatenate([attitude.spheroconic / float(self.moving.unit), frozen], axis=1), axis=1)
+        return np.sort(
+            np.concatenate([attitude.spheroconic / float(self.moving.unit), frozen], axis=1), axis=1
+        )

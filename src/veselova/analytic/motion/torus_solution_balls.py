@@ -1,4 +1,6 @@
-"""The closed-form motion of one problem in balls: every number of the chain with its error, to any number of digits."""
+"""The closed-form motion of one problem in balls: every number of the chain with its error, to any
+number of digits.
+"""
 
 from __future__ import annotations
 
@@ -51,37 +53,55 @@ _LEAST_WIDTH = 1e-290
 
 #: Digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
-_MOVED = f"the start had to be moved, and the bound of its drift grows beyond 1e{_MOST_GROWTH} times the distance until then"
+_MOVED = (
+    f"the start had to be moved, and the bound of its drift grows beyond 1e{_MOST_GROWTH} "
+    "times the distance until then"
+)
 
 
 class SolutionInBalls:
-    """The motion of a moving body in balls of so many working digits; use it ``with solution.arithmetic:``.
+    """The motion of a moving body in balls of so many working digits; use it ``with
+    solution.arithmetic:``.
 
-    ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only angles can be); else estimated.
-    ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the largest I is 1. Where branch
-    points coincide the start is moved. On a separatrix, and where errors are certified, it is moved by so little that a bound of
-    Gronwall's kind keeps its motion as near to the given one as the digits ask for until then.
-    Raises Unsolved (``not-enclosed``, ``too-far``) where a bound cannot be closed.
+    ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only
+    angles can be); else estimated.
+    ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the
+    largest I is 1. Where branch points coincide the start is moved. On a separatrix, and where
+    errors are certified, it is moved by so little that a bound of Gronwall's kind keeps its motion
+    as near to the given one as the digits ask for until then. Raises Unsolved (``not-enclosed``,
+    ``too-far``) where a bound cannot be closed.
     """
 
-    def __init__(self, coarse: Solution, digits: int, certified: bool, method: str, reach: float = 0.0) -> None:
-        problem, self._coarse = coarse.problem, coarse
+    def __init__(
+        self, coarse: Solution, digits: int, certified: bool, method: str, reach: float = 0.0
+    ) -> None:
+        problem = coarse.problem
+        self._coarse = coarse
         given = self._given = moving_part(problem)
         if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
-            reason = "on and near a separatrix phases say little of the body, and theta functions are not bounded"
+            reason = (
+                "on and near a separatrix phases say little of the body, and theta functions "
+                "are not bounded"
+            )
             raise Unsolved("not-enclosed", reason)
         beyond = _digits_of_least(given, digits)
         found = resolve_spectrum(given, digits, Fraction(1, 10 ** (2 * digits + 10)), beyond)
         if certified and (found.separatrices or found.moving.size < given.size):
-            raise Unsolved("not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others")
+            raise Unsolved(
+                "not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others"
+            )
         self._is_bounded = found.moving != given and (certified or bool(found.separatrices))
         if self._is_bounded:
             growth = estimate_growth(found.spectrum, reach)
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed" if certified else "too-far", _MOVED)
             beyond = max(growth, beyond)
-            found = resolve_spectrum(given, digits, Fraction(1, 10 ** (2 * digits + 10 + beyond)), beyond)
-        self.problem, self.moving, self.separatrices = problem, found.moving, found.separatrices
+            found = resolve_spectrum(
+                given, digits, Fraction(1, 10 ** (2 * digits + 10 + beyond)), beyond
+            )
+        self.problem = problem
+        self.moving = found.moving
+        self.separatrices = found.separatrices
         self.arithmetic: Any = balls(digits, certified)
         self.spectrum = enclose_spectrum(found)
         fine: Any = self.spectrum.arithmetic
@@ -90,9 +110,11 @@ class SolutionInBalls:
         with self.arithmetic:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
             begin = start(found.spectrum, curve, self.spectrum)
-            self.frame, self._angles = Frame(inversion.periods, begin.signs), begin.angles[None, :]
+            self.frame = Frame(inversion.periods, begin.signs)
+            self._angles = begin.angles[None, :]
             rate = TimeRate.of(self.spectrum, inversion, problem.time)
-            origin, frequencies = inversion.map(self._angles)[0], inversion.periods.frequencies
+            origin = inversion.map(self._angles)[0]
+            frequencies = inversion.periods.frequencies
             self._quotients: ThetaQuotients | None = None
             if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
@@ -100,30 +122,45 @@ class SolutionInBalls:
             time_rate = None if self._quotients is None else self._quotients.time_rate
             # Doubles do not see every direction that moves.
             in_angles = coarse.takes_rate_from_angles(coarse.default_method())
-            coarse_rate = partial(coarse.rate_at, in_angles=in_angles) if coarse.moving.size == self.moving.size else None
+            coarse_rate = (
+                partial(coarse.rate_at, in_angles=in_angles)
+                if coarse.moving.size == self.moving.size
+                else None
+            )
             self.orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rate)
 
-    def series(self, times: Values, coarse: TimeMap) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
+    def series(
+        self, times: Values, coarse: TimeMap
+    ) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took.
 
-        times (N,) exact, increasing · coarse: the clock in double precision, in units where the largest I is 1.
+        times (N,) exact, increasing · coarse: the clock in double precision, in units where the
+        largest I is 1.
         """
-        xp, problem = self.arithmetic, self.problem
+        xp = self.arithmetic
+        problem = self.problem
         tau1, attitude, details = self._motion(times, coarse)
-        velocity = attitude.q_prime * time_rate(self.spectrum, problem.time, xp)(attitude.q)[:, None]
+        velocity = (
+            attitude.q_prime * time_rate(self.spectrum, problem.time, xp)(attitude.q)[:, None]
+        )
         points = attitude.spheroconic
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
         unit = xp.number(self.moving.unit)
         points = to_all_directions(points / unit, self.moving.frozen, xp)
-        states = States(tau1 * xp.sqrt(unit), self._body.to_axes(velocity), self._body.frames(attitude), points)
+        states = States(
+            tau1 * xp.sqrt(unit), self._body.to_axes(velocity), self._body.frames(attitude), points
+        )
         return series_of(
-            problem, states if self._drift is None else self._add_perturbation(states, self._drift, tau1), xp
+            problem,
+            states if self._drift is None else self._add_perturbation(states, self._drift, tau1),
+            xp,
         ), details
 
     def _add_perturbation(self, states: States, drift: PerturbationBound, tau1: Values) -> States:
         """Return the states of the moved start, widened to hold those of the given one."""
-        xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
+        xp = self.arithmetic
+        unit = self.arithmetic.number(self.moving.unit)
         late, velocity, rotated, points = drift.bounds(tau1, xp)
         return States(
             xp.add_error(states.tau1, late * xp.sqrt(unit)),
@@ -133,13 +170,16 @@ class SolutionInBalls:
         )
 
     def _motion(self, times: Values, coarse: TimeMap) -> tuple[Values, Attitude, Mapping[str, Any]]:
-        """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs less."""
+        """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs
+        less.
+        """
 
         def sampled(t: NDArray[np.float64]) -> NDArray[np.float64]:
             attitude = self._coarse.attitude(coarse.tau1(t)[1], "angles")
             return np.concatenate([attitude.q, attitude.normals.reshape(len(t), -1)], axis=1)
 
-        windows, size = None, self.moving.size
+        windows = None
+        size = self.moving.size
         if not (self.arithmetic.certified or self._coarse.near_separatrix):
             cycles = self._coarse.fastest * abs(float(times[-1] - times[0]))
             windows = WindowsInBalls.worth_while(times, cycles, sampled, self.arithmetic)
@@ -149,25 +189,47 @@ class SolutionInBalls:
             table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
             found = windows.at(times, np.column_stack(table))
             if found is not None:
-                q, components, rest = found[:, 1 : 1 + size], found[:, 1 + size : 2 * size], found[:, 2 * size :]
+                q = found[:, 1 : 1 + size]
+                components = found[:, 1 + size : 2 * size]
+                rest = found[:, 2 * size :]
                 if size == 3:
-                    handed = (across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1])[0]
-                    side = 1 if handed > 0 else -1 if handed < 0 else 1 / handed  # of a ball that holds zero, nothing known
+                    handed = (
+                        across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1]
+                    )[0]
+                    # of a ball that holds zero, nothing known
+                    side = 1 if handed > 0 else -1 if handed < 0 else 1 / handed
                     rest = np.stack([rest, across(q, rest) * side], axis=2)
-                return found[:, 0], Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]), details
+                return (
+                    found[:, 0],
+                    Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]),
+                    details,
+                )
             windows = windows.finer()
         return self._evaluate(times, coarse)
 
-    def _evaluate(self, times: Values, coarse: TimeMap) -> tuple[Values, Attitude, Mapping[str, Any]]:
-        approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(self._coarse.moving.unit / self.moving.unit)
-        # Zero is exactly that, and a time below the range of doubles, or below the rounding of a clock in doubles, is not.
+    def _evaluate(
+        self, times: Values, coarse: TimeMap
+    ) -> tuple[Values, Attitude, Mapping[str, Any]]:
+        approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(
+            self._coarse.moving.unit / self.moving.unit
+        )
+        # Zero is exactly that, and a time below the range of doubles, or below the rounding of a
+        # clock in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
         time_map = choose_time_map(self.orbit, approximate, self._coarse, self.moving)
         tau1 = time_map.tau1(times, approximate)
         z = self.orbit.phases(tau1)
-        attitude = self._quotients.at(z) if self._quotients is not None else self.frame.at(self.orbit.rate.inversion.invert(z))
-        return tau1, attitude, {"time_map": time_map.name, "time_map_size": time_map.size, "evaluations": len(times)}
+        attitude = (
+            self._quotients.at(z)
+            if self._quotients is not None
+            else self.frame.at(self.orbit.rate.inversion.invert(z))
+        )
+        return (
+            tau1,
+            attitude,
+            {"time_map": time_map.name, "time_map_size": time_map.size, "evaluations": len(times)},
+        )
 
     @cached_property
     def _body(self) -> BodyFrame:
@@ -176,8 +238,11 @@ class SolutionInBalls:
 
     @cached_property
     def _drift(self) -> PerturbationBound | None:
-        """Return how far the start that was moved may get from the given one, where that has to be bounded."""
-        xp, given = self.arithmetic, self._given
+        """Return how far the start that was moved may get from the given one, where that has to be
+        bounded.
+        """
+        xp = self.arithmetic
+        given = self._given
         if not self._is_bounded:
             return None
         drift = PerturbationBound.of(given, self.moving, xp)
@@ -187,14 +252,22 @@ class SolutionInBalls:
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:
-    """Return the digits beyond which branch points are to coincide, so that the direction that moves least is kept."""
+    """Return the digits beyond which branch points are to coincide, so that the direction that
+    moves least is kept.
+    """
     share = given.least_share
     wanted = (share.denominator.bit_length() - share.numerator.bit_length()) * 3 // 10
-    return max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits) if wanted > _SMALL_SHARE else 0
+    return (
+        max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits)
+        if wanted > _SMALL_SHARE
+        else 0
+    )
 
 
 def _in_doubles(spectrum: Spectrum) -> Curve:
-    """Return the curve from which inversions in balls start: widths that doubles cannot hold are taken for wider ones."""
+    """Return the curve from which inversions in balls start: widths that doubles cannot hold are
+    taken for wider ones.
+    """
     curve = Curve.of(spectrum, DOUBLE)
     places = np.arange(len(curve.branch_points))
     widths = np.maximum(np.abs(curve.differences), _LEAST_WIDTH)

@@ -1,1 +1,3 @@
-"""Numerical analysis that knows no mechanics: Jacobi's functions, roots, Chebyshev and Fourier sums."""
+"""Numerical analysis that knows no mechanics: Jacobi's functions, roots, Chebyshev and Fourier
+sums.
+"""

@@ -1,4 +1,6 @@
-"""Inversion of increasing functions, many at once: Newton's method inside a bracket; beyond doubles, with a last interval."""
+"""Inversion of increasing functions, many at once: Newton's method inside a bracket; beyond
+doubles, with a last interval.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,14 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.mechanics.core.errors import InternalContradiction
 
-__all__ = ["Rows", "doublings", "fourth_order_divisor", "increasing_root", "interval_step", "is_shown"]
+__all__ = [
+    "Rows",
+    "doublings",
+    "fourth_order_divisor",
+    "increasing_root",
+    "interval_step",
+    "is_shown",
+]
 
 Array = NDArray[np.float64]
 
@@ -20,7 +29,8 @@ Array = NDArray[np.float64]
 Rows = slice | NDArray[np.intp]
 
 #: Newton's steps double the digits from those of a double, but for what they lose.
-_FIRST_DIGITS, _LOST_DIGITS = 12, 2
+_FIRST_DIGITS = 12
+_LOST_DIGITS = 2
 
 #: Part of the slope at an approximate root that is certain next to it.
 _SLOPE = 0.5
@@ -39,40 +49,56 @@ def increasing_root(
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
 
-    ``function`` gives values at entries, of rows along the first axis, and what a step divides them by: slopes (Newton's method),
-    or what another method has in their place. Iteration ends with steps of at most ``settled``, after which values are not formed
-    again: the error left is of the order of the method, so choose it near that root of the wanted accuracy. It ends with brackets
-    of at most ``narrow`` too (``settled`` without one), where values are too rough, or slopes too small, for such a step.
+    ``function`` gives values at entries, of rows along the first axis, and what a step divides them
+    by: slopes (Newton's method), or what another method has in their place. Iteration ends with
+    steps of at most ``settled``, after which values are not formed
+    again: the error left is of the order of the method, so choose it near that root of the wanted
+    accuracy. It ends with brackets of at most ``narrow`` too (``settled`` without one), where
+    values are too rough, or slopes too small, for such a step.
     """
     narrow = converged if narrow is None else narrow
     rows: Rows = slice(None)
-    result, x, before = guess, guess, high - low
-    with np.errstate(divide="ignore", invalid="ignore"):  # no slope, no step: what is not inside the bracket is not taken
+    result = guess
+    x = guess
+    before = high - low
+    # no slope, no step: what is not inside the bracket is not taken
+    with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(_MOST_STEPS):
             value, slope = function(x, rows)
             step = value / slope
-            moved, size = x - step, np.abs(step)
-            small, found = size <= converged, np.minimum(np.maximum(moved, low), high)
+            moved = x - step
+            size = np.abs(step)
+            small = size <= converged
+            found = np.minimum(np.maximum(moved, low), high)
             if small.all():
                 return _with(result, rows, found)
-            low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-            taken = (2 * size <= before) & (moved >= low) & (moved <= high)  # steps that do not shrink may go in circles
+            low = np.where(value <= 0, x, low)
+            high = np.where(value >= 0, x, high)
+            # steps that do not shrink may go in circles
+            taken = (2 * size <= before) & (moved >= low) & (moved <= high)
             trial = np.where(taken, moved, (low + high) / 2)
-            before, x = np.maximum(np.abs(trial - x), 2 * converged), np.where(small, found, trial)
+            before = np.maximum(np.abs(trial - x), 2 * converged)
+            x = np.where(small, found, trial)
             open_ = np.asarray(~(small | (high - low <= narrow)).reshape(len(x), -1).all(axis=1))
             if not open_.any():
                 return _with(result, rows, x)
-            if 2 * np.count_nonzero(open_) <= len(open_):  # those that are settled are left, when that saves more than it costs
+            # those that are settled are left, when that saves more than it costs
+            if 2 * np.count_nonzero(open_) <= len(open_):
                 result = _with(result, rows, x)
                 rows = np.flatnonzero(open_) if isinstance(rows, slice) else rows[open_]
-                low, high, before, x = low[open_], high[open_], before[open_], x[open_]
+                low = low[open_]
+                high = high[open_]
+                before = before[open_]
+                x = x[open_]
     raise InternalContradiction("inversion of an increasing function did not settle")
 
 
 def fourth_order_divisor(value: Array, slope: Array, a: Array, b: Array) -> Array:
-    """Return what a step of fourth order (Householder) divides the value by, where a step of Newton's divides by the slope.
+    """Return what a step of fourth order (Householder) divides the value by, where a step of
+    Newton's divides by the slope.
 
-    The function is value + slope x + ax² + bx³ around the point. Far away the divisor is twice the slope at most, or half of it.
+    The function is value + slope x + ax² + bx³ around the point. Far away the divisor is twice the
+    slope at most, or half of it.
     """
     step = value / slope
     bent = step * (a - b * step) / (slope - a * step)
@@ -85,11 +111,14 @@ def doublings(digits: int) -> list[int]:
     return [*doublings(half), half] if half > _FIRST_DIGITS else []
 
 
-def interval_step(value: Values, slope: Values, bend: Any, arithmetic: Any) -> tuple[Values, Values]:
-    """Return what takes approximate roots to balls that hold them, and balls around zero that hold the distances.
+def interval_step(
+    value: Values, slope: Values, bend: Any, arithmetic: Any
+) -> tuple[Values, Values]:
+    """Return what takes approximate roots to balls that hold them, and balls around zero that hold
+    the distances.
 
-    ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as far as a root may be, which is
-    shown where the distance times the bend is below the other half.
+    ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as
+    far as a root may be, which is shown where the distance times the bend is below the other half.
     """
     reach = arithmetic.zero_ball(value / (_SLOPE * slope))
     return np.asarray(value / arithmetic.add_error(slope, reach * bend)), np.asarray(reach)

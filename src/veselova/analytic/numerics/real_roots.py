@@ -1,4 +1,6 @@
-"""Polynomials with rational coefficients, lists lowest first: arithmetic, and roots to many digits."""
+"""Polynomials with rational coefficients, lists lowest first: arithmetic, and roots
+to many digits.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,18 @@ from fractions import Fraction
 
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["NEAR", "Polynomial", "monic", "product", "quotient", "remainder", "roots", "total", "trim", "value"]
+__all__ = [
+    "NEAR",
+    "Polynomial",
+    "monic",
+    "product",
+    "quotient",
+    "remainder",
+    "roots",
+    "total",
+    "trim",
+    "value",
+]
 
 Polynomial = list[Fraction]
 
@@ -29,7 +42,9 @@ def monic(roots: Sequence[Fraction]) -> Polynomial:
 
 def total(parts: Sequence[Sequence[Fraction]]) -> Polynomial:
     """Return the sum."""
-    return [sum(column, Fraction()) for column in itertools.zip_longest(*parts, fillvalue=Fraction())]
+    return [
+        sum(column, Fraction()) for column in itertools.zip_longest(*parts, fillvalue=Fraction())
+    ]
 
 
 def product(a: Sequence[Fraction], b: Sequence[Fraction]) -> Polynomial:
@@ -39,7 +54,8 @@ def product(a: Sequence[Fraction], b: Sequence[Fraction]) -> Polynomial:
 
 def quotient(polynomial: Polynomial, root: Fraction) -> Polynomial:
     """Return the quotient by λ − root."""
-    quotient, carry = [], Fraction()
+    quotient = []
+    carry = Fraction()
     for c in reversed(polynomial[1:]):
         carry = carry * root + c
         quotient.append(carry)
@@ -48,7 +64,8 @@ def quotient(polynomial: Polynomial, root: Fraction) -> Polynomial:
 
 def remainder(polynomial: Polynomial, monic: Polynomial) -> Polynomial:
     """Return the remainder of a division by a monic polynomial."""
-    rest, degree = list(polynomial), len(monic) - 1
+    rest = list(polynomial)
+    degree = len(monic) - 1
     while len(rest) > degree:
         lead = rest.pop()
         for i in range(degree):
@@ -72,18 +89,26 @@ def value(polynomial: Polynomial, x: Fraction) -> Fraction:
 
 
 def roots(polynomial: Polynomial, further: int = 0) -> list[tuple[Fraction, Fraction]]:
-    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair, to 77 digits and ``further`` ones.
+    """Return (Re, Im ≥ 0) of the roots of an exact polynomial, real ones and one of each pair, to
+    77 digits and ``further`` ones.
 
-    Each is isolated by Arb: two real roots however near each other are two, and no pair of complex ones.
-    Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer than NEAR.
+    Each is isolated by Arb: two real roots however near each other are two, and no pair of complex
+    ones. Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer
+    than NEAR.
     """
     from veselova.analytic.arithmetic.balls import balls  # loads python-flint
 
     with balls(_DIGITS + further, False) as arithmetic:
         found = arithmetic.polynomial_roots(polynomial)
     if any(count > 1 for _, _, count in found):
-        raise Unsolved("clustered-roots", "R has a double root: the motion is on a separatrix, or at rest in one coordinate")
+        raise Unsolved(
+            "clustered-roots",
+            "R has a double root: the motion is on a separatrix, or at rest in one coordinate",
+        )
     for (a, b, _), (c, d, _) in itertools.combinations(found, 2):
         if abs(a - c) + abs(b - d) <= NEAR * (1 + abs(a)):
-            raise Unsolved("clustered-roots", "two roots of R could not be told apart: the motion is near a separatrix")
+            raise Unsolved(
+                "clustered-roots",
+                "two roots of R could not be told apart: the motion is near a separatrix",
+            )
     return [(x, y) for x, y, _ in found if y >= 0]

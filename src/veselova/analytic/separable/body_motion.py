@@ -1,7 +1,7 @@
 """The Veselova system on T SO(3) with (Ω,γ) = 0 in the separable potentials (3.5), in closed form.
 
-γ and Ω come from the quadratures; e_2 and e_3 are carried along γ without turning about it, ė = −(γ∧γ̇)e, so they turn against the
-coordinate lines by one more integral along the orbit.
+γ and Ω come from the quadratures; e_2 and e_3 are carried along γ without turning about it, ė =
+−(γ∧γ̇)e, so they turn against the coordinate lines by one more integral along the orbit.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ _STEP = 1e-6
 
 
 class BodyMotion(Motion[VeselovaSO3]):
-    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or (Ω,γ) ≠ 0."""
+    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or
+    (Ω,γ) ≠ 0.
+    """
 
     @cached_property
     def _order(self) -> NDArray[np.intp]:
@@ -47,34 +49,46 @@ class BodyMotion(Motion[VeselovaSO3]):
     @cached_property
     def _orbit(self) -> SeparableOrbit:
         """Return the orbit of the exact start along these axes."""
-        problem, order = self.problem, self._order
+        problem = self.problem
+        order = self._order
         if problem.without_closed_form:
             raise Unsolved("not-separable", problem.without_closed_form)
         given = problem.potential.given or {}
-        alphas = list(exact_vector(given["family"], ("potential", "family"), 5)) if "family" in given else [Fraction(0)] * 5
+        alphas = (
+            list(exact_vector(given["family"], ("potential", "family"), 5))
+            if "family" in given
+            else [Fraction(0)] * 5
+        )
         alphas[1] += exact_number(given.get("clebsch", 0), ("potential", "clebsch"))
         moments = list(separate([problem.moments[i] for i in order]))
         gamma, Omega = problem.to_axes()
         velocity = exact_cross(gamma, Omega)  # scaled as γ is
         x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
-        v, walls = family_polynomial(moments, *alphas[:2]), tuple(alphas[2 + i] for i in order)
+        v = family_polynomial(moments, *alphas[:2])
+        walls = tuple(alphas[2 + i] for i in order)
         return SeparableOrbit(SeparableStart(tuple(moments), x, w, v, walls))
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        orbit, motion, inversion = self._orbit, self._orbit.motion, self._orbit.inversion
+        orbit = self._orbit
+        motion = self._orbit.motion
+        inversion = self._orbit.inversion
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
         slopes, largest = self._turning
-        low, high = min(tau[0], 0.0), max(tau[-1], 0.0)
+        low = min(tau[0], 0.0)
+        high = max(tau[-1], 0.0)
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
-        panels = integrate_on_panels(lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise)
+        panels = integrate_on_panels(
+            lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise
+        )
         at, velocity = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
         error, lag = orbit.error(tau, time_map, self._sensitivity)
-        # Beside a pole of the coordinate lines they turn thousands of times faster than in the mean.
+        # Beside a pole of the coordinate lines they turn thousands of times faster than in the
+        # mean.
         error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
         error = error + orbit.integral_error(tau, slopes)
         error = orbit.require_digit(error, grid.doubles)
@@ -90,21 +104,35 @@ class BodyMotion(Motion[VeselovaSO3]):
 
     def _frame(self, gamma: Array, lines: Array, rotated: Array) -> Array:
         """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
-        start = self._to_body(self._orbit.motion.attitude(self._orbit.motion.angles[None, :]).normals)[0]
-        cosine, sine = np.cos(rotated), np.sin(rotated)
-        turn = np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
+        start = self._to_body(
+            self._orbit.motion.attitude(self._orbit.motion.angles[None, :]).normals
+        )[0]
+        cosine = np.cos(rotated)
+        sine = np.sin(rotated)
+        turn = np.stack(
+            [np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1
+        )
         rest = lines @ turn @ (start.T @ self.problem.frame[:, 1:])
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
-        return self._orbit.sensitivity(lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2))
+        return self._orbit.sensitivity(
+            lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2)
+        )
 
     @cached_property
     def _turning(self) -> tuple[Array, float]:
-        """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), and its largest value, over the samples."""
-        orbit, motion = self._orbit, self._orbit.motion
+        """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), and its largest
+        value, over the samples.
+        """
+        orbit = self._orbit
+        motion = self._orbit.motion
         here = motion.turning(orbit.inversion.invert(orbit.sample))
         steps = _STEP * np.eye(motion.periods.genus)
-        moves = [motion.turning(orbit.inversion.invert(orbit.sample + step)) - here for step in steps]
-        return BETWEEN * np.array([np.max(np.abs(move)) for move in moves]) / _STEP, float(np.max(np.abs(here)))
+        moves = [
+            motion.turning(orbit.inversion.invert(orbit.sample + step)) - here for step in steps
+        ]
+        return BETWEEN * np.array([np.max(np.abs(move)) for move in moves]) / _STEP, float(
+            np.max(np.abs(here))
+        )

@@ -1,8 +1,10 @@
-"""The curve of a motion in a separable potential: w² = R(λ) with R of any degree, its roots, and the cuts where λ_s move.
+"""The curve of a motion in a separable potential: w² = R(λ) with R of any degree, its roots, and
+the cuts where λ_s move.
 
-In time τ, dτ = √(det A/(q,Aq)) dt, the spheroconic coordinates obey λ_k' = 2w_k/Π_{s≠k}(λ_k−λ_s), w² = R(λ) = 2λΦ(λ)[v(λ) − C(λ)]
-(docs/separable.md). The data are rationals, so R is exact, and its roots have as many digits as their differences ask for.
-A motion in the plane q_i = 0 is one of n−1 axes: ``SeparableStart.without``.
+In time τ, dτ = √(det A/(q,Aq)) dt, the spheroconic coordinates obey λ_k' = 2w_k/Π_{s≠k}(λ_k−λ_s),
+w² = R(λ) = 2λΦ(λ)[v(λ) − C(λ)] (docs/separable.md). The data are rationals, so R is exact, and its
+roots have as many digits as their differences ask for. A motion in the plane q_i = 0 is one of n−1
+axes: ``SeparableStart.without``.
 """
 
 from __future__ import annotations
@@ -41,23 +43,27 @@ Array = NDArray[np.float64]
 #: Digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
 
-#: I's nearer than this part of themselves are drawn apart by it: far below any digit, and products of such differences are
-#: floats.
+#: I's nearer than this part of themselves are drawn apart by it: far below any digit, and products
+#: of such differences are floats.
 _APART = Fraction(1, 10**30)
 
-#: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a separatrix.
+#: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a
+#: separatrix.
 _SEPARATRIX = 1e-12
 
-#: What R's leading coefficient, its reciprocal, and the squares of its roots multiplied may be: a float, and so their products.
+#: What R's leading coefficient, its reciprocal, and the squares of its roots multiplied may be: a
+#: float, and so their products.
 _LARGEST = 10**150
 
 
 @dataclass(frozen=True)
 class SeparableStart:
-    """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all exact; (q,q̇) = 0, |q| any.
+    """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all exact;
+    (q,q̇) = 0, |q| any.
 
-    inverse (n,) distinct I's, increasing · q, q_dot (n,) along these axes · polynomial: the v_m · centrifugal (n,) the β_i,
-    none of them at q_i = 0 · size: 1 where q̇ is scaled as q is, (q,q) where it is the velocity of the unit vector
+    inverse (n,) distinct I's, increasing · q, q_dot (n,) along these axes · polynomial: the v_m ·
+    centrifugal (n,) the β_i, none of them at q_i = 0 · size: 1 where q̇ is scaled as q is, (q,q)
+    where it is the velocity of the unit vector
     """
 
     inverse: tuple[Fraction, ...]
@@ -76,26 +82,45 @@ class SeparableStart:
     @cached_property
     def conics(self) -> Polynomial:
         """Return U(λ) = Σ q_i² Π_{k≠i}(λ−I_k) = Π(λ−λ_s)."""
-        parts = [[square * c for c in monic(_without(self.inverse, i))] for i, square in enumerate(self.q_squared)]
+        parts = [
+            [square * c for c in monic(_without(self.inverse, i))]
+            for i, square in enumerate(self.q_squared)
+        ]
         return total(parts)
 
     @cached_property
     def constants(self) -> Polynomial:
-        """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U]."""
+        """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij
+        Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U].
+        """
         size = sum((x * x for x in self.q), Fraction())
         pairs = list(itertools.combinations(range(len(self.q)), 2))
-        wedges = {(i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2 * self.size for i, j in pairs}
+        wedges = {
+            (i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2
+            * self.size
+            for i, j in pairs
+        }
         # (dt/dτ)² = (q,Aq)/det A, and T = ½Σ (q∧q̇)²_ij Π_{k≠i,j} I_k.
         rest = {(i, j): math.prod(_without(self.inverse, i, j)) for i, j in pairs}
         kinetic = sum((rest[pair] * wedges[pair] for pair in pairs), Fraction()) / 2
-        rate = sum((x / a for x, a in zip(self.q_squared, self.inverse, strict=True)), Fraction()) * math.prod(self.inverse)
-        parts = [[rate * wedges[i, j] / 2 * c for c in monic(_without(self.inverse, i, j))] for i, j in pairs]
+        rate = sum(
+            (x / a for x, a in zip(self.q_squared, self.inverse, strict=True)), Fraction()
+        ) * math.prod(self.inverse)
+        parts = [
+            [rate * wedges[i, j] / 2 * c for c in monic(_without(self.inverse, i, j))]
+            for i, j in pairs
+        ]
         conics = self.conics
         shifted = total([*parts, [kinetic * c for c in conics]])
         rest_of_v = remainder(list(self.polynomial), conics)
         for i, beta in enumerate(self.centrifugal):
             if beta:  # 1/(λ−I_i) mod U = (U(I_i) − U(λ))/((λ−I_i)U(I_i)), and U(I_i) = q_i²Φ'(I_i)
-                rest_of_v = total([rest_of_v, [beta / self.q_squared[i] * c for c in quotient(conics, self.inverse[i])]])
+                rest_of_v = total(
+                    [
+                        rest_of_v,
+                        [beta / self.q_squared[i] * c for c in quotient(conics, self.inverse[i])],
+                    ]
+                )
         return total([shifted[1:], rest_of_v])
 
     @cached_property
@@ -107,7 +132,9 @@ class SeparableStart:
         for i, beta in enumerate(self.centrifugal):
             if beta:
                 slope = math.prod(self.inverse[i] - x for x in _without(self.inverse, i))
-                parts.append([-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])])
+                parts.append(
+                    [-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])]
+                )
         return trim(total(parts))
 
     @property
@@ -117,21 +144,28 @@ class SeparableStart:
 
     @cached_property
     def apart(self) -> int:
-        """Return the digits that the nearest I's have in common: distances in their gap need as many more."""
+        """Return the digits that the nearest I's have in common: distances in their gap need as
+        many more.
+        """
         gap = min(y - x for x, y in itertools.pairwise(self.inverse))
         return len(str(int(self.inverse[-1] / gap)))
 
     def without(self, axis: int) -> SeparableStart:
-        """Return the start among the other axes, for a motion in the plane q_i = 0: T, and so V, in units of I_i.
+        """Return the start among the other axes, for a motion in the plane q_i = 0: T, and so V, in
+        units of I_i.
 
-        There one λ_s is I_i, and the divided difference v[λ_1 … λ_{n−1}] = V is that of (v(λ)−v(I_i))/(λ−I_i) at the others.
+        There one λ_s is I_i, and the divided difference v[λ_1 … λ_{n−1}] = V is that of
+        (v(λ)−v(I_i))/(λ−I_i) at the others.
         """
         own = self.inverse[axis]
         inverse, q, q_dot, walls = (
-            tuple(_without(values, axis)) for values in (self.inverse, self.q, self.q_dot, self.centrifugal)
+            tuple(_without(values, axis))
+            for values in (self.inverse, self.q, self.q_dot, self.centrifugal)
         )
         polynomial = tuple(c / own for c in quotient(list(self.polynomial), own))
-        return SeparableStart(inverse, q, q_dot, polynomial, tuple(beta / own for beta in walls), self.size)
+        return SeparableStart(
+            inverse, q, q_dot, polynomial, tuple(beta / own for beta in walls), self.size
+        )
 
     @cached_property
     def spheroconic(self) -> list[Fraction]:
@@ -140,7 +174,8 @@ class SeparableStart:
         while True:
             try:
                 with Decimals(digits) as arithmetic:
-                    poles, weights = arithmetic.array(self.inverse), arithmetic.array(self.q_squared)
+                    poles = arithmetic.array(self.inverse)
+                    weights = arithmetic.array(self.q_squared)
                     return [Fraction(x) for x in zeros_between_poles(poles, weights, 0, arithmetic)]
             except TooFewDigits:
                 digits *= 2
@@ -148,11 +183,14 @@ class SeparableStart:
 
 @dataclass(frozen=True)
 class SeparatedCut:
-    """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real roots of R next to them.
+    """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
+    roots of R next to them.
 
     ends a, b, exact: lower a · width b−a
-    left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the nearest first
-    pairs (…, 2) a−Re r, Im r of complex ones · leading |leading coefficient of R| · below, above: λ_s−a and b−λ_s at the start
+    left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the
+    nearest first
+    pairs (…, 2) a−Re r, Im r of complex ones · leading |leading coefficient of R| · below, above:
+    λ_s−a and b−λ_s at the start
     axes: the numbers of the I's that are a and b, None where an end is none
     """
 
@@ -170,7 +208,9 @@ class SeparatedCut:
     @cached_property
     def points(self) -> FourPoints:
         """Return the cut with its neighbours; λ = 0 is a root, so there always is one below."""
-        return FourPoints(DOUBLE, self.left[-1], self.width, self.right[0] if self.right.size else None)
+        return FourPoints(
+            DOUBLE, self.left[-1], self.width, self.right[0] if self.right.size else None
+        )
 
     def point(self, psi: Array) -> tuple[Array, Array]:
         """Return λ−a and b−λ at angles ψ."""
@@ -178,9 +218,12 @@ class SeparatedCut:
         return below * below, above * above
 
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
-        """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of many may be no float."""
+        """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
+        many may be no float.
+        """
         below, above = (x[..., None] for x in self.point(psi))
-        left, right = np.sqrt(below + self.left), np.sqrt(above + self.right)
+        left = np.sqrt(below + self.left)
+        right = np.sqrt(above + self.right)
         far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)
         complex_ones = np.prod(np.hypot(below + self.pairs[:, 0], self.pairs[:, 1]), axis=-1)
         near = left[..., -1] * (right[..., 0] if self.right.size else 1.0)
@@ -197,7 +240,9 @@ class SeparatedCut:
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Return increasing numbers, of which those that are equal, or nearly so, are drawn apart by 1e-30 of themselves."""
+    """Return increasing numbers, of which those that are equal, or nearly so, are drawn apart by
+    1e-30 of themselves.
+    """
     result = list(values)
     for i in range(1, len(result)):
         result[i] = max(result[i], result[i - 1] * (1 + _APART))
@@ -205,16 +250,20 @@ def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 
 class _Resting(Exception):
-    """A coordinate that rests at I_i, a double root of R with R ≤ 0 on both sides: q_i = 0 for good, to twenty digits."""
+    """A coordinate that rests at I_i, a double root of R with R ≤ 0 on both sides: q_i = 0 for
+    good, to twenty digits.
+    """
 
     def __init__(self, axis: int) -> None:
         self.axis = axis
 
 
 def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
-    """Return the start among the axes along which it moves, its cuts, and the numbers of these axes.
+    """Return the start among the axes along which it moves, its cuts, and the numbers of these
+    axes.
 
-    Raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``, ``at-rest``, ``beyond-floats``).
+    Raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``, ``at-rest``,
+    ``beyond-floats``).
     """
     axes = list(range(len(start.q)))
     still = [i for i, x in enumerate(start.q) if x == start.q_dot[i] == 0]
@@ -231,7 +280,9 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
 
 
 def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
-    """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as ``moving_axes`` has it."""
+    """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as
+    ``moving_axes`` has it.
+    """
     factor = start.factor
     found = roots(factor, start.apart)
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
@@ -241,43 +292,56 @@ def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     real = sorted([Fraction(0), *free, *single])
     pairs = [(x, y) for x, y in found if y > 0]
     R = [2 * c for c in product([Fraction(0), Fraction(1)], product(monic(free), factor))]
-    leading, far = abs(R[-1]), math.prod((max(Fraction(1), x * x + y * y) for x, y in found), start=Fraction(1))
+    leading = abs(R[-1])
+    far = math.prod((max(Fraction(1), x * x + y * y) for x, y in found), start=Fraction(1))
     if max(leading, 1 / leading, far) > _LARGEST:
         raise Unsolved("beyond-floats", "R leaves the range of a float; integrate numerically")
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
 
 
 def _cut(
-    start: SeparableStart, s: int, point: Fraction, real: list[Fraction], pairs: list[tuple[Fraction, Fraction]], R: Polynomial
+    start: SeparableStart,
+    s: int,
+    point: Fraction,
+    real: list[Fraction],
+    pairs: list[tuple[Fraction, Fraction]],
+    R: Polynomial,
 ) -> SeparatedCut:
-    low, high = start.inverse[s], start.inverse[s + 1]
+    low = start.inverse[s]
+    high = start.inverse[s + 1]
     marks = [x for x in real if low <= x <= high]
-    at = min(marks, key=lambda x: abs(x - point), default=point)  # without marks it runs into a plane either way
+    # without marks it runs into a plane either way
+    at = min(marks, key=lambda x: abs(x - point), default=point)
     names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
     if abs(at - point) > NEAR * (high - low):
-        lower, upper = max((x for x in marks if x < point), default=None), min((x for x in marks if x > point), default=None)
-    else:  # it starts at a turning point, and moves to where R > 0; where that is nowhere, it stays
+        lower = max((x for x in marks if x < point), default=None)
+        upper = min((x for x in marks if x > point), default=None)
+    else:
         point = at
-        before, after = max((x for x in marks if x < at), default=None), min((x for x in marks if x > at), default=None)
-        if value(R, (at + (high if after is None else after)) / 2) > 0:
-            lower, upper = at, after
-        elif value(R, (at + (low if before is None else before)) / 2) > 0:
-            lower, upper = before, at
-        elif at in names:
+        ends = _ends_from(at, marks, low, high, R)
+        if ends is None and at in names:
             raise _Resting(names[at])
-        else:
-            raise Unsolved("clustered-roots", "R has a double root: a coordinate rests there; integrate numerically")
+        if ends is None:
+            reason = "R has a double root: a coordinate rests there; integrate numerically"
+            raise Unsolved("clustered-roots", reason)
+        lower, upper = ends
     if lower is None or upper is None:
         wall = float(low if lower is None else high)
         raise Unsolved(
-            "collision", f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞; integrate numerically"
+            "collision",
+            f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞; "
+            "integrate numerically",
         )
     width = upper - lower
     others = list(real)
     others.remove(lower)
     others.remove(upper)
     if min(abs(x - end) for x in others for end in (lower, upper)) <= Fraction(_SEPARATRIX) * width:
-        raise Unsolved("separatrix", "a turning point is nearly a double root: the motion is asymptotic, or within 1e-12 of one")
+        raise Unsolved(
+            "separatrix",
+            "a turning point is nearly a double root: the motion is asymptotic, or within "
+            "1e-12 of one",
+        )
     return SeparatedCut(
         ends=(lower, upper),
         lower=float(lower),
@@ -290,6 +354,21 @@ def _cut(
         above=float(upper - point),
         axes=(names.get(lower), names.get(upper)),
     )
+
+
+def _ends_from(
+    at: Fraction, marks: list[Fraction], low: Fraction, high: Fraction, R: Polynomial
+) -> tuple[Fraction | None, Fraction | None] | None:
+    """Return the ends between which a coordinate moves that starts at a turning point: on the side
+    where R > 0; None where there is none. An end is None where no turning point bounds it.
+    """
+    before = max((x for x in marks if x < at), default=None)
+    after = min((x for x in marks if x > at), default=None)
+    if value(R, (at + (high if after is None else after)) / 2) > 0:
+        return at, after
+    if value(R, (at + (low if before is None else before)) / 2) > 0:
+        return before, at
+    return None
 
 
 def _without(values: Sequence[Fraction], *omitted: int) -> list[Fraction]:

@@ -1,4 +1,6 @@
-"""Motions in a separable potential in closed form: quadratures inverted in real angles, then position and velocity."""
+"""Motions in a separable potential in closed form: quadratures inverted in real angles, then
+position and velocity.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,12 @@ Array = NDArray[np.float64]
 
 
 class SeparableMotion:
-    """The motion of one start on its torus; elliptic angles φ_s as in SeparatedCut, of any sign, increasing in time.
+    """The motion of one start on its torus; elliptic angles φ_s as in SeparatedCut, of any sign,
+    increasing in time.
 
-    Axes along which nothing moves are left out of all but ``attitude``: ``start`` is the start among the others. Raises Unsolved
-    as ``moving_axes`` does, and where an angle series does not end.
+    Axes along which nothing moves are left out of all but ``attitude``: ``start`` is the start
+    among the others. Raises Unsolved as ``moving_axes`` does, and where an angle series does not
+    end.
     """
 
     def __init__(self, start: SeparableStart) -> None:
@@ -41,12 +45,16 @@ class SeparableMotion:
             for axis, lower in zip(cut.axes, (True, False), strict=True):
                 if axis is not None:
                     self._own[axis] = s, lower
-        self._signs = [self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))]
+        self._signs = [
+            self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))
+        ]
 
     def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
-        """Return the constant sign of q_i against its root, which passes zero upwards at a lower end, downwards at an upper.
+        """Return the constant sign of q_i against its root, which passes zero upwards at a lower
+        end, downwards at an upper.
 
-        Where λ_s is at that end to all its digits q_i counts as zero, and what it does next is what its velocity says.
+        Where λ_s is at that end to all its digits q_i counts as zero, and what it does next is what
+        its velocity says.
         """
         if axis not in self._own:
             return 1 if position > 0 else -1
@@ -62,7 +70,9 @@ class SeparableMotion:
         for s in range(g):
             for j in range(s + 1, g):
                 time_rate = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
-                distance = self.cuts[s].point(phi[:, s])[1] + time_rate + self.cuts[j].point(phi[:, j])[0]
+                distance = (
+                    self.cuts[s].point(phi[:, s])[1] + time_rate + self.cuts[j].point(phi[:, j])[0]
+                )
                 result[:, s, j] = result[:, j, s] = distance
         return result
 
@@ -77,75 +87,109 @@ class SeparableMotion:
         for s, cut in enumerate(self.cuts):
             below, above = cut.point(phi[:, s])
             for i, x in enumerate(self.start.inverse):
-                result[:, s, i] = below + float(cut.ends[0] - x) if i <= s else -(above + float(x - cut.ends[1]))
+                result[:, s, i] = (
+                    below + float(cut.ends[0] - x) if i <= s else -(above + float(x - cut.ends[1]))
+                )
         return result
 
     def attitude(self, phi: Array) -> Attitude:
-        """Return q and, as its normals, the unit tangents m_1 … m_g of the coordinate lines, with (q', m_s), at angles (N, g).
+        """Return q and, as its normals, the unit tangents m_1 … m_g of the coordinate lines, with
+        (q', m_s), at angles (N, g).
 
-        (m_s)_i = q_i y_s/(λ_s−I_i), y_s = √(|Φ(λ_s)|/Π_{j≠s}|λ_s−λ_j|); the root of a cut's own end carries a sign, so that all
-        are analytic in φ and change sign with φ_s → φ_s + 2π as they do in time. The last are axes along which nothing moves.
+        (m_s)_i = q_i y_s/(λ_s−I_i), y_s = √(|Φ(λ_s)|/Π_{j≠s}|λ_s−λ_j|); the root of a cut's own end
+        carries a sign, so that all are analytic in φ and change sign with φ_s → φ_s + 2π as they do
+        in time. The last are axes along which nothing moves.
         """
         offsets, ends, own, far, y_rest = self._roots(phi)
         scale = np.array([np.sqrt(np.prod([d for d in row if d])) for row in self._distances])
         q_rest = np.array(self._signs) * np.prod(far, axis=1) / scale
-        q, y = q_rest * np.prod(own, axis=1), y_rest * np.prod(own, axis=2)
+        q = q_rest * np.prod(own, axis=1)
+        y = y_rest * np.prod(own, axis=2)
         tangents = q[:, None, :] * y[:, :, None] / np.where(ends, 1.0, offsets)
-        for i, (s, lower) in self._own.items():  # the root stands in q_i and in y_s, and cancels the quotient
+        # the root stands in q_i and in y_s, and cancels the quotient
+        for i, (s, lower) in self._own.items():
             other = self.cuts[s].axes[1 if lower else 0]
             mate = own[:, s, other] if other is not None else 1.0
             tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
-        return self._among_all_axes(q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi))
+        return self._among_all_axes(
+            q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi)
+        )
 
     def _roots(self, phi: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Return λ_s−I_i; whether I_i is an end of cut s, (g, n); √|λ_s−I_i| there, signed, and elsewhere, 1 where not; y_s.
+        """Return λ_s−I_i; whether I_i is an end of cut s, (g, n); √|λ_s−I_i| there, signed, and
+        elsewhere, 1 where not; y_s.
 
         All are (N, g, n) but the second and y_s (N, g), which leaves out the signed roots.
         """
-        offsets, axes = self._offsets(phi), range(self._inverse.size)
-        ends = np.array([[self._own.get(i, (-1, True))[0] == s for i in axes] for s in range(len(self.cuts))])
+        offsets = self._offsets(phi)
+        axes = range(self._inverse.size)
+        ends = np.array(
+            [[self._own.get(i, (-1, True))[0] == s for i in axes] for s in range(len(self.cuts))]
+        )
         own = np.ones_like(offsets)
         for i, (s, lower) in self._own.items():
             own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
         far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
-        return offsets, ends, own, far, np.prod(far, axis=2) / np.sqrt(np.prod(self.differences(phi), axis=2))
+        return (
+            offsets,
+            ends,
+            own,
+            far,
+            np.prod(far, axis=2) / np.sqrt(np.prod(self.differences(phi), axis=2)),
+        )
 
     def _among_all_axes(self, q: Array, lines: Array, components: Array, points: Array) -> Attitude:
-        n, g, count = self._dimension, len(self.cuts), q.shape[0]
+        n = self._dimension
+        g = len(self.cuts)
+        count = q.shape[0]
         still = [i for i in range(n) if i not in self._axes]
-        position, normals, along = np.zeros((count, n)), np.zeros((count, n, n - 1)), np.zeros((count, n - 1))
+        position = np.zeros((count, n))
+        normals = np.zeros((count, n, n - 1))
+        along = np.zeros((count, n - 1))
         position[:, self._axes], normals[:, self._axes, :g], along[:, :g] = q, lines, components
         normals[:, still, range(g, n - 1)] = 1.0
         return Attitude(position, normals, along, points)
 
     def _components(self, phi: Array, y_rest: Array) -> Array:
-        """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of the ends that are I's."""
-        result, products = np.empty_like(phi), np.prod(self.differences(phi), axis=2)
+        """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of
+        the ends that are I's.
+        """
+        result = np.empty_like(phi)
+        products = np.prod(self.differences(phi), axis=2)
         for s, cut in enumerate(self.cuts):
             lower, upper = cut.points.roots(phi[:, s])
-            ends = (1.0 if cut.axes[0] is not None else lower) * (1.0 if cut.axes[1] is not None else upper)
+            ends = (1.0 if cut.axes[0] is not None else lower) * (
+                1.0 if cut.axes[1] is not None else upper
+            )
             result[:, s] = ends * cut.outer_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
         return result
 
     def turning(self, phi: Array) -> Array:
         """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
-        From A⁻¹m_s = λ_sm_s + σ_sq it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); σ_s = Σ I_iq_i²y_s/(λ_s−I_i) = −y_s, a product:
-        the sum has no digit left where I's are nearly equal. It is zero where m_2 is an axis.
+        From A⁻¹m_s = λ_sm_s + σ_sq it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); σ_s = Σ
+        I_iq_i²y_s/(λ_s−I_i) = −y_s, a product: the sum has no digit left where I's are nearly
+        equal. It is zero where m_2 is an axis.
         """
         if len(self.cuts) == 1:
             return np.zeros(phi.shape[0])
         _, _, own, _, y_rest = self._roots(phi)
-        y, along = y_rest * np.prod(own, axis=2), self._components(phi, y_rest)
+        y = y_rest * np.prod(own, axis=2)
+        along = self._components(phi, y_rest)
         return np.asarray(-np.sum(y * along[:, ::-1], axis=1) / self.differences(phi)[:, 0, 1])
 
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
-    """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)²."""
+    """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ
+    q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)².
+    """
     if cut.below == 0 or cut.above == 0:  # from an end there is one way, and λ_s may be I_i
         return float(cut.points.angle(cut.below, cut.above, True))
     point = start.spheroconic[s]
-    slope = sum((x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)), Fraction())
+    slope = sum(
+        (x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)),
+        Fraction(),
+    )
     return float(cut.points.angle(cut.below, cut.above, slope >= 0))
 
 
@@ -161,11 +205,20 @@ class SeparatedRate(TorusRate[SeparatedPeriods]):
 
     @cached_property
     def needed_nodes(self) -> tuple[int, ...]:
-        """Return, per cut, the number of coefficients of the forms or the weighted ones: √λ may make two of them many."""
+        """Return, per cut, the number of coefficients of the forms or the weighted ones: √λ may
+        make two of them many.
+        """
         periods = self.inversion.periods
-        weighted = (periods.cosine_coefficients(partial(self._weight_forms, s)) for s in range(periods.genus))
-        return tuple(max(a.shape[1], b.shape[1]) for a, b in zip(weighted, periods.cut_series, strict=True))
+        weighted = (
+            periods.cosine_coefficients(partial(self._weight_forms, s))
+            for s in range(periods.genus)
+        )
+        return tuple(
+            max(a.shape[1], b.shape[1]) for a, b in zip(weighted, periods.cut_series, strict=True)
+        )
 
     def _weight_forms(self, s: int, psi: Array) -> Array:
         periods = self.inversion.periods
-        return periods.forms(s, psi) * np.sqrt(periods.cuts[s].lower + periods.cuts[s].point(psi)[0])
+        return periods.forms(s, psi) * np.sqrt(
+            periods.cuts[s].lower + periods.cuts[s].point(psi)[0]
+        )

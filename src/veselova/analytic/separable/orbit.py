@@ -1,4 +1,6 @@
-"""One orbit of a separable motion: its clock, phases, and what rounding of them does to positions."""
+"""One orbit of a separable motion: its clock, phases, and what rounding of them does
+to positions.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +27,19 @@ __all__ = ["SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which the Fourier clock is cheaper, to genus three; and those that panels are willing to cover.
-_FOURIER_FROM, _FOURIER_GENUS = 10.0, 3
+#: Cycles from which the Fourier clock is cheaper, to genus three; and those that panels are willing
+#: to cover.
+_FOURIER_FROM = 10.0
+_FOURIER_GENUS = 3
 _MOST_CYCLES = 5e4
 
 #: An error above this leaves no digit.
 _NO_DIGIT = 0.1
 
 #: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
-_EVALUATION, _PHASE, _RATE = 16.0, 8.0, 4.0
+_EVALUATION = 16.0
+_PHASE = 8.0
+_RATE = 4.0
 
 #: Points at which steepness is sampled.
 _SAMPLES = 48
@@ -56,18 +62,30 @@ class SeparableOrbit:
         return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
     def time_map(self, grid: Array) -> TimeMap:
-        """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes too many panels."""
+        """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes
+        too many panels.
+        """
         if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
             return FourierTimeMap(self.rate, self.in_tau, self.in_time, self.rate.mean)
         self.require_panels(grid)
-        return ChebyshevTimeMap(lambda z: self.rate.at(self.inversion.invert(z)), self.rate.mean, self.in_tau, grid[0], grid[-1])
+        return ChebyshevTimeMap(
+            lambda z: self.rate.at(self.inversion.invert(z)),
+            self.rate.mean,
+            self.in_tau,
+            grid[0],
+            grid[-1],
+        )
 
     def require_panels(self, grid: Array) -> None:
-        """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are made."""
+        """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are
+        made.
+        """
         cycles = self._cycles(grid)
         if not cycles <= _MOST_CYCLES:
             raise Unsolved(
-                "too-far", f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to {_MOST_CYCLES:.0e}"
+                "too-far",
+                f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to "
+                f"{_MOST_CYCLES:.0e}",
             )
 
     def _cycles(self, grid: Array) -> float:
@@ -78,14 +96,19 @@ class SeparableOrbit:
         lost = grid[~(error <= _NO_DIGIT)]
         if lost.size:
             first = lost[np.argmin(np.abs(lost))]
-            raise Unsolved("no-digit-left", f"at t = {first:.6g} the error of phases in double precision reaches {_NO_DIGIT}")
+            raise Unsolved(
+                "no-digit-left",
+                f"at t = {first:.6g} the error of phases in double precision reaches {_NO_DIGIT}",
+            )
         return error
 
     def states(self, z: Array) -> tuple[Attitude, Array]:
         """Return positions and coordinate lines at phases (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
         phi = self.inversion.invert(z)
         at = self.motion.attitude(phi)
-        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[:, None]
+        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[
+            :, None
+        ]
 
     def details(self, time_map: TimeMap) -> dict[str, Any]:
         """Return what a trajectory's provenance says of the orbit."""
@@ -98,9 +121,13 @@ class SeparableOrbit:
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
     def sensitivity(self, values: Callable[[Attitude], Array]) -> Sensitivity:
-        """Return how fast numbers (N, …) of the attitudes change with the phases, and more between the sampled points."""
+        """Return how fast numbers (N, …) of the attitudes change with the phases, and more between
+        the sampled points.
+        """
         genus = self.motion.periods.genus
-        differences = Differences(self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus)))
+        differences = Differences(
+            self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus))
+        )
         at = self.motion.attitude(self.inversion.invert(differences.ends))
         return Sensitivity.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
 
@@ -111,18 +138,29 @@ class SeparableOrbit:
 
     def error(self, tau: Array, time_map: TimeMap, sensitivity: Sensitivity) -> tuple[Array, Array]:
         """Return a bound on the error of numbers of that steepness, (N,), and that of τ."""
-        rates, elapsed, rounding = np.abs(self.in_tau.rates), np.abs(tau), _RATE * DOUBLE.epsilon
+        rates = np.abs(self.in_tau.rates)
+        elapsed = np.abs(tau)
+        rounding = _RATE * DOUBLE.epsilon
         of_clock, drift = time_map.error(tau, self.start_rounding, rounding * rates)
         lag = (rounding + drift) * elapsed + of_clock
-        at_once = _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * sensitivity.together
-        return np.asarray(at_once + rounding * sensitivity.by_rates * elapsed + lag * sensitivity.along_flow), np.asarray(lag)
+        at_once = (
+            _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * sensitivity.together
+        )
+        return np.asarray(
+            at_once + rounding * sensitivity.by_rates * elapsed + lag * sensitivity.along_flow
+        ), np.asarray(lag)
 
     def integral_error(self, tau: Array, slopes: Array) -> Array:
-        """Return how far errors of the phases move an integral along the orbit, (N,), from its integrand's slopes in them, (g,).
+        """Return how far errors of the phases move an integral along the orbit, (N,), from its
+        integrand's slopes in them, (g,).
 
         They act in one sense for as long as the slowest phase takes for a radian, at most.
         """
-        rates, elapsed = np.abs(self.in_tau.rates), np.abs(tau)
+        rates = np.abs(self.in_tau.rates)
+        elapsed = np.abs(tau)
         acting = np.minimum(elapsed, 1 / np.min(rates))
-        moved = float(self.start_rounding @ slopes) + _RATE * DOUBLE.epsilon * float(rates @ slopes) * elapsed
+        moved = (
+            float(self.start_rounding @ slopes)
+            + _RATE * DOUBLE.epsilon * float(rates @ slopes) * elapsed
+        )
         return np.asarray(acting * moved)

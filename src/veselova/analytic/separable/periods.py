@@ -1,7 +1,7 @@
 """Periods and angle series of the differentials p_k dλ/(2√R) on the cuts of a separable motion.
 
-The sum over k points on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all the same a diffeomorphism of
-the torus (Liouville), and is inverted as in analytic.abel_jacobi.
+The sum over k points on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all
+the same a diffeomorphism of the torus (Liouville), and is inverted as in analytic.abel_jacobi.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ __all__ = ["SeparatedPeriods"]
 Array = NDArray[np.float64]
 
 #: Nodes to begin with, and where a cut is too near another root.
-_FEWEST_NODES, _MOST_NODES = 16, 8192
+_FEWEST_NODES = 16
+_MOST_NODES = 8192
 
 #: A series is complete when its last two coefficients are below this part of the largest.
 _RESOLVED = 1e-15
@@ -55,17 +56,26 @@ class SeparatedPeriods(AngleSeries):
 
     def points(self, phi: Array) -> Array:
         """Return λ_s at angles (N, g)."""
-        return np.stack([cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1)
+        return np.stack(
+            [cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1
+        )
 
     def forms(self, s: int, phi: Array) -> Array:
-        """Return du_k/dψ = ±p_k dλ/(2√R dψ) on cut s, shape (g, N): p_g = Π(λ−ζ_l) with ζ_l mid-gap, p_k = p_g/(λ−ζ_k)."""
-        g, cut = self.genus, self.cuts[s]
+        """Return du_k/dψ = ±p_k dλ/(2√R dψ) on cut s, shape (g, N): p_g = Π(λ−ζ_l) with ζ_l
+        mid-gap, p_k = p_g/(λ−ζ_k).
+        """
+        g = self.genus
+        cut = self.cuts[s]
         below, above = cut.point(phi)
         factors = []
         for l in range(g - 1):
             middle = (self.cuts[l].ends[1] + self.cuts[l + 1].ends[0]) / 2
             # λ−ζ_l from the end of the cut that faces the gap.
-            factors.append(below + float(cut.ends[0] - middle) if s > l else -(above + float(middle - cut.ends[1])))
+            factors.append(
+                below + float(cut.ends[0] - middle)
+                if s > l
+                else -(above + float(middle - cut.ends[1]))
+            )
         one = np.ones_like(phi)
         products = [np.prod([one, *factors[:k], *factors[k + 1 :]], axis=0) for k in range(g - 1)]
         products.append(np.prod([one, *factors], axis=0))
@@ -77,7 +87,8 @@ class SeparatedPeriods(AngleSeries):
         return tuple(self.cosine_coefficients(partial(self.forms, s)) for s in range(self.genus))
 
     def cosine_coefficients(self, function: Callable[[Array], Array]) -> Array:
-        """Return the cosine coefficients of even functions of an angle, (K, M), from their values (K, N) at angles (N,).
+        """Return the cosine coefficients of even functions of an angle, (K, M), from their values
+        (K, N) at angles (N,).
 
         Raises Unsolved where they do not fall to rounding.
         """
@@ -86,10 +97,15 @@ class SeparatedPeriods(AngleSeries):
             coefficients = self.arithmetic.cosine_series(function(self.arithmetic.nodes(count)))
             size = np.max(np.abs(coefficients), axis=1, keepdims=True)
             if np.all(np.abs(coefficients[:, -2:]) <= _RESOLVED * size):
-                significant = np.flatnonzero(np.any(np.abs(coefficients) > _RESOLVED / 4 * size, axis=0))
+                significant = np.flatnonzero(
+                    np.any(np.abs(coefficients) > _RESOLVED / 4 * size, axis=0)
+                )
                 return np.asarray(coefficients[:, : max(2, int(significant[-1]) + 2)])
             count *= 2
-        raise Unsolved("separatrix", "a turning point is nearly a double root: the series of its angle does not end")
+        raise Unsolved(
+            "separatrix",
+            "a turning point is nearly a double root: the series of its angle does not end",
+        )
 
     @cached_property
     def series_truncation(self) -> Array:

@@ -32,13 +32,17 @@ class PointMotion(Motion[SeparableVeselova]):
 
     @cached_property
     def _orbit(self) -> SeparableOrbit:
-        exact, betas = self.problem.exact, self.problem.potential[2]
+        exact = self.problem.exact
+        betas = self.problem.potential[2]
         inverse, q, v, walls = (
-            tuple(values[i] for i in self._order) for values in ([1 / a for a in exact.A], exact.q, exact.tangent, betas)
+            tuple(values[i] for i in self._order)
+            for values in ([1 / a for a in exact.A], exact.q, exact.tangent, betas)
         )
         size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableOrbit(SeparableStart(separate(inverse), q, v, self.problem.polynomial, walls, size))
+        return SeparableOrbit(
+            SeparableStart(separate(inverse), q, v, self.problem.polynomial, walls, size)
+        )
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
@@ -49,7 +53,9 @@ class PointMotion(Motion[SeparableVeselova]):
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
         at, velocity = orbit.states(z)
-        series = {name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))}
+        series = {
+            name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))
+        }
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
         error = orbit.require_digit(orbit.error(tau, time_map, self._sensitivity)[0], grid.doubles)
         return series, error, "angles", orbit.details(time_map)

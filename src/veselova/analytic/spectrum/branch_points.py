@@ -1,10 +1,13 @@
 """The two spectra that give the branch points, to as many digits as their differences ask for.
 
-I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1} at the start are the
-eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the components x_s of q' along the eigenvectors,
-c_1 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
-So they interlace by construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact rationals, and digits are
-added until every difference of neighbours has enough of its own: a gap of 1e-280 is as good as one of 0.1.
+I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1}
+at the start are the eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the
+components x_s of q' along the eigenvectors, c_1 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ)
+− xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
+So they interlace by construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact
+rationals, and digits are
+added until every difference of neighbours has enough of its own: a gap of 1e-280 is as good as one
+of 0.1.
 """
 
 from __future__ import annotations
@@ -30,23 +33,28 @@ __all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "
 #: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
 _InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
-#: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to hold their differences, and
-#: squares of roots of them.
+#: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to
+#: hold their differences, and squares of roots of them.
 COINCIDE = 290
 
-#: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by 1e-16) for the sums themselves.
+#: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by
+#: 1e-16) for the sums themselves.
 _SPARE = 12
 
-#: Sums can cancel to the square of the smallest coordinate: digits go to this many times what the widths ask for.
+#: Sums can cancel to the square of the smallest coordinate: digits go to this many times what the
+#: widths ask for.
 _MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate ``with spectrum.working()``.
+    """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate
+    ``with spectrum.working()``.
 
-    inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime = dq/dτ₁
-    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · clock_rate dτ₁/d(time) there
+    inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime =
+    dq/dτ₁
+    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · clock_rate dτ₁/d(time)
+    there
     """
 
     arithmetic: Arithmetic | Decimals
@@ -59,19 +67,36 @@ class Spectrum:
 
     def in_arithmetic(self, arithmetic: Arithmetic) -> Spectrum:
         """Return the spectrum in another arithmetic."""
-        values = map(arithmetic.array, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic))
+        values = map(
+            arithmetic.array, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic)
+        )
         inverse, q, q_prime, constants, spheroconic = values
-        return Spectrum(arithmetic, inverse, q, q_prime, constants, spheroconic, arithmetic.number(self.time_rate))
+        return Spectrum(
+            arithmetic,
+            inverse,
+            q,
+            q_prime,
+            constants,
+            spheroconic,
+            arithmetic.number(self.time_rate),
+        )
 
     def working(self) -> AbstractContextManager[object]:
-        """Return the context in which operators keep the digits of decimals; other numbers keep theirs by themselves, or in that
-        of their arithmetic."""
-        return Decimals(self.arithmetic.digits) if isinstance(self.arithmetic, Decimals) else nullcontext()
+        """Return the context in which operators keep the digits of decimals; other numbers keep
+        theirs by themselves, or in that of their arithmetic.
+        """
+        return (
+            Decimals(self.arithmetic.digits)
+            if isinstance(self.arithmetic, Decimals)
+            else nullcontext()
+        )
 
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
         """Return (value, kind, index), increasing."""
-        labelled: list[tuple[Any, Literal["I", "c"], int]] = [(c, "c", k) for k, c in enumerate(self.constants)]
+        labelled: list[tuple[Any, Literal["I", "c"], int]] = [
+            (c, "c", k) for k, c in enumerate(self.constants)
+        ]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
         return sorted(labelled, key=lambda item: item[:2])
 
@@ -85,7 +110,9 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Resolved:
-    """The spectrum of a start without coincidences; ``separatrices`` are the axes i (sorted) where c_k = I_i had to be opened."""
+    """The spectrum of a start without coincidences; ``separatrices`` are the axes i (sorted) where
+    c_k = I_i had to be opened.
+    """
 
     moving: Moving
     spectrum: Spectrum
@@ -93,42 +120,57 @@ class Resolved:
 
 
 def resolve_spectrum(
-    moving: Moving, digits: int, distance: Fraction | None = None, beyond: int = 0, coincide: int = COINCIDE
+    moving: Moving,
+    digits: int,
+    distance: Fraction | None = None,
+    beyond: int = 0,
+    coincide: int = COINCIDE,
 ) -> Resolved:
     """Return the spectrum in which every interval is open and known to twice ``digits``.
 
-    Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by ``distance`` where that is
-    given. Where I_i = c_k is an end of a closed cut, or of a gap and less than the root of 10^−``coincide`` of the rest moves
-    along its direction, or of 10^−20 times the opening squared, the direction is frozen; at a gap that is a separatrix to all
-    digits.
+    Coincidences are opened by moving the start by 10^(−2·digits−10−beyond), on a separatrix by
+    ``distance`` where that is given. Where I_i = c_k is an end of a closed cut, or of a gap and
+    less than the root of 10^−``coincide`` of the rest moves along its direction, or of 10^−20 times
+    the opening squared, the direction is frozen; at a gap that is a separatrix to all digits.
 
-    Raises Unsolved: ``beyond-floats`` where the least I is no larger than that part of the others, or |q'|² than their inverse
-    part; ``at-rest`` where one direction alone is left, beside a stable equilibrium of Neumann's system.
+    Raises Unsolved: ``beyond-floats`` where the least I is no larger than that part of the others,
+    or |q'|² than their inverse part; ``at-rest`` where one direction alone is left, beside a stable
+    equilibrium of Neumann's system.
     """
     exponent = 2 * digits + 10 + beyond
-    opening, coinciding = Fraction(1, 10**exponent), max(coincide, 2 * exponent + 20)
+    opening = Fraction(1, 10**exponent)
+    coinciding = max(coincide, 2 * exponent + 20)
     # Between A's nearer than that, a cut that closes would not say that a direction hardly moves.
     moving = moving.separate(opening, Fraction(1, 10 ** (coinciding // 2)))
-    separatrices, coincident = set[int](), set[int]()
+    separatrices = set[int]()
+    coincident = set[int]()
     while True:
         if moving.size < 2:
             raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
         found = spectrum(moving, digits, coinciding)
         threshold = Decimal((0, (1,), -coinciding))
-        if found.widths[0] > Decimal((0, (1,), coinciding)):  # a comparison, unlike a product, asks no context
-            raise Unsolved("beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I")
+        # a comparison, unlike a product, asks no context
+        if found.widths[0] > Decimal((0, (1,), coinciding)):
+            raise Unsolved(
+                "beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I"
+            )
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | coincident)))
-        j, ends = closed[0], found.branch_points[closed[0] : closed[0] + 2]
-        if j == 0 and moving.time != "tau1":  # between c_1 = 0 and the least I, which is no separatrix
-            raise Unsolved("beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}")
+        j = closed[0]
+        ends = found.branch_points[closed[0] : closed[0] + 2]
+        # between c_1 = 0 and the least I, which is no separatrix
+        if j == 0 and moving.time != "tau1":
+            raise Unsolved(
+                "beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}"
+            )
         axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.perturb(0, opening)
         elif j % 2 == 1:
             moving = moving.without(axis)
-        elif moving.hardly_moves(axis, Fraction(1, 10**coinciding)):  # across it the motion is not stable
+        elif moving.hardly_moves(axis, Fraction(1, 10**coinciding)):
+            # across it the motion is not stable
             coincident.add(moving.axes[axis])
             leaves_one = distance is None and moving.size == 2  # an unstable equilibrium is no rest
             apart = opening if leaves_one else distance
@@ -141,14 +183,17 @@ def resolve_spectrum(
 
 
 def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectrum:
-    """Return the spectra of what moves with enough digits for all differences of neighbours above 10^−coinciding."""
+    """Return the spectra of what moves with enough digits for all differences of neighbours above
+    10^−coinciding.
+    """
     wanted = 2 * digits + _SPARE
     most = wanted + coinciding
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
         found = _values(moving, working, digits)
         narrowest = _narrowest(found, working) if found is not None else Decimal(0)
-        known = narrowest >= Decimal((0, (1,), _SPARE - working))  # otherwise nothing can be said of it but that it is small
+        # otherwise nothing can be said of it but that it is small
+        known = narrowest >= Decimal((0, (1,), _SPARE - working))
         needed = wanted - narrowest.adjusted() if known else 2 * working
         if found is not None and working >= min(needed, most):
             return Spectrum(Decimals(working), *found)
@@ -171,7 +216,9 @@ def _digits_between(moving: Moving) -> int:
 
 
 def _digits_of_speed(moving: Moving) -> int:
-    """Return how many digits |q'|² has before the point, in units of the largest I, where it is given: c_1 is as large."""
+    """Return how many digits |q'|² has before the point, in units of the largest I, where it is
+    given: c_1 is as large.
+    """
     if moving.time != "tau1":
         return 0
     square = sum(moving.v_squared, Fraction()) * moving.unit / sum(moving.q_squared, Fraction())
@@ -179,7 +226,8 @@ def _digits_of_speed(moving: Moving) -> int:
 
 
 def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
-    """Return the values of the spectra with ``working`` digits, of which c_1 = 0 is to come out to ``digits``.
+    """Return the values of the spectra with ``working`` digits, of which c_1 = 0 is to come out to
+    ``digits``.
 
     None where they are too few for that, or for iterations to settle.
     """
@@ -194,7 +242,8 @@ def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
         except TooFewDigits:
             return None
         if moving.time == "tau1":
-            # All eigenvalues add up to the trace; none but the lowest is missing, and none at all where q' = 0.
+            # All eigenvalues add up to the trace; none but the lowest is missing, and none at all
+            # where q' = 0.
             rest = np.sum(spheroconic) - np.sum(along * along) - sum(constants)
             constants = sorted([rest, *constants]) if len(constants) < len(points) else constants
         elif abs(1 - (along * along / spheroconic).sum()) > Decimal((0, (1,), -digits)):
@@ -205,27 +254,39 @@ def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:
-    """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until roots are taken.
+    """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until
+    roots are taken.
 
-    With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose tangent is along Aw, (dτ₁/ds)²
-    = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q| = 1. Call it ``with`` the arithmetic.
+    With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose
+    tangent is along Aw, (dτ₁/ds)² = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q|
+    = 1. Call it ``with`` the arithmetic.
     """
     # Over common denominators: sums of fractions would look for common factors at every step.
     A, A_unit = _over_common(moving.A)
     squares, square_unit = _over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
     m = moving.size
-    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
-    qq, along = sum(q2), sum(qv)
+    q2 = squares[:m]
+    v2 = squares[m : 2 * m]
+    qv = squares[2 * m :]
+    qq = sum(q2)
+    along = sum(qv)
     qAq, vAv, qAv = (sum(a * x for a, x in zip(A, values, strict=True)) for values in (q2, v2, qv))
-    speed = 1 / moving.unit if moving.time == "tau1" else Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
+    speed = (
+        1 / moving.unit
+        if moving.time == "tau1"
+        else Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
+    )
     rate = speed
     if moving.time == "s":
         terms = zip(A, q2, v2, qv, strict=True)
-        scaled = (a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms)
+        scaled = (
+            a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms
+        )
         rate = speed * Fraction(qAq**3 * A_unit * square_unit, qq * sum(scaled)) / moving.unit
     q = arithmetic.sqrt(arithmetic.array([_quotient(x, qq, arithmetic) for x in q2]))
     v = [
-        _quotient(x * qq - along * own, qq * square_unit, arithmetic) / arithmetic.sqrt(_quotient(own, square_unit, arithmetic))
+        _quotient(x * qq - along * own, qq * square_unit, arithmetic)
+        / arithmetic.sqrt(_quotient(own, square_unit, arithmetic))
         if own
         else arithmetic.sqrt(_quotient(other, square_unit, arithmetic))
         for own, other, x in zip(q2, v2, qv, strict=True)
@@ -250,8 +311,12 @@ def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
     return arithmetic.sqrt(arithmetic.number(value))
 
 
-def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Decimals) -> list[Any]:
-    """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or too small for the digits)."""
+def _components(
+    q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Decimals
+) -> list[Any]:
+    """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or
+    too small for the digits).
+    """
     on_plane = {I: i for i, I in enumerate(inverse) if not q[i] > 0}
     live = {I: i for i, I in enumerate(inverse) if q[i] > 0}
     components = []
@@ -262,5 +327,7 @@ def _components(q: Values, v: Values, inverse: Values, points: list[Any], arithm
             components.append(v[live[point]])
         else:
             row = [(q[i] / (point - I), v[i]) for I, i in live.items()]
-            components.append(sum(x * y for x, y in row) / arithmetic.sqrt(sum(x * x for x, _ in row)))
+            components.append(
+                sum(x * y for x, y in row) / arithmetic.sqrt(sum(x * x for x, _ in row))
+            )
     return components

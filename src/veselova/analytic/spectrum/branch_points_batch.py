@@ -1,7 +1,9 @@
-"""The spectra of many starts of one dimension at once, with thirty digits: what analytic.spectrum finds for one with any number.
+"""The spectra of many starts of one dimension at once, with thirty digits: what analytic.spectrum
+finds for one with any number.
 
-Only starts with all A's apart and no q_i = 0 are of this kind, and of those the ones whose differences of branch points keep
-fifteen digits; the others are marked, and left to analytic.spectrum.
+Only starts with all A's apart and no q_i = 0 are of this kind, and of those the ones whose
+differences of branch points keep fifteen digits; the others are marked, and left to
+analytic.spectrum.
 """
 
 from __future__ import annotations
@@ -26,9 +28,12 @@ _CONTRADICTION = 1e-18
 class Spectra:
     """The spectra of N starts, in units of the largest I of each.
 
-    axes (N, n) the body axes by decreasing A · unit (N,) the least A, which counts as 1 · energy (N,) h
-    inverse (N, n) the I's, the last one 1 · constants (N, n−1) c_1 = 0 … c_{n−1} · spheroconic (N, n−1) λ's at the start
-    increasing (N, n−1) whether they increase there · clock_rate (N,) dτ₁/dt there · known (N,) which starts are of this kind
+    axes (N, n) the body axes by decreasing A · unit (N,) the least A, which counts as 1 · energy
+    (N,) h
+    inverse (N, n) the I's, the last one 1 · constants (N, n−1) c_1 = 0 … c_{n−1} · spheroconic (N,
+    n−1) λ's at the start
+    increasing (N, n−1) whether they increase there · clock_rate (N,) dτ₁/dt there · known (N,)
+    which starts are of this kind
     """
 
     axes: NDArray[np.intp]
@@ -43,14 +48,18 @@ class Spectra:
 
     @classmethod
     def of(cls, A: Array, q: Array, q_dot: Array) -> Spectra:
-        """Return the spectra of starts (N, n) each, exact as they stand; q needs no length, and q̇ may have a part along q."""
+        """Return the spectra of starts (N, n) each, exact as they stand; q needs no length, and q̇
+        may have a part along q.
+        """
         axes = np.argsort(-A, axis=1, kind="stable")
         A, q, q_dot = (np.take_along_axis(x, axes, axis=1) for x in (A, q, q_dot))
         with np.errstate(all="ignore"):  # what is no number is not known
             return cls._of_sorted(axes, A, DoubleDouble.of(q), DoubleDouble.of(q_dot))
 
     @classmethod
-    def _of_sorted(cls, axes: NDArray[np.intp], A: Array, position: DoubleDouble, velocity: DoubleDouble) -> Spectra:
+    def _of_sorted(
+        cls, axes: NDArray[np.intp], A: Array, position: DoubleDouble, velocity: DoubleDouble
+    ) -> Spectra:
         unit = A[:, -1:]
         size = (position * position).total()
         velocity = velocity - position * ((position * velocity).total() / size)[:, None]
@@ -60,11 +69,14 @@ class Spectra:
         sliding = velocity - position * ((scaled * position * velocity).total() / weight)[:, None]
         speed = (scaled * sliding * sliding).total()
         rate = speed.sqrt()
-        position, velocity = position / size.sqrt()[:, None], velocity / rate[:, None]
+        position = position / size.sqrt()[:, None]
+        velocity = velocity / rate[:, None]
         inverse = DoubleDouble.of(unit) / A
         spheroconic, found = zeros_of_many(inverse, position * position, 0)
         rows = [position / (spheroconic[:, s, None] - inverse) for s in range(A.shape[1] - 1)]
-        along = stack_double_doubles([(row * velocity).total() / (row * row).total().sqrt() for row in rows])
+        along = stack_double_doubles(
+            [(row * velocity).total() / (row * row).total().sqrt() for row in rows]
+        )
         squares = along * along
         others, converged = zeros_of_many(spheroconic, squares, 1)
         excess = np.abs(((squares / spheroconic).total() - 1).high)
@@ -83,7 +95,9 @@ class Spectra:
 
 
 def _energy(speed: DoubleDouble, weight: DoubleDouble, A: Array) -> Array:
-    """Return h = (dτ₁/dt)² (q,Aq)/(2 det A), equation (4.6), from the speed and (q,Aq) for |q| = 1."""
+    """Return h = (dτ₁/dt)² (q,Aq)/(2 det A), equation (4.6), from the speed and
+    (q,Aq) for |q| = 1.
+    """
     energy = speed * weight / 2.0
     for i in range(A.shape[1]):
         energy = energy / A[:, i]

@@ -1,9 +1,11 @@
-"""What of a start moves, in exact rationals: frozen directions are dropped, equal A's turned, coincidences opened.
+"""What of a start moves, in exact rationals: frozen directions are dropped, equal A's turned,
+coincidences opened.
 
-A coordinate with q_i = q̇_i = 0 stays zero for ever (there c_k = λ_s = I_i: a closed cut). Inside a group of equal A's the
-motion stays in the span of q and q̇ there: a turn of the axes leaves at most two moving coordinates. What is left may still
-have coinciding branch points, I_i = I_{i+1} or c_k = I_i or c_k = c_{k+1}; a start moved by far less than any digit asked
-for has none, and its motion is the same to all of them (on a separatrix, for as long as the digits of the data last).
+A coordinate with q_i = q̇_i = 0 stays zero for ever (there c_k = λ_s = I_i: a closed cut). Inside a
+group of equal A's the motion stays in the span of q and q̇ there: a turn of the axes leaves at most
+two moving coordinates. What is left may still have coinciding branch points, I_i = I_{i+1} or c_k =
+I_i or c_k = c_{k+1}; a start moved by far less than any digit asked for has none, and its motion is
+the same to all of them (on a separatrix, for as long as the digits of the data last).
 """
 
 from __future__ import annotations
@@ -28,14 +30,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Moving:
-    """A start along its m moving directions, sorted by decreasing A; exact, with A in units of its smallest entry.
+    """A start along its m moving directions, sorted by decreasing A; exact, with A in units of its
+    smallest entry.
 
-    A (m,) · q_squared, v_squared, qv (m,): q_a², q̇_a², q_aq̇_a; q_a ≥ 0, and q̇_a > 0 where q_a = 0, by choice of the directions
-    vectors (m,) orthogonal vectors, of any length, as {principal axis: component} · n the number of principal axes
+    A (m,) · q_squared, v_squared, qv (m,): q_a², q̇_a², q_aq̇_a; q_a ≥ 0, and q̇_a > 0 where q_a =
+    0, by choice of the directions
+    vectors (m,) orthogonal vectors, of any length, as {principal axis: component} · n the number of
+    principal axes
     axes (m,) the principal axis of each, or the first of its group · unit: the A that counts as 1
     frozen: the A's of the directions that do not move, in the problem's units
     turned: whether a group of equal A's has two moving directions
-    time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and c_1 need not be zero
+    time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and c_1 need
+    not be zero
     """
 
     A: tuple[Fraction, ...]
@@ -65,15 +71,20 @@ class Moving:
 
     @cached_property
     def rate_variation(self) -> float:
-        """Return by how much dt/dτ₁ may vary at most: it goes like the root of (q,Aq) for t, and like 1/(q,Aq) for s."""
+        """Return by how much dt/dτ₁ may vary at most: it goes like the root of (q,Aq) for t, and
+        like 1/(q,Aq) for s.
+        """
         power = {"t": 0.5, "s": 1.0, "tau1": 0.0}[self.time]
         return math.exp(power * (math.log(self.A[0].numerator) - math.log(self.A[0].denominator)))
 
     def separate(self, distance: Fraction, closeness: Fraction) -> Moving:
-        """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by ``distance``."""
+        """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by
+        ``distance``.
+        """
         A = list(self.A)
         for i in range(1, len(A)):
-            if A[i] > A[i - 1] * (1 - closeness):  # or above it, where the one before has just moved
+            # or above it, where the one before has just moved
+            if A[i] > A[i - 1] * (1 - closeness):
                 A[i] = A[i - 1] * (1 - distance)
         if tuple(A) == self.A:
             return self
@@ -81,8 +92,11 @@ class Moving:
         return replace(self, A=tuple(a / unit for a in A), unit=self.unit * unit)
 
     def hardly_moves(self, axis: int, share: Fraction) -> bool:
-        """Return whether q_i and q̇_i are both below √share of |q| and |q̇|, or of |q|√I where q̇ is Neumann's and may vanish."""
-        q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
+        """Return whether q_i and q̇_i are both below √share of |q| and |q̇|, or of |q|√I where q̇
+        is Neumann's and may vanish.
+        """
+        q_total = sum(self.q_squared, Fraction())
+        v_total = sum(self.v_squared, Fraction())
         if self.time == "tau1":
             v_total += q_total / self.unit
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
@@ -90,13 +104,23 @@ class Moving:
     @property
     def least_share(self) -> Fraction:
         """Return the least part that a direction has in |q|² or |q̇|², whichever is larger."""
-        q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
-        return min(max(q / q_total, v / v_total) for q, v in zip(self.q_squared, self.v_squared, strict=True))
+        q_total = sum(self.q_squared, Fraction())
+        v_total = sum(self.v_squared, Fraction())
+        return min(
+            max(q / q_total, v / v_total)
+            for q, v in zip(self.q_squared, self.v_squared, strict=True)
+        )
 
     def lift_axis(self, axis: int, distance: Fraction) -> Moving:
-        """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much for a negative distance."""
-        q_squared, qv = list(self.q_squared), list(self.qv)
-        q_squared[axis], qv[axis] = max(distance, -2 * distance) ** 2 * sum(q_squared, Fraction()), Fraction()
+        """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much
+        for a negative distance.
+        """
+        q_squared = list(self.q_squared)
+        qv = list(self.qv)
+        q_squared[axis], qv[axis] = (
+            max(distance, -2 * distance) ** 2 * sum(q_squared, Fraction()),
+            Fraction(),
+        )
         v_squared = [v if i != axis else Fraction() for i, v in enumerate(self.v_squared)]
         return replace(self, q_squared=tuple(q_squared), v_squared=tuple(v_squared), qv=tuple(qv))
 
@@ -117,12 +141,18 @@ class Moving:
         )
 
     def perturb(self, axis: int, distance: Fraction) -> Moving:
-        """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇| where it is smaller than that.
+        """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇|
+        where it is smaller than that.
 
-        Where q̇ is Neumann's q' it is scaled in place of q_i: alone on its axis, q is a unit vector whatever its scale.
+        Where q̇ is Neumann's q' it is scaled in place of q_i: alone on its axis, q is a unit vector
+        whatever its scale.
         """
-        q_squared, qv, vectors = list(self.q_squared), list(self.qv), list(self.vectors)
-        square, product, v_squared = q_squared[axis], qv[axis], self.v_squared[axis]
+        q_squared = list(self.q_squared)
+        qv = list(self.qv)
+        vectors = list(self.vectors)
+        square = q_squared[axis]
+        product = qv[axis]
+        v_squared = self.v_squared[axis]
         if square >= distance**2 * sum(q_squared, Fraction()):
             if self.time == "tau1":
                 v_scaled = tuple(v * (1 + distance) ** 2 for v in self.v_squared)
@@ -130,19 +160,27 @@ class Moving:
             q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
         else:
             s = distance / _near_root(sum(self.v_squared, Fraction()))
-            q_squared[axis], qv[axis] = square + 2 * s * product + s * s * v_squared, product + s * v_squared
-            if (square + s * product if square else s) < 0:  # q_i keeps its sign by the choice of the direction
+            q_squared[axis], qv[axis] = (
+                square + 2 * s * product + s * s * v_squared,
+                product + s * v_squared,
+            )
+            # q_i keeps its sign by the choice of the direction
+            if (square + s * product if square else s) < 0:
                 vectors[axis] = {i: -x for i, x in vectors[axis].items()}
         return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), vectors=tuple(vectors))
 
 
 def moving_part(problem: TorusProblem) -> Moving:
-    """Return what moves of a problem that moves: at least two directions, and no more than two for any value of A."""
+    """Return what moves of a problem that moves: at least two directions, and no more than two for
+    any value of A.
+    """
     exact = problem.exact
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
         groups.setdefault(a, []).append(i)
-    selected: list[tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]] = []
+    selected: list[
+        tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]
+    ] = []
     frozen: list[Fraction] = []
     for a in sorted(groups, reverse=True):
         axes = groups[a]
@@ -169,16 +207,27 @@ def moving_part(problem: TorusProblem) -> Moving:
 def _rotate_group(
     q: Sequence[Fraction], velocity: Sequence[Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]]:
-    """Return (q², q̇², qq̇) and a vector along each moving direction of one group: q first, then q̇ across it."""
+    """Return (q², q̇², qq̇) and a vector along each moving direction of one group: q first, then q̇
+    across it.
+    """
     if len(q) == 1 and q[0]:
         return [((q[0] * q[0], velocity[0] * velocity[0], q[0] * velocity[0]), q)]
-    qq, qv, vv = _dot(q, q), _dot(q, velocity), _dot(velocity, velocity)
+    qq = _dot(q, q)
+    qv = _dot(q, velocity)
+    vv = _dot(velocity, velocity)
     zero = Fraction()
     if qq == 0:
         return [((zero, vv, zero), velocity)] if vv else []
-    rotated: list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]] = [((qq, qv * qv / qq, qv), q)]
+    rotated: list[tuple[tuple[Fraction, Fraction, Fraction], Sequence[Fraction]]] = [
+        ((qq, qv * qv / qq, qv), q)
+    ]
     if vv * qq != qv * qv:
-        rotated.append(((zero, vv - qv * qv / qq, zero), [qq * d - qv * x for x, d in zip(q, velocity, strict=True)]))
+        rotated.append(
+            (
+                (zero, vv - qv * qv / qq, zero),
+                [qq * d - qv * x for x, d in zip(q, velocity, strict=True)],
+            )
+        )
     return rotated
 
 

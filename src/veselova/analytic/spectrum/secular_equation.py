@@ -1,6 +1,8 @@
-"""Zeros of secular functions f(x) = κ + Σ w_i/(x−p_i), w_i ≥ 0: one between each two neighbouring poles, O(m) a step.
+"""Zeros of secular functions f(x) = κ + Σ w_i/(x−p_i), w_i ≥ 0: one between each two neighbouring
+poles, O(m) a step.
 
-For one function, in as many digits as it takes, or for many at once: in doubles, then twice as many digits by Newton's method.
+For one function, in as many digits as it takes, or for many at once: in doubles, then twice as many
+digits by Newton's method.
 """
 
 from __future__ import annotations
@@ -28,30 +30,40 @@ _LEAST_PART = Decimal("1e-30")
 #: A bracket over more than this is not one in which Newton's method converges quadratically.
 _WIDE_BRACKET = 1000
 
-#: Newton's method that changes less than this part of the distance converges, however wide the bracket.
+#: Newton's method that changes less than this part of the distance converges, however wide the
+#: bracket.
 _CONVERGING = Decimal("1e-3")
 
-#: Iterations settle at this relative change, or at so many roundings; from there every plain Newton step doubles the digits.
-_SETTLED, _SETTLED_DIGITS = Decimal("1e-300"), 300
+#: Iterations settle at this relative change, or at so many roundings; from there every plain Newton
+#: step doubles the digits.
+_SETTLED = Decimal("1e-300")
+_SETTLED_DIGITS = 300
 _ROUNDINGS = 4
 
 #: Steps in doubles for many functions at once; one that has not settled by then goes its own way.
 _FEW_STEPS = 40
 
-#: Steps with twice the digits: from eight digits to sixteen to all, and one that shows that they are.
+#: Steps with twice the digits: from eight digits to sixteen to all, and one that shows that they
+#: are.
 _FINE_STEPS = 3
 _FINE_SETTLED = 1e-25
 
 
 class TooFewDigits(Exception):
-    """The sums cancel below the digits of the arithmetic, so that an iteration does not settle: ask again with more."""
+    """The sums cancel below the digits of the arithmetic, so that an iteration does not settle: ask
+    again with more.
+    """
 
 
-def zeros_between_poles(poles: Values, weights: Values, constant: int, arithmetic: Decimals) -> list[Any]:
-    """Return the zeros of f between increasing poles and the poles of weight zero, all increasing: m−1 numbers for m poles.
+def zeros_between_poles(
+    poles: Values, weights: Values, constant: int, arithmetic: Decimals
+) -> list[Any]:
+    """Return the zeros of f between increasing poles and the poles of weight zero, all increasing:
+    m−1 numbers for m poles.
 
-    They are the eigenvalues of diag(p) restricted to √w⊥ (κ = 0), or those of diag(p) − √w√wᵀ but the lowest (κ = 1), to
-    the digits of ``arithmetic`` relative to the largest pole; call it ``with`` that. Raises TooFewDigits.
+    They are the eigenvalues of diag(p) restricted to √w⊥ (κ = 0), or those of diag(p) − √w√wᵀ but
+    the lowest (κ = 1), to the digits of ``arithmetic`` relative to the largest pole; call it
+    ``with`` that. Raises TooFewDigits.
     """
     live = [(p, w) for p, w in zip(poles, weights, strict=True) if w > 0]
     zeros = [p for p, w in zip(poles, weights, strict=True) if not w > 0]
@@ -74,25 +86,38 @@ def _zero(live: list[tuple[Any, Any]], a: int, constant: int, arithmetic: Decima
 def _scaled_secular(
     near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: Any, width: Any, own: Any
 ) -> tuple[Any, Any]:
-    """Return δ(width−δ) h(δ) and its derivative, h = κ + Σ_near w/(d+δ) − Σ_far w/(d+width−δ); both lists start at d = 0.
+    """Return δ(width−δ) h(δ) and its derivative, h = κ + Σ_near w/(d+δ) − Σ_far w/(d+width−δ); both
+    lists start at d = 0.
 
     All distances are sums of positive terms, and the product has no pole on [0, width].
     """
     other = width - own
-    rest, slope = 0 * own + constant, 0 * own
+    rest = 0 * own + constant
+    slope = 0 * own
     for distances, sign, to_end in ((near, 1, own), (far, -1, other)):
         for distance, weight in distances[1:]:
             inverse = 1 / (distance + to_end)
             term = weight * inverse
-            rest, slope = rest + sign * term, slope - term * inverse
-    near_weight, far_weight = near[0][1], far[0][1]
+            rest = rest + sign * term
+            slope = slope - term * inverse
+    near_weight = near[0][1]
+    far_weight = far[0][1]
     value = near_weight * other - far_weight * own + own * other * rest
     return value, (other - own) * rest + own * other * slope - near_weight - far_weight
 
 
-def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant: int, width: Any, arithmetic: Decimals) -> Any:
-    """Return the zero δ of h in (0, width/2] to the digits of the arithmetic relative to itself: bracketed Newton steps."""
-    least, most = 0 * width, width / 2
+def _distance(
+    near: list[tuple[Any, Any]],
+    far: list[tuple[Any, Any]],
+    constant: int,
+    width: Any,
+    arithmetic: Decimals,
+) -> Any:
+    """Return the zero δ of h in (0, width/2] to the digits of the arithmetic relative to itself:
+    bracketed Newton steps.
+    """
+    least = 0 * width
+    most = width / 2
     own = width * near[0][1] / (near[0][1] + far[0][1])
     own = min(own, most)
     for step in range(_MOST_STEPS):
@@ -101,11 +126,13 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
             return own
         least, most = (own, most) if value > 0 else (least, own)
         new = own - value / derivative if derivative < 0 else 2 * most
-        # Towards a nearly double zero at the pole Newton's method only halves the distance, which may be 1e-300.
+        # Towards a nearly double zero at the pole Newton's method only halves the distance, which
+        # may be 1e-300.
         slow = step % 4 == 3 and most > _WIDE_BRACKET * least and abs(new - own) > _CONVERGING * own
         if slow or not (least <= new <= most and new > 0):
             new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
-        change, own = abs(new - own), new
+        change = abs(new - own)
+        own = new
         if change <= _ROUNDINGS * max(arithmetic.epsilon, _SETTLED) * own:
             for _ in range(math.ceil(math.log2(max(1.0, arithmetic.digits / _SETTLED_DIGITS)))):
                 value, derivative = _scaled_secular(near, far, constant, width, own)
@@ -114,45 +141,63 @@ def _distance(near: list[tuple[Any, Any]], far: list[tuple[Any, Any]], constant:
     raise TooFewDigits
 
 
-def zeros_of_many(poles: DoubleDouble, weights: DoubleDouble, constant: int) -> tuple[DoubleDouble, NDArray[np.bool_]]:
-    """Return the zeros of N functions between their increasing poles, shape (N, m−1) for (N, m), and which N have settled.
+def zeros_of_many(
+    poles: DoubleDouble, weights: DoubleDouble, constant: int
+) -> tuple[DoubleDouble, NDArray[np.bool_]]:
+    """Return the zeros of N functions between their increasing poles, shape (N, m−1) for (N, m),
+    and which N have settled.
 
-    All weights must be positive. The distance of every zero from the nearer pole has some 25 digits of its own. No number
-    depends on what the other functions are.
+    All weights must be positive. The distance of every zero from the nearer pole has some 25 digits
+    of its own. No number depends on what the other functions are.
     """
-    low, high = poles[:, :-1], poles[:, 1:]
+    low = poles[:, :-1]
+    high = poles[:, 1:]
     if low.high.shape[1] == 0:
         return low, np.ones(low.high.shape[0], dtype=bool)
     width = high - low
     below, above = _sides(poles, weights)
     middle = _scaled_secular(_round(below), _round(above), constant, width.high, width.high / 2)[0]
     from_low = middle <= 0
-    near = [(where(from_low, x, y), where(from_low, v, w)) for (x, v), (y, w) in zip(below, above, strict=True)]
-    far = [(where(from_low, y, x), where(from_low, w, v)) for (x, v), (y, w) in zip(below, above, strict=True)]
+    near = [
+        (where(from_low, x, y), where(from_low, v, w))
+        for (x, v), (y, w) in zip(below, above, strict=True)
+    ]
+    far = [
+        (where(from_low, y, x), where(from_low, w, v))
+        for (x, v), (y, w) in zip(below, above, strict=True)
+    ]
     kappa = np.where(from_low, float(constant), -float(constant))
     own = DoubleDouble.of(_distances(_round(near), _round(far), kappa, width.high))
     for _ in range(_FINE_STEPS):
         value, derivative = _scaled_secular(near, far, kappa, width, own)
         change = value.high / derivative.high
         own = own - change
-    converged = (np.abs(change) <= _FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
+    converged = (
+        (np.abs(change) <= _FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
+    )
     return where(from_low, low + own, high - own), np.all(converged, axis=1)
 
 
 def _sides(
     poles: DoubleDouble, weights: DoubleDouble
 ) -> tuple[list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]]:
-    """Return (distance, weight) of the poles below, and above, each zero, from the nearest on; where there is none, weight 0."""
+    """Return (distance, weight) of the poles below, and above, each zero, from the nearest on;
+    where there is none, weight 0.
+    """
     count = poles.high.shape[1]
     zero = np.arange(count - 1)
-    sides: tuple[list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]] = ([], [])
+    sides: tuple[
+        list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]
+    ] = ([], [])
     for k in range(count - 1):
         for side, nearest, step in ((sides[0], zero, -1), (sides[1], zero + 1, 1)):
             index = nearest + step * k
             exists = (index >= 0) & (index < count)
             index = np.where(exists, index, nearest)
             distance = (poles[:, index] - poles[:, nearest]) * float(step)
-            side.append((distance, where(exists, weights[:, index], DoubleDouble.of(np.zeros(count - 1)))))
+            side.append(
+                (distance, where(exists, weights[:, index], DoubleDouble.of(np.zeros(count - 1))))
+            )
     return sides
 
 
@@ -160,18 +205,26 @@ def _round(side: list[tuple[DoubleDouble, DoubleDouble]]) -> list[tuple[Array, A
     return [(distance.high, weight.high) for distance, weight in side]
 
 
-def _distances(near: list[tuple[Array, Array]], far: list[tuple[Array, Array]], constant: Array, width: Array) -> Array:
-    """Return what ``_distance`` does for arrays of functions, in doubles; those that do not settle are left where they are."""
-    least, most = np.zeros_like(width), width / 2
+def _distances(
+    near: list[tuple[Array, Array]], far: list[tuple[Array, Array]], constant: Array, width: Array
+) -> Array:
+    """Return what ``_distance`` does for arrays of functions, in doubles; those that do not settle
+    are left where they are.
+    """
+    least = np.zeros_like(width)
+    most = width / 2
     own = np.minimum(width * near[0][1] / (near[0][1] + far[0][1]), most)
     moving = np.ones(width.shape, dtype=bool)
     for step in range(_FEW_STEPS):
         value, derivative = _scaled_secular(near, far, constant, width, own)
-        least, most = np.where(moving & (value > 0), own, least), np.where(moving & (value <= 0), own, most)
+        least = np.where(moving & (value > 0), own, least)
+        most = np.where(moving & (value <= 0), own, most)
         new = own - value / np.where(derivative < 0, derivative, -np.inf)
         slow = (step % 4 == 3) & (most > _WIDE_BRACKET * least)
         inside = (derivative < 0) & (new >= least) & (new <= most) & (new > 0)
-        new = np.where(inside & ~slow, new, np.sqrt(most * np.maximum(least, most * float(_LEAST_PART))))
+        new = np.where(
+            inside & ~slow, new, np.sqrt(most * np.maximum(least, most * float(_LEAST_PART)))
+        )
         new = np.where(moving & (value != 0), new, own)
         moving &= np.abs(new - own) > _ROUNDINGS * DOUBLE.epsilon * own
         own = new

@@ -8,7 +8,9 @@ __all__ = ["Characteristic"]
 
 
 class Characteristic(NamedTuple):
-    """[ε; δ] in halves: each entry is 0 or 1 and stands for 0 or ½. Addition is modulo one, which changes θ by a sign at most."""
+    """[ε; δ] in halves: each entry is 0 or 1 and stands for 0 or ½. Addition is modulo one, which
+    changes θ by a sign at most.
+    """
 
     epsilon: tuple[int, ...]
     delta: tuple[int, ...]
@@ -20,7 +22,9 @@ class Characteristic(NamedTuple):
 
     @classmethod
     def of_branch_point(cls, j: int, genus: int) -> Characteristic:
-        """Return η(b_j): η(b_0) = [0; ½…½], η(b_{2s−1}) = [½e_s; ½ from s on] (odd), η(b_{2s}) = [½e_s; ½ beyond s]."""
+        """Return η(b_j): η(b_0) = [0; ½…½], η(b_{2s−1}) = [½e_s; ½ from s on] (odd), η(b_{2s}) =
+        [½e_s; ½ beyond s].
+        """
         s = (j + 1) // 2
         epsilon = tuple(int(i == s) for i in range(1, genus + 1))
         first = s if j % 2 == 1 else s + 1

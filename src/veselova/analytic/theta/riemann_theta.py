@@ -2,14 +2,17 @@
 
     θ[ε;δ](z) = Σ_{m∈Z^g} exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ),   T symmetric, positive definite.
 
-Where T is small this sum cancels: θ(z) falls to e^(−π/4T) of θ(0). Poisson summation over some of the variables (set G, the
-rest being F) turns their waves into Gaussians. With y = z+δ, C = T_FG T_GG⁻¹ and S = T_FF − C T_GF,
+Where T is small this sum cancels: θ(z) falls to e^(−π/4T) of θ(0). Poisson summation over some of
+the variables (set G, the rest being F) turns their waves into Gaussians. With y = z+δ, C = T_FG
+T_GG⁻¹ and S = T_FF − C T_GF,
 
-    θ[ε;δ](z) = det T_GG^{−1/2} Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} e^{−π xᵀSx − π dᵀT_GG⁻¹d} cos 2π[x·(y_F + Cd) + k·ε_G],   d = k−y_G.
+    θ[ε;δ](z) = det T_GG^{−1/2} Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} e^{−π xᵀSx − π dᵀT_GG⁻¹d} cos 2π[x·(y_F +
+    Cd) + k·ε_G],   d = k−y_G.
 
-F is kept to directions where S is not small, so θ(z) = θ[0;0](z) is a sum without cancellation, and its values are accurate
-relative to themselves. F = everything is the defining series, G = everything a lattice sum of Gaussians. Coordinates are those in
-which the sum is short (analytic.lattice).
+F is kept to directions where S is not small, so θ(z) = θ[0;0](z) is a sum without cancellation, and
+its values are accurate relative to themselves. F = everything is the defining series, G =
+everything a lattice sum of Gaussians. Coordinates are those in which the sum is short
+(analytic.lattice).
 """
 
 from __future__ import annotations
@@ -41,7 +44,8 @@ Array = NDArray[np.float64]
 
 K = TypeVar("K")
 
-#: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred times slower.
+#: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred
+#: times slower.
 _VANISHING = -630.0
 
 #: i^m.
@@ -53,13 +57,16 @@ _BLOCK = 100_000
 #: Classes ε_F that are few enough for all of them to be found when the first is asked for.
 _FEW_CLASSES = 8
 
-#: Products of few points with the tables of all functions at once, which save the calls of one group after the other.
+#: Products of few points with the tables of all functions at once, which save the calls of one
+#: group after the other.
 _FEW = 150_000
 
 
 @dataclass(frozen=True)
 class Theta:
-    """The theta functions of T, shape (g, g); ``waves`` is the set F of the sum over Z^g, None for the cheapest accurate one."""
+    """The theta functions of T, shape (g, g); ``waves`` is the set F of the sum over Z^g, None for
+    the cheapest accurate one.
+    """
 
     T: Array
     harmonics: tuple[int, ...] | None = None
@@ -71,7 +78,11 @@ class Theta:
 
     @cached_property
     def _chosen(self) -> tuple[Coordinates, float]:
-        return Coordinates.cheapest(self.T) if self.harmonics is None else Coordinates.unreduced(self.T, self.harmonics)
+        return (
+            Coordinates.cheapest(self.T)
+            if self.harmonics is None
+            else Coordinates.unreduced(self.T, self.harmonics)
+        )
 
     @property
     def coordinates(self) -> Coordinates:
@@ -84,7 +95,9 @@ class Theta:
 
     @cached_property
     def _to_coordinates(self) -> Array:
-        """Return the matrix from z to y, (g, g): first the coordinates with Gaussians, then those of the waves."""
+        """Return the matrix from z to y, (g, g): first the coordinates with Gaussians, then those
+        of the waves.
+        """
         F, G = self._split
         return np.asarray(self.coordinates.U[[*G, *F]].T, dtype=np.float64)
 
@@ -101,16 +114,23 @@ class Theta:
 
     @cached_property
     def _of_cell(self) -> tuple[Array, Array]:
-        """Return −πkᵀT_GG⁻¹k, (K,), all k at once, and what a point r of the cell is multiplied with, (|G|, K + |G| + |F|).
+        """Return −πkᵀT_GG⁻¹k, (K,), all k at once, and what a point r of the cell is multiplied
+        with, (|G|, K + |G| + |F|).
 
-        These are 2πT_GG⁻¹k and −πT_GG⁻¹, of which the exponents −π(k−r)ᵀT_GG⁻¹(k−r) are made, and −πC, which turns the waves.
+        These are 2πT_GG⁻¹k and −πT_GG⁻¹, of which the exponents −π(k−r)ᵀT_GG⁻¹(k−r) are made, and
+        −πC, which turns the waves.
         """
-        k, inverse = self._gaussian_lattice, -np.pi * self._parts[2]
-        return np.sum((k @ inverse) * k, axis=1), np.hstack([-2 * inverse @ k.T, inverse, -np.pi * self._parts[1].T])
+        k = self._gaussian_lattice
+        inverse = -np.pi * self._parts[2]
+        return np.sum((k @ inverse) * k, axis=1), np.hstack(
+            [-2 * inverse @ k.T, inverse, -np.pi * self._parts[1].T]
+        )
 
     @property
     def cost(self) -> float:
-        """Return about the number of lattice terms, without forming them, and what their Gaussians and waves take."""
+        """Return about the number of lattice terms, without forming them, and what their Gaussians
+        and waves take.
+        """
         return self._chosen[1]
 
     @cached_property
@@ -120,16 +140,27 @@ class Theta:
         return len(self._gaussian_lattice) * (of_zero.stop - of_zero.start)
 
     def values(self, z: Array, characteristics: Sequence[Characteristic]) -> Array:
-        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N, len(characteristics)).
+        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N,
+        len(characteristics)).
 
-        |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to the waves' floor.
+        |error| ≤ about 1e-15 (1 + π/min T) Σ|terms|; for characteristic zero Σ|terms| = θ(z) up to
+        the waves' floor.
         """
-        wanted, y = tuple(characteristics), (z - 2 * np.rint(z / 2)) @ self._to_coordinates
+        wanted = tuple(characteristics)
+        y = (z - 2 * np.rint(z / 2)) @ self._to_coordinates
         if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
             blocks = self._blocks(wanted)
             return blocks.values(*self._gaussian_factors(y, blocks.shifts))
-        result, groups = np.empty((len(characteristics), z.shape[0])), self._groups(wanted)
-        block = max(1, _BLOCK // (len(self._gaussian_lattice) + max(len(f.tables) for group in groups for f in group.families)))
+        result = np.empty((len(characteristics), z.shape[0]))
+        groups = self._groups(wanted)
+        block = max(
+            1,
+            _BLOCK
+            // (
+                len(self._gaussian_lattice)
+                + max(len(f.tables) for group in groups for f in group.families)
+            ),
+        )
         at_once = max(1, block // max(len(z), 1))  # groups, of few points
         for first in range(0, z.shape[0], block):
             rows = slice(first, first + block)
@@ -138,15 +169,20 @@ class Theta:
         return result.T
 
     def _fill(self, groups: list[Group], y: Array, result: Array) -> None:
-        """Write the values of some groups at points y (N, g) to their places, the rows of the result."""
-        gaussian_factors, angles, nearest = self._gaussian_factors(y, np.array([group.delta_G for group in groups]))
+        """Write the values of some groups at points y (N, g) to their places, the rows of the
+        result.
+        """
+        gaussian_factors, angles, nearest = self._gaussian_factors(
+            y, np.array([group.delta_G for group in groups])
+        )
         for k, group in enumerate(groups):
             half_turns = (group.parities.T @ nearest[k].T).astype(np.int64)
             signs = group.signs[:, None] * SIGNS[half_turns & 1]
             result[group.places] = group.sums(gaussian_factors[k], angles[k]) * signs
 
     def _gaussian_factors(self, y: Array, shifts: Array) -> tuple[Array, Array, Array]:
-        """Return (e^{−π|k−r|²}, π(y_F − Cr), n), k on the Gaussian lattice, with y_G + δ_G = n + r, r in the cell around zero.
+        """Return (e^{−π|k−r|²}, π(y_F − Cr), n), k on the Gaussian lattice, with y_G + δ_G = n + r,
+        r in the cell around zero.
 
         ``shifts`` (P, |G|) are the δ_G; shapes (P, N, K), (P, N, |F|) and (P, N, |G|).
         """
@@ -156,7 +192,8 @@ class Theta:
         if not gaussians:
             return np.ones((*y_G.shape[:2], 1)), np.pi * y[None], nearest
         constant, of_cell = self._of_cell
-        r, ends = y_G - nearest, (constant.size, constant.size + gaussians)
+        r = y_G - nearest
+        ends = (constant.size, constant.size + gaussians)
         made = r @ of_cell
         angles = np.pi * y[:, gaussians:] + made[:, :, ends[1] :]
         exponents = constant + made[:, :, : ends[0]]
@@ -180,12 +217,19 @@ class Theta:
     def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
         local, signs = zip(*self.coordinates.characteristics(characteristics), strict=True)
         deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
-        shifts, (of, doubled, rotated) = list(dict.fromkeys(deltas)), self._characteristic_phases(local)
+        shifts, (of, doubled, rotated) = (
+            list(dict.fromkeys(deltas)),
+            self._characteristic_phases(local),
+        )
         blocks = np.array([shifts.index(delta) for delta in deltas])
         return Blocks(
             np.array(shifts, dtype=float) / 2,
             in_blocks(doubled, blocks[of], len(shifts)),
-            in_blocks(np.concatenate([rotated.real, -rotated.imag], axis=1).T, np.tile(blocks[of], 2), len(shifts)),
+            in_blocks(
+                np.concatenate([rotated.real, -rotated.imag], axis=1).T,
+                np.tile(blocks[of], 2),
+                len(shifts),
+            ),
             np.flatnonzero(np.diff(of, prepend=-1)),
             in_blocks(self._parities(local).T, blocks, len(shifts)),
             self._parts[3] * np.array(signs)[:, None],
@@ -206,14 +250,26 @@ class Theta:
         return [self._group(delta_G, list(of.values())) for delta_G, of in families]
 
     def _group(self, delta_G: tuple[int, ...], members: list[list[Member]]) -> Group:
-        places, characteristics, signs = zip(*(given for of in members for given in of), strict=True)
+        places, characteristics, signs = zip(
+            *(given for of in members for given in of), strict=True
+        )
         families = [self._family([c for _, c, _ in of]) for of in members]
         parities = self._parities(characteristics)
-        return Group(np.array(delta_G) / 2, families, list(places), parities, self._parts[3] * np.array(signs))
+        return Group(
+            np.array(delta_G) / 2,
+            families,
+            list(places),
+            parities,
+            self._parts[3] * np.array(signs),
+        )
 
     def _parities(self, members: Sequence[Characteristic]) -> Array:
         G = self._split[1]
-        return np.array([[c.epsilon[i] for i in G] for c in members], dtype=float).reshape(len(members), len(G)).T
+        return (
+            np.array([[c.epsilon[i] for i in G] for c in members], dtype=float)
+            .reshape(len(members), len(G))
+            .T
+        )
 
     def _family(self, members: list[Characteristic]) -> Family:
         of, doubled, rotated = self._characteristic_phases(members)
@@ -225,13 +281,15 @@ class Theta:
     def _characteristic_phases(
         self, members: Sequence[Characteristic]
     ) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.complex128]]:
-        """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its waves, (X, |F|), and
-        (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X)."""
+        """Return what is summed, characteristic after characteristic: which it is, (X,), 2x of its
+        waves, (X, |F|), and (−1)^{2k·ε_G} w_x e^{2πi x·(Ck + δ_F)}, (K, X).
+        """
         F = self._split[0]
         codes = self._codes(members)
         doubled, places, cross_terms = self._cross_terms(frozenset(codes))
         ranges = [places[code] for code in codes]
-        of, harmonics = np.repeat(np.arange(len(members)), [len(each) for each in ranges]), np.concatenate(ranges)
+        of = np.repeat(np.arange(len(members)), [len(each) for each in ranges])
+        harmonics = np.concatenate(ranges)
         delta = np.array([[c.delta[i] for i in F] for c in members], dtype=np.int64)
         signs = 1 - 2 * np.mod(self._gaussian_lattice @ self._parities(members), 2)
         doubled = doubled[harmonics]
@@ -242,50 +300,71 @@ class Theta:
 
     def _codes(self, members: Sequence[Characteristic]) -> list[int]:
         """Return the bits of 2ε_F of each."""
-        return [sum(c.epsilon[i] << place for place, i in enumerate(self._split[0])) for c in members]
+        return [
+            sum(c.epsilon[i] << place for place, i in enumerate(self._split[0])) for c in members
+        ]
 
-    def _cross_terms(self, wanted: frozenset[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
-        """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K, X); w_x counts x and −x.
+    def _cross_terms(
+        self, wanted: frozenset[int]
+    ) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+        """Return 2x of the waves of some ε_F, (X, |F|), the rows of each, and w_x e^{2πi x·Ck}, (K,
+        X); w_x counts x and −x.
 
-        ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are one of each pair ±x with a term
-        above e^−39 of the largest: where T is large ε = ½ makes all small.
+        ``wanted``: the ``_codes`` of these ε_F; there may be others beside them. Of ε_F these are
+        one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all
+        small.
         """
         if (classes := 2 ** len(self._split[0])) <= _FEW_CLASSES:
             wanted = frozenset(range(classes))
         known = list(self._crossed)  # a copy: another thread may add to them
-        if (found := next((selected for selected in known if wanted <= selected), None)) is not None:
+        if (
+            found := next((selected for selected in known if wanted <= selected), None)
+        ) is not None:
             return self._crossed[found]
         self._crossed[wanted] = self._form_cross_terms(sorted(wanted))
         return self._crossed[wanted]
 
-    def _form_cross_terms(self, codes: list[int]) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
+    def _form_cross_terms(
+        self, codes: list[int]
+    ) -> tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]:
         """Return the ``_crossings`` of these codes and no others."""
         S, C, _, _ = self._parts
         doubled = half_of(self._double_points(codes))
-        of, x = (doubled & 1) @ (1 << np.arange(len(S))), doubled / 2
+        of = (doubled & 1) @ (1 << np.arange(len(S)))
+        x = doubled / 2
         norms = ((x @ S) * x).sum(axis=1)
         least = np.full(2 ** len(S), -np.inf)
         least[codes] = np.inf
         np.minimum.at(least, of, norms)
         selected = norms <= RADIUS**2 + least[of]
         order = np.flatnonzero(selected)[np.argsort(of[selected], kind="stable")]
-        doubled, x = doubled[order], x[order]
+        doubled = doubled[order]
+        x = x[order]
         weights = np.where(doubled.any(axis=1), 2.0, 1.0) * np.exp(-np.pi * norms[order])
-        firsts, ends = (np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right"))
+        firsts, ends = (
+            np.searchsorted(of[order], codes, side=side).tolist() for side in ("left", "right")
+        )
         places = {code: range(*pair) for code, *pair in zip(codes, firsts, ends, strict=True)}
         return doubled, places, weights * np.exp(2j * np.pi * (self._gaussian_lattice @ C.T @ x.T))
 
     def _double_points(self, codes: list[int]) -> NDArray[np.int64]:
-        """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent finds all of them at once."""
-        S, bits = self._parts[0], np.arange(len(self._parts[0]))
+        """Return 2x for the x of these ε_F, and maybe others, whose terms may count; one descent
+        finds all of them at once.
+        """
+        S = self._parts[0]
+        bits = np.arange(len(self._parts[0]))
         # No point of space is farther from a lattice than a corner of its cell is from the middle.
         reach = float(np.sqrt(RADIUS**2 + largest_corner(S)))
         if 2 ** len(S) <= 2 * len(codes):
             return lattice_points(S / 4, reach, np.zeros(len(S))).astype(np.int64)
-        return np.concatenate([2 * lattice_points(S, reach, (code >> bits & 1) / 2) for code in codes]).astype(np.int64)
+        return np.concatenate(
+            [2 * lattice_points(S, reach, (code >> bits & 1) / 2) for code in codes]
+        ).astype(np.int64)
 
     @cached_property
-    def _crossed(self) -> dict[frozenset[int], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
+    def _crossed(
+        self,
+    ) -> dict[frozenset[int], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
         return {}
 
 
@@ -295,11 +374,21 @@ def _keep_tables(
     made: Callable[[tuple[Characteristic, ...]], K],
     part: Callable[[K, list[int]], K],
 ) -> K:
-    """Return the tables of characteristics: those that are kept, a part of those of more of them, or those that are made."""
+    """Return the tables of characteristics: those that are kept, a part of those of more of them,
+    or those that are made.
+    """
     if (found := tables.get(wanted)) is None:
-        each, known = set(wanted), list(tables)  # a copy: another thread may add to them
-        more = next((selected for selected in known if each <= set(selected)), None) if len(each) == len(wanted) else None
-        found = made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
+        # a copy: another thread may add to them
+        each = set(wanted)
+        known = list(tables)
+        more = (
+            next((selected for selected in known if each <= set(selected)), None)
+            if len(each) == len(wanted)
+            else None
+        )
+        found = (
+            made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
+        )
         tables[wanted] = found
     return found
 

@@ -1,4 +1,5 @@
-"""Siegel reduction: a symplectic change of variables after which theta series of any τ are short and do not cancel.
+"""Siegel reduction: a symplectic change of variables after which theta series of any τ are short
+and do not cancel.
 
 Each step is exact for theta functions with any real characteristics,
 
@@ -8,8 +9,9 @@ and none has a root whose branch is in doubt:
 
     basis        m = Uᵀm':       θ[ε;δ](z|τ) = θ[U⁻ᵀε; Uδ](Uz | UτUᵀ)
     translation  τ = τ' + B:     θ[ε;δ](z|τ) = e^{−πi ε·(Bε + diag B)} θ[ε; δ+Bε+½diag B](z|τ')
-    inversion    of m_1 alone (Poisson summation), a = τ_11, b = (τ_21 …), D the rest:
-                 θ[ε;δ](z|τ) = (−ia)^{−½} e^{2πi δ_1ε_1 − πi z_1²/a} θ[δ_1,ε'; −ε_1,δ'](−z_1/a, z'−bz_1/a | −1/a, −b/a, D−bbᵀ/a)
+    inversion    of m_1 alone (Poisson summation), a = τ_11, b = (τ_21 …), D the rest: θ[ε;δ](z|τ) =
+                 (−ia)^{−½} e^{2πi δ_1ε_1 − πi z_1²/a} θ[δ_1,ε'; −ε_1,δ'](−z_1/a, z'−bz_1/a | −1/a,
+                 −b/a, D−bbᵀ/a)
 """
 
 from __future__ import annotations
@@ -28,15 +30,20 @@ Wide = NDArray[np.clongdouble]
 WideReal = NDArray[np.longdouble]
 Integers = NDArray[np.int64]
 
-#: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that rounding does not go to and fro.
-_LOVASZ, _INSIDE = 0.99, 1 - 1e-9
+#: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that rounding
+#: does not go to and fro.
+_LOVASZ = 0.99
+_INSIDE = 1 - 1e-9
 
-#: Each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by matrices of doubles.
+#: Each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by matrices of
+#: doubles.
 _MOST_STEPS = 2000
 
 
 def reduce_lattice(form: Array) -> Integers:
-    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in the quadratic form (Lenstra, Lenstra, Lovász)."""
+    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in the quadratic form (Lenstra,
+    Lenstra, Lovász).
+    """
     size = len(form)
     U = np.eye(size, dtype=np.int64)
     vectors = np.linalg.cholesky(form)  # row i is basis vector i
@@ -49,7 +56,8 @@ def reduce_lattice(form: Array) -> Integers:
                 vectors[k] -= multiple * vectors[j]
                 U[k] -= multiple * U[j]
         _, triangle = np.linalg.qr(vectors[: k + 1].T)
-        above, own = triangle[k - 1, k], triangle[k, k]
+        above = triangle[k - 1, k]
+        own = triangle[k, k]
         if own * own + above * above >= _LOVASZ * triangle[k - 1, k - 1] ** 2:
             k += 1
         else:
@@ -62,11 +70,12 @@ def reduce_lattice(form: Array) -> Integers:
 class SiegelReduction:
     """A reduced matrix τ' and the way there: θ[ε;δ](z|τ) = e^{c} e^{πi zᵀQz} θ[ε';δ'](Lz|τ').
 
-    tau (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1 · linear L (g, g) · quadratic Q (g, g)
+    tau (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1 · linear L (g, g) ·
+    quadratic Q (g, g)
     symplectic (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
 
-    Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11 bits more where the processor has
-    them. Integers are chosen in doubles.
+    Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
+    bits more where the processor has them. Integers are chosen in doubles.
     """
 
     tau: Any
@@ -79,7 +88,10 @@ class SiegelReduction:
     def __post_init__(self) -> None:
         g = len(self.tau)
         self.tau = np.array(self.tau, dtype=np.clongdouble)
-        self.linear, self.quadratic = np.eye(g, dtype=np.clongdouble), np.zeros((g, g), dtype=np.clongdouble)
+        self.linear, self.quadratic = (
+            np.eye(g, dtype=np.clongdouble),
+            np.zeros((g, g), dtype=np.clongdouble),
+        )
         self.symplectic = np.eye(2 * g, dtype=np.int64)
         for _ in range(_MOST_STEPS):
             self._change_basis()
@@ -105,7 +117,8 @@ class SiegelReduction:
             self._steps.append(("translation", B.astype(float)))
 
     def _invert(self) -> None:
-        a, b = self.tau[0, 0], self.tau[0, 1:]
+        a = self.tau[0, 0]
+        b = self.tau[0, 1:]
         row = self.linear[0].copy()
         self.quadratic = self.quadratic - np.outer(row, row) / a
         self.linear[1:] -= np.outer(b, row) / a
@@ -124,14 +137,17 @@ class SiegelReduction:
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
         self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
 
-    def characteristic(self, given_epsilon: Array, given_delta: Array) -> tuple[WideReal, WideReal, Any, complex]:
+    def characteristic(
+        self, given_epsilon: Array, given_delta: Array
+    ) -> tuple[WideReal, WideReal, Any, complex]:
         """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}."""
         epsilon: Any = given_epsilon.astype(np.longdouble)
         delta: Any = given_delta.astype(np.longdouble)
         turns: Any = np.longdouble(0)
         for kind, matrix in self._steps:
             if kind == "basis":
-                epsilon, delta = np.rint(np.linalg.inv(matrix)).T @ epsilon, matrix @ delta
+                epsilon = np.rint(np.linalg.inv(matrix)).T @ epsilon
+                delta = matrix @ delta
             elif kind == "translation":
                 moved = matrix @ epsilon
                 turns -= epsilon @ (moved + np.diag(matrix)) / 2

@@ -1,11 +1,12 @@
-"""Riemann theta functions of any τ, at any complex z, with any real characteristics, and their derivatives.
+"""Riemann theta functions of any τ, at any complex z, with any real characteristics, and their
+derivatives.
 
 After Siegel reduction, with m = n + k and n the lattice point next to the largest term,
 
     θ[ε;δ](z|τ) = e^{…} Σ_k W_k Π_j u_j^{k_j},   W_k = exp(πi kᵀτk),   u = exp 2πi(z + δ + τ(n+ε)).
 
-W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W is a sparse matrix
-between the products of powers of the two halves.
+W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W
+is a sparse matrix between the products of powers of the two halves.
 """
 
 from __future__ import annotations
@@ -32,16 +33,20 @@ WideReal = NDArray[np.longdouble]
 
 _PI = np.longdouble("3.14159265358979323846264338327950288")
 
-#: Rounding of a term in ε, by its exponent and by products of powers; largest seen over random τ: 6.
+#: Rounding of a term in ε, by its exponent and by products of powers; largest seen over random τ:
+#: 6.
 _TERM_ROUNDING = 4 * float(np.finfo(float).eps)
 
 #: Entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
-_BLOCK, _MOST_TERMS = 1_000_000, 100_000_000
+_BLOCK = 1_000_000
+_MOST_TERMS = 100_000_000
 
 
 @dataclass(frozen=True)
 class _Table:
-    """The terms of a sum: halves of the k's, (I, a) and (J, g−a), and W between them, sparse (J, I), and |W|."""
+    """The terms of a sum: halves of the k's, (I, a) and (J, g−a), and W between them, sparse (J,
+    I), and |W|.
+    """
 
     left: Array
     right: Array
@@ -58,14 +63,21 @@ class _Table:
         return cls(left, right, weights, abs(weights))
 
     def moments(self, v: Complex, order: int) -> tuple[list[Complex], Array]:
-        """Return Σ W e^{2πi k·v}, and with k_i and k_ik_j in the sum, (N,), (N, g), (N, g, g); and Σ|W e^{2πi k·v}|."""
-        split, genus = self.left.shape[1], v.shape[1]
-        left, right = np.exp(2j * np.pi * (self.left @ v[:, :split].T)), np.exp(2j * np.pi * (self.right @ v[:, split:].T))
+        """Return Σ W e^{2πi k·v}, and with k_i and k_ik_j in the sum, (N,), (N, g), (N, g, g); and
+        Σ|W e^{2πi k·v}|.
+        """
+        split = self.left.shape[1]
+        genus = v.shape[1]
+        left = np.exp(2j * np.pi * (self.left @ v[:, :split].T))
+        right = np.exp(2j * np.pi * (self.right @ v[:, split:].T))
         sizes = np.sum(np.abs(right) * (self.sizes @ np.abs(left)), axis=0)
-        factors = [(self.left, i) for i in range(split)] + [(self.right, i) for i in range(genus - split)]
+        factors = [(self.left, i) for i in range(split)] + [
+            (self.right, i) for i in range(genus - split)
+        ]
 
         def total(chosen: tuple[int, ...]) -> Complex:
-            P, R = left, right
+            P = left
+            R = right
             for c in chosen:
                 table, column = factors[c]
                 if table is self.left:
@@ -87,7 +99,9 @@ class _Table:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Σ terms and their derivatives, over e^{2πi·turns}; Σ|terms|; the largest 2π|m+ε|, and the turns of a term by one of v."""
+    """Σ terms and their derivatives, over e^{2πi·turns}; Σ|terms|; the largest 2π|m+ε|, and the
+    turns of a term by one of v.
+    """
 
     derivatives: list[Complex]
     turns: Wide
@@ -96,8 +110,12 @@ class _Sums:
     turning: float
 
 
-def _transform(found: _Sums, slope: Complex, L: Complex, Q: Complex) -> tuple[Complex, Array | float]:
-    """Return the highest derivative of e^{πi zᵀQz + …}Θ(Lz), and what a rounding of a term is multiplied with."""
+def _transform(
+    found: _Sums, slope: Complex, L: Complex, Q: Complex
+) -> tuple[Complex, Array | float]:
+    """Return the highest derivative of e^{πi zᵀQz + …}Θ(Lz), and what a rounding of a term is
+    multiplied with.
+    """
     value, *higher = found.derivatives
     if not higher:
         return value, 1.0
@@ -118,7 +136,9 @@ def _forms(rows: NDArray[Any], matrix: Wide) -> Wide:
 
 @dataclass(frozen=True)
 class SiegelTheta:
-    """The theta functions of one matrix τ, complex, symmetric, Im τ positive definite, shape (g, g)."""
+    """The theta functions of one matrix τ, complex, symmetric, Im τ positive definite, shape (g,
+    g).
+    """
 
     tau: Complex
 
@@ -143,30 +163,45 @@ class SiegelTheta:
         tau = self.reduction.tau.astype(complex)
         return _Table.of(tau, points_near_cell(tau.imag, RADIUS))
 
-    def values(self, z: Complex, characteristics: Array, order: int) -> tuple[Complex, Array, Array]:
-        """Return the derivatives of one order (0, 1 or 2) at points z (N, g) for characteristics (C, 2, g).
+    def values(
+        self, z: Complex, characteristics: Array, order: int
+    ) -> tuple[Complex, Array, Array]:
+        """Return the derivatives of one order (0, 1 or 2) at points z (N, g) for characteristics
+        (C, 2, g).
 
-        The result is (mantissas, exponents, errors): the derivative is mantissa·exp(exponent), of shapes (N, C, g, …) and (N, C).
-        The errors bound those of the mantissas.
+        The result is (mantissas, exponents, errors): the derivative is mantissa·exp(exponent), of
+        shapes (N, C, g, …) and (N, C). The errors bound those of the mantissas.
         """
         count, genus = z.shape
-        point, tau = z.astype(np.clongdouble), self.tau.astype(np.clongdouble)
-        # z = z' + n + τm with z' in the cell around zero: quadratic exponents would lose the digits of a large z.
+        point = z.astype(np.clongdouble)
+        tau = self.tau.astype(np.clongdouble)
+        # z = z' + n + τm with z' in the cell around zero: quadratic exponents would lose the digits
+        # of a large z.
         m = np.rint(np.linalg.solve(self.tau.imag, z.imag.T).T)
         rest = point - m @ tau
         n = np.rint(rest.real)
         rest = rest - n
-        L, Q = self.reduction.linear, self.reduction.quadratic
+        L = self.reduction.linear
+        Q = self.reduction.quadratic
         inner = rest @ L.T
         outer = (_forms(rest, Q) - _forms(m, tau)) / 2
         slope = (2j * np.pi * (rest @ Q - m)).astype(complex)  # the gradient of the exponent
         shape = (count, len(characteristics))
         values = np.empty((*shape, *(genus,) * order), dtype=complex)
-        exponents, errors = np.empty(shape), np.empty(shape)
+        exponents = np.empty(shape)
+        errors = np.empty(shape)
         for c, (epsilon, delta) in enumerate(characteristics):
-            within_epsilon, within_delta, turns, root = self.reduction.characteristic(epsilon, delta)
+            within_epsilon, within_delta, turns, root = self.reduction.characteristic(
+                epsilon, delta
+            )
             found = self._sums(inner, within_epsilon, within_delta, order)
-            turns = found.turns + outer + turns + n @ epsilon.astype(np.longdouble) - np.sum(m * (rest + delta), axis=1)
+            turns = (
+                found.turns
+                + outer
+                + turns
+                + n @ epsilon.astype(np.longdouble)
+                - np.sum(m * (rest + delta), axis=1)
+            )
             exponent = -2 * _PI * turns.imag + root.real
             exponents[:, c] = exponent
             phase = (2 * _PI * (turns.real - np.rint(turns.real)) + root.imag).astype(float)
@@ -174,12 +209,16 @@ class SiegelTheta:
             derivative, scale = _transform(found, slope, L.astype(complex), Q.astype(complex))
             values[:, c] = derivative * factor.reshape((count, *(1,) * order))
             wide = float(np.finfo(np.longdouble).eps) * (1 + np.abs(turns).astype(float))
-            errors[:, c] = found.sizes * scale * (_TERM_ROUNDING + _TERM_ROUNDING * found.turning + 64 * wide)
+            errors[:, c] = (
+                found.sizes * scale * (_TERM_ROUNDING + _TERM_ROUNDING * found.turning + 64 * wide)
+            )
         return values, exponents, errors
 
     def _sums(self, z: Wide, epsilon: WideReal, delta: WideReal, order: int) -> _Sums:
         """Return the sums of the reduced matrix, over the largest term."""
-        tau, count, genus = self.reduction.tau, z.shape[0], z.shape[1]
+        tau = self.reduction.tau
+        count = z.shape[0]
+        genus = z.shape[1]
         height = np.linalg.solve(tau.imag.astype(float), z.imag.astype(float).T).T
         m = np.rint(-(epsilon.astype(float) + height)) + epsilon
         v = z + delta + m @ tau
@@ -198,12 +237,21 @@ class SiegelTheta:
             if order == 2:
                 mixed = shift[:, :, None] * moments[1][:, None, :]
                 square = shift[:, :, None] * shift[:, None, :] * moments[0][:, None, None]
-                sums[2][rows] = -4 * np.pi**2 * (moments[2] + mixed + np.swapaxes(mixed, 1, 2) + square)
-        return _Sums(sums, turns, sizes, 2 * np.pi * (np.max(np.abs(own), axis=1) + self._reach), self._reach)
+                sums[2][rows] = (
+                    -4 * np.pi**2 * (moments[2] + mixed + np.swapaxes(mixed, 1, 2) + square)
+                )
+        return _Sums(
+            sums, turns, sizes, 2 * np.pi * (np.max(np.abs(own), axis=1) + self._reach), self._reach
+        )
 
     @cached_property
     def _reach(self) -> float:
-        return float(max(np.max(np.abs(self._table.left), initial=0), np.max(np.abs(self._table.right), initial=0)))
+        return float(
+            max(
+                np.max(np.abs(self._table.left), initial=0),
+                np.max(np.abs(self._table.right), initial=0),
+            )
+        )
 
 
 def _distinct(points: Array) -> tuple[Array, NDArray[np.intp]]:

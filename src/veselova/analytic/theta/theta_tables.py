@@ -1,4 +1,6 @@
-"""The tables of theta sums (analytic.theta): what Gaussians and waves are multiplied with, for many characteristics at once."""
+"""The tables of theta sums (analytic.theta): what Gaussians and waves are multiplied with, for many
+characteristics at once.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ class Family:
     """M characteristics with the same Gaussians and waves.
 
     orders (X, |F|): 2x of the waves
-    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without waves the signs, W = 1
+    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without
+    waves the signs, W = 1
     """
 
     orders: NDArray[np.int64]
@@ -39,10 +42,14 @@ class Family:
     def of(self, members: list[int]) -> Family:
         """Return the family of some members."""
         lattice = self.tables.shape[1]
-        return Family(self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice))
+        return Family(
+            self.orders, self.tables.reshape(self.size, -1, lattice)[members].reshape(-1, lattice)
+        )
 
     def sums(self, gaussian_factors: Array, along: Array) -> Array:
-        """Return the sums without their signs, shape (M, N); ``along`` (W, N): cosines of each x, then sines."""
+        """Return the sums without their signs, shape (M, N); ``along`` (W, N): cosines of each x,
+        then sines.
+        """
         weighted = (self.tables @ gaussian_factors.T).reshape(-1, *along.shape)
         return np.asarray(np.multiply(weighted, along, out=weighted).sum(axis=1))
 
@@ -51,7 +58,8 @@ class Family:
 class Group:
     """The families with one δ_G, and of all their characteristics:
 
-    places  among those asked for · parities (|G|, M): 2ε_G · signs (M,): of their reduction modulo one, and det T_GG^{−1/2}
+    places  among those asked for · parities (|G|, M): 2ε_G · signs (M,): of their reduction modulo
+        one, and det T_GG^{−1/2}
     """
 
     delta_G: Array
@@ -61,11 +69,14 @@ class Group:
     signs: Array
 
     def of(self, places: Mapping[int, int]) -> Group | None:
-        """Return the group of the members at some places, the keys, with their new places; None where it has none of them."""
+        """Return the group of the members at some places, the keys, with their new places; None
+        where it has none of them.
+        """
         selected = [i for i, place in enumerate(self.places) if place in places]
         if not selected:
             return None
-        families, first = [], 0
+        families = []
+        first = 0
         for family in self.families:
             last = first + family.size
             members = [i - first for i in selected if first <= i < last]
@@ -83,20 +94,27 @@ class Group:
         return int(np.max(np.abs(self._orders), initial=0))
 
     def sums(self, gaussian_factors: Array, angles: Array) -> Array:
-        """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N, |F|) of their waves."""
+        """Return the sums of all families without their signs, shape (M, N), for the ``angles`` (N,
+        |F|) of their waves.
+        """
         if not angles.shape[1]:
             return np.concatenate([family.tables @ gaussian_factors.T for family in self.families])
-        along, result, first = waves_at(angles, self._orders, self._highest), [], 0
+        along = waves_at(angles, self._orders, self._highest)
+        result = []
+        first = 0
         for family in self.families:
             last = first + len(family.orders)
-            result.append(family.sums(gaussian_factors, along[:, first:last].reshape(-1, len(angles))))
+            result.append(
+                family.sums(gaussian_factors, along[:, first:last].reshape(-1, len(angles)))
+            )
             first = last
         return np.concatenate(result)
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """M characteristics with P different δ_G, all at once for few points, by matrices of P blocks of which a row has one.
+    """M characteristics with P different δ_G, all at once for few points, by matrices of P blocks
+    of which a row has one.
 
     shifts (P, |G|): the δ_G
     orders (X, P·|F|): 2x of the waves of each
@@ -119,12 +137,20 @@ class Blocks:
         harmonics = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in members])
         tables = np.concatenate([part[harmonics] for part in np.split(self.tables, 2)])
         return Blocks(
-            self.shifts, self.orders[harmonics], tables, np.cumsum(counts) - counts, self.parities[members], self.signs[members]
+            self.shifts,
+            self.orders[harmonics],
+            tables,
+            np.cumsum(counts) - counts,
+            self.parities[members],
+            self.signs[members],
         )
 
     def values(self, gaussian_factors: Array, angles: Array, nearest: Array) -> Array:
-        """Return the theta functions, (N, M), from (P, N, K), (P, N, |F|) and (P, N, |G|): see ``Theta``."""
-        phases, terms = self.orders @ _stack_blocks(angles), self.tables @ _stack_blocks(gaussian_factors)
+        """Return the theta functions, (N, M), from (P, N, K), (P, N, |F|) and (P, N, |G|): see
+        ``Theta``.
+        """
+        phases = self.orders @ _stack_blocks(angles)
+        terms = self.tables @ _stack_blocks(gaussian_factors)
         sums = terms[: len(phases)] * np.cos(phases)
         sums += terms[len(phases) :] * np.sin(phases)
         half_turns = (self.parities @ _stack_blocks(nearest)).astype(np.int64)

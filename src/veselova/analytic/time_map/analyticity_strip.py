@@ -1,14 +1,17 @@
-"""Where dt/dτ₁ is analytic along an orbit, and how large it is there: a bound that no gap or cut enters.
+"""Where dt/dτ₁ is analytic along an orbit, and how large it is there: a bound that no gap or cut
+enters.
 
-Along an orbit q'' = −A⁻¹q + βq with β = 2(A⁻¹q,q) − E and E = (q',q') + (A⁻¹q,q) constant (Theorem LR→Nn), I_1 ≤ A⁻¹ ≤ 1 in
-units of the largest I. At complex times a distance y from a real one let |q − q(real)| ≤ d. There
+Along an orbit q'' = −A⁻¹q + βq with β = 2(A⁻¹q,q) − E and E = (q',q') + (A⁻¹q,q) constant (Theorem
+LR→Nn), I_1 ≤ A⁻¹ ≤ 1 in units of the largest I. At complex times a distance y from a real one let
+|q − q(real)| ≤ d. There
 
-    |q''| ≤ (κ + 4d + 2d²)(1 + d),   κ = max |β − I_i| over real times,   so   d ≤ |q'|y + ½ max|q''| y²,
+    |q''| ≤ (κ + 4d + 2d²)(1 + d),   κ = max |β − I_i| over real times,   so   d ≤ |q'|y + ½
+        max|q''| y²,
     |(q,Aq)/(q,Aq)_real − 1| ≤ 2ad + a²d²,   a² = A_1/min (q,Aq),
 
-which is below one while ad < √2−1. As long as it is, dt/dτ₁ = √((q,Aq)/W) is analytic and at most √2 times its real maximum.
-Along a geodesic ds/dτ₁ = 1/(√J (q,Aq)). While ad ≤ √(3/2)−1 that ratio is at least 1/2 in absolute value, so ds/dτ₁ is analytic
-and at most twice its real maximum.
+which is below one while ad < √2−1. As long as it is, dt/dτ₁ = √((q,Aq)/W) is analytic and at most
+√2 times its real maximum. Along a geodesic ds/dτ₁ = 1/(√J (q,Aq)). While ad ≤ √(3/2)−1 that ratio
+is at least 1/2 in absolute value, so ds/dτ₁ is analytic and at most twice its real maximum.
 """
 
 from __future__ import annotations
@@ -28,17 +31,20 @@ from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 
 __all__ = ["Orbit"]
 
-#: By the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what makes up for the rounding of the half
-#: width to a double; and by how much d(time)/dτ₁ may be above its real maximum.
-_LARGEST_TURN, _ABOVE_REAL = {"t": 0.4142, "s": 0.2247}, {"t": math.sqrt(2), "s": 2.0}
+#: By the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what makes up
+#: for the rounding of the half width to a double; and by how much d(time)/dτ₁ may be above its real
+#: maximum.
+_LARGEST_TURN = {"t": 0.4142, "s": 0.2247}
+_ABOVE_REAL = {"t": math.sqrt(2), "s": 2.0}
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start, frequencies (g,) are balls.
+    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start,
+    frequencies (g,) are balls.
 
-    stretch: √(q,Aq) at phases but for a constant, by theta functions, where angles are not to be asked · coarse_rates: the rate
-    at phases in doubles, where these can give it
+    stretch: √(q,Aq) at phases but for a constant, by theta functions, where angles are not to be
+    asked · coarse_rates: the rate at phases in doubles, where these can give it
     """
 
     spectrum: Spectrum
@@ -49,7 +55,9 @@ class Orbit:
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
     def phases(self, tau1: Values) -> Values:
-        """Return z modulo 2 at Neumann times (N,), shape (N, g): however far they are, doubles tell its cells apart."""
+        """Return z modulo 2 at Neumann times (N,), shape (N, g): however far they are, doubles tell
+        its cells apart.
+        """
         z = self.start + tau1[:, None] * self.frequencies
         return np.asarray(z - 2 * self.rate.inversion.arithmetic.floor(z / 2))
 
@@ -73,14 +81,21 @@ class Orbit:
 
     @cached_property
     def strip(self) -> tuple[float, Any]:
-        """Return (y, M) with |d(time)/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on its torus."""
-        inverse, points = self.spectrum.inverse, self.rate.inversion.periods.curve.branch_points
-        q, q_prime = self.spectrum.q, self.spectrum.q_prime
-        lowest, level = float(inverse[0].lower()), float((np.sum(q_prime * q_prime) + np.sum(inverse * q * q)).upper())
+        """Return (y, M) with |d(time)/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on
+        its torus.
+        """
+        inverse = self.spectrum.inverse
+        points = self.rate.inversion.periods.curve.branch_points
+        q = self.spectrum.q
+        q_prime = self.spectrum.q_prime
+        lowest = float(inverse[0].lower())
+        level = float((np.sum(q_prime * q_prime) + np.sum(inverse * q * q)).upper())
         # (q,Aq) = Π λ_s/Π I_i, and I_1 = 1/A_1: the least of a⁻².
         share = float((inverse[0] * math.prod(points[1::2]) / math.prod(inverse)).lower())
         d = _LARGEST_TURN[self.rate.time] * math.sqrt(share)
         kappa = max(abs(2 - level - lowest), abs(2 * lowest - level - 1))
         bend = (kappa + 4 * d + 2 * d * d) * (1 + d)
         speed = math.sqrt(level - lowest)
-        return 2 * d / (speed + math.sqrt(speed * speed + 2 * bend * d)), _ABOVE_REAL[self.rate.time] * self.rate.scale
+        return 2 * d / (speed + math.sqrt(speed * speed + 2 * bend * d)), _ABOVE_REAL[
+            self.rate.time
+        ] * self.rate.scale

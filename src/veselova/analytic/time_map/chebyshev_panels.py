@@ -11,15 +11,19 @@ __all__ = ["TAIL", "Panels", "are_settled"]
 
 Array = NDArray[np.float64]
 
-#: A series whose last coefficients fall below this part of its size is resolved; what it leaves out counts as no less.
+#: A series whose last coefficients fall below this part of its size is resolved; what it leaves out
+#: counts as no less.
 TAIL = 4e-15
 
-#: Last coefficients that have not fallen to this part of what they were on a longer panel are rounding, if they are small.
+#: Last coefficients that have not fallen to this part of what they were on a longer panel are
+#: rounding, if they are small.
 _STALLED = 0.25
 
 
 def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np.bool_]:
-    """Return which series are resolved, or fall no more: by their tails, those on longer panels, and what may be rounding."""
+    """Return which series are resolved, or fall no more: by their tails, those on longer panels,
+    and what may be rounding.
+    """
     return (tails <= TAIL) | ((tails <= noise) & (tails > _STALLED * before))
 
 
@@ -27,10 +31,10 @@ def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np
 class Panels:
     """τ₁ ↦ ∫_0^{τ₁} f(z) along an orbit, on P panels.
 
-    borders (P+1,) in τ₁, zero among them · lengths (P,)
-    integrals (P, 2, N+1), coefficients of the integral from the left border, and of its derivative in x, −1 … 1 on a panel
-    values (P+1,) of the integral at the borders · tails (P+1,), what series and rounding leave out of them
-    mean_size of f over τ₁
+    borders (P+1,) in τ₁, zero among them · lengths (P,) integrals (P, 2, N+1), coefficients of the
+    integral from the left border, and of its derivative in x, −1 … 1 on a panel
+    values (P+1,) of the integral at the borders · tails (P+1,), what series and rounding leave out
+    of them mean_size of f over τ₁
     """
 
     borders: Array
@@ -41,21 +45,39 @@ class Panels:
     mean_size: float
 
     @classmethod
-    def of(cls, lefts: Array, lengths: Array, coefficients: Array, tails: Array, sizes: Array) -> Panels:
-        """Return the integral from the coefficients (P, N) of f on panels in any order; tails (P,) are relative to sizes (P,)."""
+    def of(
+        cls, lefts: Array, lengths: Array, coefficients: Array, tails: Array, sizes: Array
+    ) -> Panels:
+        """Return the integral from the coefficients (P, N) of f on panels in any order; tails (P,)
+        are relative to sizes (P,).
+        """
         order = np.argsort(lefts)
-        left, lengths, sizes = lefts[order], lengths[order], sizes[order]
+        left = lefts[order]
+        lengths = lengths[order]
+        sizes = sizes[order]
         borders = np.append(left, left[-1] + lengths[-1])
         zero = int(np.searchsorted(borders, 0.0))
         slopes = coefficients[order] * (lengths / 2)[:, None]
         integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
         integrals[:, 0], integrals[:, 1, :-1] = _integrate_series(slopes), slopes
         over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
-        # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the mean.
+        # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the
+        # mean.
         count = slopes.shape[1]
-        left_out = (np.maximum(tails[order], TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
-        values, tails_from_zero = (_sum_panels(summands, zero) for summands in (over_panels, left_out))
-        return cls(borders, lengths, integrals, values, tails_from_zero, float(sizes @ lengths / np.sum(lengths)))
+        left_out = (
+            (np.maximum(tails[order], TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
+        )
+        values, tails_from_zero = (
+            _sum_panels(summands, zero) for summands in (over_panels, left_out)
+        )
+        return cls(
+            borders,
+            lengths,
+            integrals,
+            values,
+            tails_from_zero,
+            float(sizes @ lengths / np.sum(lengths)),
+        )
 
     @property
     def size(self) -> int:
@@ -82,7 +104,8 @@ class Panels:
         if tau1.size < self.lengths.size:
             return 2 * np.abs(np.interp(tau1, self.borders, self.tails))
         # Of whole panels, which is faster, but next to zero.
-        ends, zero = np.searchsorted(tau1, self.borders), int(np.searchsorted(self.borders, 0.0))
+        ends = np.searchsorted(tau1, self.borders)
+        zero = int(np.searchsorted(self.borders, 0.0))
         ends[0], ends[-1] = 0, tau1.size  # whatever the first and the last time are rounded to
         tails = 2 * np.maximum(np.abs(self.tails[1:]), np.abs(self.tails[:-1]))
         result = np.repeat(tails, np.diff(ends[1:-1], prepend=0, append=tau1.size))
@@ -92,7 +115,9 @@ class Panels:
 
     def panel_of(self, borders: Array, values: Array) -> NDArray[np.intp]:
         """Return the panels in which values lie, borders being those of τ₁ or of the integral."""
-        return np.clip(np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1)
+        return np.clip(
+            np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1
+        )
 
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
         """Return the integral from the panel's left border to x, and its derivative in x."""
@@ -103,12 +128,18 @@ class Panels:
 
 
 def _sum_panels(over_panels: Array, zero: int) -> Array:
-    """Return the sums at the borders, 0 at number ``zero``: outwards from it, so that far ones do not round near ones."""
-    return np.concatenate([-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])])
+    """Return the sums at the borders, 0 at number ``zero``: outwards from it, so that far ones do
+    not round near ones.
+    """
+    return np.concatenate(
+        [-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])]
+    )
 
 
 def _integrate_series(coefficients: Array) -> Array:
-    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} − c_{k+1})/2k, c_0 doubled."""
+    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} −
+    c_{k+1})/2k, c_0 doubled.
+    """
     count = coefficients.shape[1]
     padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)
     padded[:, 0] *= 2

@@ -1,10 +1,13 @@
-"""The clock in closed form: every Fourier coefficient of dt/dτ₁ is a determinant of one-variable integrals.
+"""The clock in closed form: every Fourier coefficient of dt/dτ₁ is a determinant of one-variable
+integrals.
 
     t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f)
 
-Near a resonance, where m·f is small, m·z is a phase of its own: made of the others, its rounding would be divided by m·f.
+Near a resonance, where m·f is small, m·z is a phase of its own: made of the others, its rounding
+would be divided by m·f.
 
-Any t costs the same; the number of modes grows with the genus (n = 3: hundreds, n = 4: thousands, n = 5: ten thousands).
+Any t costs the same; the number of modes grows with the genus (n = 3: hundreds, n = 4: thousands, n
+= 5: ten thousands).
 """
 
 from __future__ import annotations
@@ -34,14 +37,17 @@ T = TypeVar("T")
 #: Modes below this part of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
 
-#: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is hardly ever exceeded.
+#: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is
+#: hardly ever exceeded.
 _COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 
 #: Radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
 _SPARE_PACE = 16
 
-#: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and their part.
-_FIRST_MODES, _FIRST_PART = 64, 1 / 16
+#: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and
+#: their part.
+_FIRST_MODES = 64
+_FIRST_PART = 1 / 16
 
 #: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse clock divides by.
 _LEAST_SLOPE = 0.05
@@ -52,45 +58,73 @@ _SLOW = 4.0
 #: Entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
 
-#: Cycles that the last step of the inverse clock may leave open; and a step that leaves so much where no slope is known to be
-#: the least, and the error is of the order of its square.
-_OPEN, _SETTLED = 1e-17, 1e-9
+#: Cycles that the last step of the inverse clock may leave open; and a step that leaves so much
+#: where no slope is known to be the least, and the error is of the order of its square.
+_OPEN = 1e-17
+_SETTLED = 1e-9
 
 
 class FourierTimeMap(TimeMap):
-    """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ − t/F_0 stays bounded."""
+    """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ −
+    t/F_0 stays bounded.
+    """
 
     name: ClassVar[str] = "fourier"
 
-    def __init__(self, rate: TorusRate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float) -> None:
+    def __init__(
+        self, rate: TorusRate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float
+    ) -> None:
         modes, coefficients, edge, self._off = find_modes(rate)
         order = np.argsort(-np.abs(coefficients))
-        modes, coefficients = modes[order], coefficients[order]
-        self._genus, self._mean, self._fastest = in_tau1.rates.size, mean, float(np.max(np.abs(in_tau1.rates)))
+        modes = modes[order]
+        coefficients = coefficients[order]
+        self._genus, self._mean, self._fastest = (
+            in_tau1.rates.size,
+            mean,
+            float(np.max(np.abs(in_tau1.rates))),
+        )
         #: How far modes move τ₁ with each phase at the start, in a unit of time.
         self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
         at_edge = in_tau1.rates_of(edge)
-        self._modes, slow = _with_slow_phases(modes, self._pull.max(axis=1, initial=0.0), in_tau1.rates)
+        self._modes, slow = _with_slow_phases(
+            modes, self._pull.max(axis=1, initial=0.0), in_tau1.rates
+        )
         if len(slow):
             in_tau1 = in_tau1.with_combinations(slow)
-            # Without guard digits f/F_0 is rounded, and its combinations would not be those of f: so f is divided to more digits.
+            # Without guard digits f/F_0 is rounded, and its combinations would not be those of f:
+            # so f is divided to more digits.
             in_time = in_time.with_combinations(slow) if in_time.rests.any() else in_tau1.per(mean)
-        self._in_tau1, self._in_time = in_tau1, in_time
-        # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
+        self._in_tau1 = in_tau1
+        self._in_time = in_time
+        # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f)
+        # (sin 2πm·z − sin 2πm·z⁰).
         pace = 2 * np.pi * self._in_tau1.rates_of(self._modes)
         amplitudes = 2 * coefficients / pace
-        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and −sin(2πm·z⁰+2h) in turn, divided by k!:
-        # of sin h cos h and of sin²h.
+        # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and
+        # −sin(2πm·z⁰+2h) in turn, divided by k!: of sin h cos h and of sin²h.
         offset = 2 * np.pi * (self._modes @ self._in_tau1.start)
-        cosine, sine = np.cos(offset), np.sin(offset)
-        sizes = 2 * np.stack([amplitudes, 2 * coefficients, -coefficients * pace, -coefficients * pace**2 / 3], axis=1)
+        cosine = np.cos(offset)
+        sine = np.sin(offset)
+        sizes = 2 * np.stack(
+            [amplitudes, 2 * coefficients, -coefficients * pace, -coefficients * pace**2 / 3],
+            axis=1,
+        )
         of_products = sizes * np.stack([cosine, -sine, cosine, -sine], axis=1)
         of_squares = -sizes * np.stack([sine, cosine, sine, cosine], axis=1)
-        self._sum, few = _Sum.of(mean, self._modes, of_products, of_squares), max(_FIRST_MODES, int(_FIRST_PART * len(modes)))
-        self._first = _Sum.of(mean, self._modes[:few], of_products[:few], of_squares[:few]) if few < len(modes) else None
+        self._sum, few = (
+            _Sum.of(mean, self._modes, of_products, of_squares),
+            max(_FIRST_MODES, int(_FIRST_PART * len(modes))),
+        )
+        self._first = (
+            _Sum.of(mean, self._modes[:few], of_products[:few], of_squares[:few])
+            if few < len(modes)
+            else None
+        )
         self._reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
-        self._longest = 1 / np.maximum(np.abs(np.concatenate([pace / 2, np.pi * at_edge])), np.finfo(float).tiny)
+        self._longest = 1 / np.maximum(
+            np.abs(np.concatenate([pace / 2, np.pi * at_edge])), np.finfo(float).tiny
+        )
         self._longest_of_all = float(np.max(self._longest, initial=0.0))
         self._converged = self._last_step(coefficients, pace)
 
@@ -107,16 +141,22 @@ class FourierTimeMap(TimeMap):
     def ahead(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
-        return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[:, : self._genus]
+        return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[
+            :, : self._genus
+        ]
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
-        """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or for the time elapsed.
+        """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or
+        for the time elapsed.
 
-        So are those next to them that are left out, and others are smaller. An error of phase k moves τ₁ by 2F_m 2πm_k/F_0 of it
-        for as long. Errors of different modes add in squares. To these comes one rounding of δ.
+        So are those next to them that are left out, and others are smaller. An error of phase k
+        moves τ₁ by 2F_m 2πm_k/F_0 of it for as long. Errors of different modes add in squares. To
+        these comes one rounding of δ.
         """
         elapsed = max(abs(tau1.item(0)), abs(tau1.item(-1)))
-        of_all, sway = self._swayed if elapsed > self._longest_of_all else self._bound_modes(elapsed)
+        of_all, sway = (
+            self._swayed if elapsed > self._longest_of_all else self._bound_modes(elapsed)
+        )
         return of_all + float(sway @ of_start), float(sway @ of_rates)
 
     @cached_property
@@ -124,40 +164,61 @@ class FourierTimeMap(TimeMap):
         return self._bound_modes(np.inf)
 
     def _bound_modes(self, elapsed: float) -> tuple[float, Array]:
-        """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for the time elapsed."""
+        """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for
+        the time elapsed.
+        """
         lengths = np.minimum(self._longest, elapsed)
         of_modes = self._off * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
         shifts = self._pull * lengths[: self.size, None]
-        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt((shifts * shifts).sum(axis=0))
+        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt(
+            (shifts * shifts).sum(axis=0)
+        )
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
         return np.asarray(self._mean * tau1 + self._sum.at(self._in_tau1.advance(tau1))[0])
 
     def _last_step(self, coefficients: Array, pace: Array) -> float:
-        """Return the step of τ₁ that leaves _OPEN: of s stays |a³ − 2ab + c| s⁴, with t(τ₁+x) − t(τ₁) ∝ x + ax² + bx³ + cx⁴ …"""
+        """Return the step of τ₁ that leaves _OPEN: of s stays |a³ − 2ab + c| s⁴, with t(τ₁+x) −
+        t(τ₁) ∝ x + ax² + bx³ + cx⁴ …
+        """
         least = self._mean - 2 * float(np.sum(np.abs(coefficients)))
         if least < _LEAST_SLOPE * self._mean:
             return _SETTLED / self._fastest
-        a, b, c = (float(np.sum(np.abs(coefficients * pace**k))) / (least * d) for k, d in ((1, 1), (2, 3), (3, 12)))
+        a, b, c = (
+            float(np.sum(np.abs(coefficients * pace**k))) / (least * d)
+            for k, d in ((1, 1), (2, 3), (3, 12))
+        )
         return float((_OPEN / (self._fastest * (a**3 + 2 * a * b + c))) ** 0.25) if a else np.inf
 
     def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
-        """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ > 0; large modes come first."""
-        uniform, delta = self._in_time.advance(times, remainders), np.zeros(times.size)
-        reach, mean, rates = np.full(times.size, self._reach), self._mean, self._in_tau1.rates
+        """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ >
+        0; large modes come first.
+        """
+        uniform = self._in_time.advance(times, remainders)
+        delta = np.zeros(times.size)
+        reach = np.full(times.size, self._reach)
+        mean = self._mean
+        rates = self._in_tau1.rates
 
         def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:
             value, *rise = self._sum.at(uniform[rows] + delta[:, None] * rates)
             value += mean * delta
             return value, fourth_order_divisor(value, *rise)
 
-        if self._first is not None:  # a truncated sum need not increase: one plain step towards it is all it is good for
+        # a truncated sum need not increase: one plain step towards it is all it is good for
+        if self._first is not None:
             value, *rise = self._first.at(uniform)
             delta = np.maximum(
-                np.minimum(-value / np.maximum(fourth_order_divisor(value, *rise), _LEAST_SLOPE * mean), reach), -reach
+                np.minimum(
+                    -value / np.maximum(fourth_order_divisor(value, *rise), _LEAST_SLOPE * mean),
+                    reach,
+                ),
+                -reach,
             )
-        delta = increasing_root(excess, delta, -reach, reach, self._converged, _SETTLED / self._fastest)
+        delta = increasing_root(
+            excess, delta, -reach, reach, self._converged, _SETTLED / self._fastest
+        )
         z = self._in_time.start + uniform + delta[:, None] * rates
         return times / mean + delta, z[:, : self._genus]
 
@@ -166,8 +227,8 @@ class FourierTimeMap(TimeMap):
 class _Sum:
     """t − F_0τ₁ summed over M modes, and t's Taylor coefficients in τ₁.
 
-    orders (M, g) · highest: their largest entry · weights (2M, 4): what cos h sin h and sin² h of each are multiplied with,
-    h = πm·(z−z⁰) · at_start (3,): the coefficients at z⁰
+    orders (M, g) · highest: their largest entry · weights (2M, 4): what cos h sin h and sin² h of
+    each are multiplied with, h = πm·(z−z⁰) · at_start (3,): the coefficients at z⁰
     """
 
     orders: Integers
@@ -179,12 +240,19 @@ class _Sum:
     def of(cls, mean: float, orders: Integers, of_products: Array, of_squares: Array) -> _Sum:
         """Return the sum from the weights (M, 4) of products and of squares."""
         at_start = np.array([mean, 0.0, 0.0]) - of_squares[:, 1:].sum(axis=0) / 2
-        return cls(orders, int(np.max(np.abs(orders), initial=0)), np.concatenate([of_products, of_squares]), at_start)
+        return cls(
+            orders,
+            int(np.max(np.abs(orders), initial=0)),
+            np.concatenate([of_products, of_squares]),
+            at_start,
+        )
 
     def at(self, advance: Array) -> Array:
-        """Return the sum at z = z⁰ + advance (N, g) and the coefficients of the first three powers, shape (4, N).
+        """Return the sum at z = z⁰ + advance (N, g) and the coefficients of the first three powers,
+        shape (4, N).
 
-        The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or the advance is small.
+        The difference of sines is 2 cos(πm·(z+z⁰)) sin(πm·(z−z⁰)), so nothing cancels when m·f or
+        the advance is small.
         """
         (count, _), (modes, _) = advance.shape, self.orders.shape
         result = np.empty((count, 4))
@@ -192,7 +260,9 @@ class _Sum:
         room = np.empty((2, modes, block))
         for first in range(0, count, block):
             rows = slice(first, first + block)
-            half = waves_at(np.pi * advance[rows], self.orders, self.highest, room[:, :, : count - first])
+            half = waves_at(
+                np.pi * advance[rows], self.orders, self.highest, room[:, :, : count - first]
+            )
             cosines, sines = half
             cosines *= sines
             sines *= sines
@@ -204,10 +274,12 @@ class _Sum:
 def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
     """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
 
-    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes too much of that, the mode is a
-    multiple of a slow combination.
+    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
+    too much of that, the mode is a multiple of a slow combination.
     """
-    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (np.count_nonzero(modes, axis=1) > 1)
+    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (
+        np.count_nonzero(modes, axis=1) > 1
+    )
     if not slow.any():
         return modes, modes[:0]
     multiples = np.gcd.reduce(modes[slow], axis=1)
@@ -218,50 +290,76 @@ def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integ
 
 
 def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
-    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0 and above its rounding, F_m, the modes
-    next to them, and by what part of F_0 each is off.
+    """Return the modes m (first nonzero entry positive) with |F_m| above a part of F_0 and above
+    its rounding, F_m, the modes next to them, and by what part of F_0 each is off.
 
-    Next to a separatrix there are directions in which one column stays, and a determinant is rounding without end.
+    Next to a separatrix there are directions in which one column stays, and a determinant is
+    rounding without end.
     """
 
     def made(weights: Array, G: Array, _: int) -> tuple[Array, Array, float, Array]:
         angles = 2 * np.pi * G.T
-        return weights.T, angles, _COLUMN_ROUNDING * float(np.linalg.norm(weights)), np.abs(angles).max(axis=1)
+        return (
+            weights.T,
+            angles,
+            _COLUMN_ROUNDING * float(np.linalg.norm(weights)),
+            np.abs(angles).max(axis=1),
+        )
 
-    columns, mean = ColumnsForModes(rate, made), float(rate.mean)
+    columns = ColumnsForModes(rate, made)
+    mean = float(rate.mean)
 
     def determinants(modes: Integers) -> tuple[Array, NDArray[np.bool_]]:
-        sizes, found = np.abs(modes), columns(modes)
-        matrices = np.stack([np.cos(modes @ angles) @ weights for weights, angles, _, _ in found], axis=2)
-        lengths, others = np.linalg.norm(matrices, axis=1), ~np.eye(len(found), dtype=bool)
+        sizes = np.abs(modes)
+        found = columns(modes)
+        matrices = np.stack(
+            [np.cos(modes @ angles) @ weights for weights, angles, _, _ in found], axis=2
+        )
+        lengths = np.linalg.norm(matrices, axis=1)
+        others = ~np.eye(len(found), dtype=bool)
         # An angle is off by a rounding for each entry of m, and so is its cosine.
-        off = sum(one * (1 + sizes @ wide) * lengths[:, others[s]].prod(axis=1) for s, (_, _, one, wide) in enumerate(found))
+        off = sum(
+            one * (1 + sizes @ wide) * lengths[:, others[s]].prod(axis=1)
+            for s, (_, _, one, wide) in enumerate(found)
+        )
         values = float(rate.scale) / mean * np.stack([np.linalg.det(matrices), off])
         return values.T, np.abs(values[0]) > np.maximum(_SMALLEST_MODE, values[1])
 
     modes, values, edge = find_significant_modes(rate.inversion.periods.genus, determinants)
-    return modes, mean * values[:, 0], edge, max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2)
+    return (
+        modes,
+        mean * values[:, 0],
+        edge,
+        max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2),
+    )
 
 
 class ColumnsForModes(Generic[T]):
-    """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept for modes that ask for no more.
+    """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept
+    for modes that ask for no more.
 
-    ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may turn by one of ψ
+    ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may
+    turn by one of ψ
     """
 
     def __init__(self, rate: TorusRate[Any], made: Callable[[Values, Values, int], T]) -> None:
-        self._rate, self._made = rate, made
+        self._rate = rate
+        self._made = made
         self._form(0.0)
 
     def _form(self, pace: float) -> None:
-        # A wave of k radians a radian takes k nodes more of half a period than the forms. It is analytic in their strip,
-        # where it is e^{πky/2} at most at height y (e^{ky}, but that G bends at the edge), and k nodes leave e^{−2ky} of it.
+        # A wave of k radians a radian takes k nodes more of half a period than the forms. It is
+        # analytic in their strip, where it is e^{πky/2} at most at height y (e^{ky}, but that G
+        # bends at the edge), and k nodes leave e^{−2ky} of it.
         self._most = math.ceil(pace + max(_SPARE_PACE, pace / 2))
         count = max(self._rate.needed_nodes) + self._most
         columns = self._rate.columns(count)
         self._columns = [self._made(*column, self._most) for column in columns]
         #: Radians of 2πm·G_s by one of ψ for each entry of m, between nodes; entries count as well.
-        self._paces = [np.eye(len(columns)), *(2 * count * np.diff(G.astype(np.float64), axis=0).T for _, G in columns)]
+        self._paces = [
+            np.eye(len(columns)),
+            *(2 * count * np.diff(G.astype(np.float64), axis=0).T for _, G in columns),
+        ]
 
     def __call__(self, modes: Integers) -> list[T]:
         """Return the columns for modes (M, g)."""

@@ -1,4 +1,6 @@
-"""The Fourier clock in balls, for any time at all: the determinants of analytic.fourier_clock to any number of digits."""
+"""The Fourier clock in balls, for any time at all: the determinants of analytic.fourier_clock to
+any number of digits.
+"""
 
 from __future__ import annotations
 
@@ -22,35 +24,48 @@ __all__ = ["MOST_MODES", "FourierTimeMapInBalls"]
 #: Modes looked at before giving up: minutes.
 MOST_MODES = 200_000
 
-#: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double; and waves in memory at once.
-_SETTLED, _BLOCK = 1e-7, 2_000_000
+#: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double;
+#: and waves in memory at once.
+_SETTLED = 1e-7
+_BLOCK = 2_000_000
 
 #: Digits of modes, and of slopes, beyond those of a step.
-_MODE_DIGITS, _SLOPE_DIGITS = 2, 2
+_MODE_DIGITS = 2
+_SLOPE_DIGITS = 2
 
-#: What the modes left out add up to, in units of the smallest kept for 1/(m·f) or for the time elapsed, those kept and those next
-#: to them: others fall off as fast as they came.
+#: What the modes left out add up to, in units of the smallest kept for 1/(m·f) or for the time
+#: elapsed, those kept and those next to them: others fall off as fast as they came.
 _TAIL = 4
 
 
 class FourierTimeMapInBalls:
-    """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is left out is estimated."""
+    """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is
+    left out is estimated.
+    """
 
     name = "fourier"
 
     def __init__(self, orbit: Orbit) -> None:
         self._orbit = orbit
         xp: Any = orbit.rate.inversion.arithmetic
-        self._xp, self._mean = xp, orbit.rate.mean
+        self._xp = xp
+        self._mean = orbit.rate.mean
         self._modes, coefficients, edge = self._select_modes()
         rates = self._modes @ orbit.frequencies
-        self._amplitudes, self._slopes = coefficients / (xp.pi * rates), 2 * coefficients
+        self._amplitudes = coefficients / (xp.pi * rates)
+        self._slopes = 2 * coefficients
         self._bend = np.sum(xp.upper_bound(2 * xp.pi * rates * self._slopes))
         fastest = 2 * xp.pi * np.max(np.abs(orbit.frequencies.astype(float)))
-        #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the mean.
-        self._weights = np.maximum(xp.upper_bound(self._slopes), xp.upper_bound(fastest * self._amplitudes)) / self._mean
+        #: What modes do to dt/dτ₁, or to t within a turn of the fastest phase, as a part of the
+        #: mean.
+        self._weights = (
+            np.maximum(xp.upper_bound(self._slopes), xp.upper_bound(fastest * self._amplitudes))
+            / self._mean
+        )
         #: 1/|m·f| of those kept and of those next to them.
-        self._slowness = np.abs(1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)).astype(float)
+        self._slowness = np.abs(
+            1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)
+        ).astype(float)
 
     @property
     def size(self) -> int:
@@ -63,12 +78,18 @@ class FourierTimeMapInBalls:
 
     def _select_modes(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
-        rate, xp = self._orbit.rate, self._xp
-        columns = ColumnsForModes(rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp))
+        rate = self._orbit.rate
+        xp = self._xp
+        columns = ColumnsForModes(
+            rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp)
+        )
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
             stacks = [column.cosines(modes) for column in columns(modes)]
-            values = np.array([xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)], dtype=object)
+            values = np.array(
+                [xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)],
+                dtype=object,
+            )
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
@@ -77,7 +98,9 @@ class FourierTimeMapInBalls:
         )  # those at the edge are looked at too
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
-        """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ + (t/F_0 + δ)f) − P(z⁰) = 0."""
+        """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ +
+        (t/F_0 + δ)f) − P(z⁰) = 0.
+        """
         xp = self._xp
         uniform = times / self._mean
         z = self._orbit.phases(uniform)
@@ -92,41 +115,64 @@ class FourierTimeMapInBalls:
         return np.asarray(tau1 - interval_step(xp.add_error(value, tail), slope, self._bend, xp)[0])
 
     def _tail(self, elapsed: float) -> Any:
-        """Return what the modes left out add up to: what a mode does to t grows until a half of its period, 1/(2 m·f)."""
-        return _TAIL * self._smallest * float(np.linalg.norm(np.minimum(self._slowness, math.pi * elapsed)))
+        """Return what the modes left out add up to: what a mode does to t grows until a half of its
+        period, 1/(2 m·f).
+        """
+        return (
+            _TAIL
+            * self._smallest
+            * float(np.linalg.norm(np.minimum(self._slowness, math.pi * elapsed)))
+        )
 
     def _excess(self, digits: int, z: Values, delta: Values) -> tuple[Values, Values]:
-        """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step asks for no more."""
-        xp, half, start = self._xp, math.ceil(digits / 2) + _SLOPE_DIGITS, self._orbit.start[None, :]
+        """Return F_0 δ + P(z + δf) − P(z⁰) to so many digits, and its slope to half of them: a step
+        asks for no more.
+        """
+        xp = self._xp
+        half = math.ceil(digits / 2) + _SLOPE_DIGITS
+        start = self._orbit.start[None, :]
         turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
         selected = self._select_by_digits(digits)
-        exponentials = sums_over_modes("sines", self._modes[selected], self._amplitudes[selected], turns, xp.at(digits))
+        exponentials = sums_over_modes(
+            "sines", self._modes[selected], self._amplitudes[selected], turns, xp.at(digits)
+        )
         value = self._mean * delta + exponentials[1:] - exponentials[0]
         selected = self._select_by_digits(half)
         with xp.at(half) as fewer:
-            exponentials = sums_over_modes("cosines", self._modes[selected], self._slopes[selected], turns[1:], fewer)
-            return value, xp.add_error(self._mean + exponentials, np.sum(xp.upper_bound(self._slopes[~selected])))
+            exponentials = sums_over_modes(
+                "cosines", self._modes[selected], self._slopes[selected], turns[1:], fewer
+            )
+            return value, xp.add_error(
+                self._mean + exponentials, np.sum(xp.upper_bound(self._slopes[~selected]))
+            )
 
     def _select_by_digits(self, digits: int) -> NDArray[np.bool_]:
         """Return the modes that matter to so many digits."""
-        return np.asarray(self._weights > self._xp.number(10) ** -(digits + _MODE_DIGITS), dtype=bool)
+        return np.asarray(
+            self._weights > self._xp.number(10) ** -(digits + _MODE_DIGITS), dtype=bool
+        )
 
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return δ in double precision, from the uniform phases (N, g)."""
         selected = self._select_by_digits(DOUBLE.digits)
-        modes, amplitudes, slopes = (
-            self._modes[selected],
-            self._amplitudes[selected].astype(float),
-            self._slopes[selected].astype(float),
-        )
-        frequencies, mean = self._orbit.frequencies.astype(float), float(self._mean)
+        modes = self._modes[selected]
+        amplitudes = self._amplitudes[selected].astype(float)
+        slopes = self._slopes[selected].astype(float)
+        frequencies = self._orbit.frequencies.astype(float)
+        mean = float(self._mean)
         begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
-        reach, converged = 2 * float(np.sum(np.abs(amplitudes))) / mean, _SETTLED / float(np.max(np.abs(frequencies)))
-        highest, block = int(np.max(np.abs(modes), initial=0)), max(1, _BLOCK // max(1, len(modes)))
+        reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
+        converged = _SETTLED / float(np.max(np.abs(frequencies)))
+        highest = int(np.max(np.abs(modes), initial=0))
+        block = max(1, _BLOCK // max(1, len(modes)))
 
         def root(z: NDArray[np.float64]) -> NDArray[np.float64]:
-            def excess(delta: NDArray[np.float64], rows: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-                cosines, sines = waves_at(2 * np.pi * (z[rows] + delta[:, None] * frequencies), modes, highest)
+            def excess(
+                delta: NDArray[np.float64], rows: Rows
+            ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                cosines, sines = waves_at(
+                    2 * np.pi * (z[rows] + delta[:, None] * frequencies), modes, highest
+                )
                 return mean * delta + amplitudes @ sines - begin, mean + slopes @ cosines
 
             bounds = np.full(len(z), reach)

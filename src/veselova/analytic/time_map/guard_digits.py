@@ -1,4 +1,6 @@
-"""Frequencies for times far out: with digits beyond those of a double, in balls, which are faster than any other."""
+"""Frequencies for times far out: with digits beyond those of a double, in balls, which are faster
+than any other.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,20 @@ __all__ = ["extended_precision_flows"]
 _SPARE = 6
 
 
-def extended_precision_flows(spectrum: Spectrum, origin: NDArray[np.float64], time: str) -> tuple[LinearFlow, LinearFlow, float]:
-    """Return z(τ₁) = z⁰ + fτ₁, the uniform part z⁰ + (f/F_0)t, and F_0, from z⁰ in double precision."""
+def extended_precision_flows(
+    spectrum: Spectrum, origin: NDArray[np.float64], time: str
+) -> tuple[LinearFlow, LinearFlow, float]:
+    """Return z(τ₁) = z⁰ + fτ₁, the uniform part z⁰ + (f/F_0)t, and F_0, from z⁰ in double
+    precision.
+    """
     with balls(spectrum.arithmetic.digits, certified=False) as fine:
         exact = spectrum.in_arithmetic(fine)
         curve = Curve.of(exact, balls(GUARD_DIGITS + _SPARE, certified=False))
     with balls(GUARD_DIGITS + _SPARE, certified=False):
         periods = Periods(curve)
         mean = TimeRate.of(exact, AbelJacobi(periods), time).mean
-        of_tau1, of_time = (LinearFlow.of(origin, rates) for rates in (periods.frequencies, periods.frequencies / mean))
+        of_tau1, of_time = (
+            LinearFlow.of(origin, rates)
+            for rates in (periods.frequencies, periods.frequencies / mean)
+        )
     return of_tau1, of_time, float(mean)

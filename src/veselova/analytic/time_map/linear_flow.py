@@ -26,7 +26,8 @@ _STANDING = 1e-60
 
 @dataclass(frozen=True)
 class LinearFlow:
-    """z(x) = start + x·(rates + rests), x a time; ``rests`` are the digits of the rates beyond double precision.
+    """z(x) = start + x·(rates + rests), x a time; ``rests`` are the digits of the rates beyond
+    double precision.
 
     Phases are taken modulo 2: the attitude has period 2 in z, everything else period 1.
     """
@@ -37,29 +38,39 @@ class LinearFlow:
 
     @classmethod
     def of(cls, start: Array, rates: Values) -> LinearFlow:
-        """Return the flow with rates given in any arithmetic: the part beyond a double goes to the rests."""
+        """Return the flow with rates given in any arithmetic: the part beyond a double goes to the
+        rests.
+        """
         leading = np.array([float(rate) for rate in rates])
-        rests = np.array([float(rate - head) for rate, head in zip(rates, leading.tolist(), strict=True)])
+        rests = np.array(
+            [float(rate - head) for rate, head in zip(rates, leading.tolist(), strict=True)]
+        )
         return cls(start, leading, rests)
 
     def with_combinations(self, orders: Integers) -> LinearFlow:
-        """Return the flow of z and, after them, of the combinations m·z for integers m (K, g), whose rates keep all digits.
+        """Return the flow of z and, after them, of the combinations m·z for integers m (K, g),
+        whose rates keep all digits.
 
         None of them stands still: it moves by a 1e-60th of the fastest rate instead.
         """
         rates = (DoubleDouble(self.rates, self.rests) * orders).total()
         high = np.where(rates.high == 0, _STANDING * np.max(np.abs(self.rates)), rates.high)
-        start, rests = np.concatenate([self.start, orders @ self.start]), np.concatenate([self.rests, rates.low])
+        start = np.concatenate([self.start, orders @ self.start])
+        rests = np.concatenate([self.rests, rates.low])
         return LinearFlow(start, np.concatenate([self.rates, high]), rests)
 
     def per(self, unit: float) -> LinearFlow:
-        """Return z as a function of x·unit: the rates divided by it, to as many digits as two doubles have."""
+        """Return z as a function of x·unit: the rates divided by it, to as many digits as two
+        doubles have.
+        """
         rates = self.rates / unit
         product, error = exact_product(rates, np.full_like(rates, unit))
         return LinearFlow(self.start, rates, (((self.rates - product) - error) + self.rests) / unit)
 
     def rates_of(self, orders: Integers) -> Array:
-        """Return m·(rates + rests) for integers m (K, g), right to 1e-24 of the largest rate: small ones do not cancel."""
+        """Return m·(rates + rests) for integers m (K, g), right to 1e-24 of the largest rate: small
+        ones do not cancel.
+        """
         quantum = np.ldexp(1.0, math.frexp(float(np.max(np.abs(self.rates))))[1] - _COARSE_BITS)
         coarse = np.rint(self.rates / quantum) * quantum
         return np.asarray(orders @ coarse + orders @ ((self.rates - coarse) + self.rests))
@@ -71,8 +82,10 @@ class LinearFlow:
     def advance(self, x: Array, remainders: Array | None = None) -> Array:
         """Return x·(rates + rests) modulo 2, shape (N, g), to one rounding of the reduced value.
 
-        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact. ``remainders`` (N,) are what the
-        times are beyond x, at most a rounding of it: their products with the rests are below 2^−106 of x·rate.
+        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
+        ``remainders`` (N,) are what the
+        times are beyond x, at most a rounding of it: their products with the rests are below 2^−106
+        of x·rate.
         """
         column = x[:, None]
         product, error = exact_product(column, self.rates, self._halves)

@@ -20,18 +20,25 @@ __all__ = ["integrate_on_panels"]
 Array = NDArray[np.float64]
 
 #: Points per panel, of a short stretch and of a long one.
-_FEW_NODES, _NODES = 24, 48
+_FEW_NODES = 24
+_NODES = 48
 
-#: Panels beyond an end, as ends come from means; none beyond one so near that going on, where it is short, costs little.
-_MARGIN, _NEAR = 2, 4
+#: Panels beyond an end, as ends come from means; none beyond one so near that going on, where it is
+#: short, costs little.
+_MARGIN = 2
+_NEAR = 4
 
-#: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and how many are looked at.
-_MANY_PANELS, _LONGER, _PROBED = 200, (7, 6, 5, 4, 3.5, 3, 2.5), 8
+#: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and
+#: how many are looked at.
+_MANY_PANELS = 200
+_LONGER = (7, 6, 5, 4, 3.5, 3, 2.5)
+_PROBED = 8
 
 #: Last coefficients below this part of the first may be rounding of the phases.
 _NOISE_TAIL = 1e-11
 
-#: Halvings of a panel before giving up; near a separatrix integrands vary over a few hundredths of a cycle.
+#: Halvings of a panel before giving up; near a separatrix integrands vary over a few hundredths of
+#: a cycle.
 _MOST_HALVINGS = 30
 
 #: Nodes evaluated at once.
@@ -46,36 +53,63 @@ def integrate_on_panels(
     floor: float = 0.0,
     noise: float = 0.0,
 ) -> Panels:
-    """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high, and a margin.
+    """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high,
+    and a margin.
 
-    ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean, or of ``floor`` where that is
-    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the rounding of the values may be.
-    Panels that are not resolved are halved, each for itself. An end at zero, where the integral is known, has no margin.
-    Raises Unsolved (``narrow-gap``) where a spike is too short for that.
+    ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean,
+    or of ``floor`` where that is
+    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the
+    rounding of the values may be. Panels that are not resolved are halved, each for itself. An end
+    at zero, where the integral is known, has no margin. Raises Unsolved (``narrow-gap``) where a
+    spike is too short for that.
     """
-    panels = _Panels(integrand, in_tau1, floor, _FEW_NODES, 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))))
+    panels = _Panels(
+        integrand,
+        in_tau1,
+        floor,
+        _FEW_NODES,
+        2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))),
+    )
     if (high - low) / panels.length >= _MANY_PANELS:
         panels = panels.longer(low, high)
-    lefts, length = panels.lefts(low, high), panels.length
+    lefts = panels.lefts(low, high)
+    length = panels.length
     before = np.full(lefts.size, np.inf)
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = panels.series(lefts, length)
-        # A spike may be shorter than its phases are exact, and its series never end; a short one needs no more than a long panel.
-        converged = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (tails * sizes * length <= TAIL * floor * panels.length)
+        # A spike may be shorter than its phases are exact, and its series never end; a short one
+        # needs no more than a long panel.
+        converged = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (
+            tails * sizes * length <= TAIL * floor * panels.length
+        )
         lengths = np.full(lefts.size, length)
-        done.append((lefts[converged], lengths[converged], coefficients[converged], tails[converged], sizes[converged]))
+        done.append(
+            (
+                lefts[converged],
+                lengths[converged],
+                coefficients[converged],
+                tails[converged],
+                sizes[converged],
+            )
+        )
         if np.all(converged):
             return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
         length /= 2
         lefts = (lefts[~converged][:, None] + np.array([0.0, length])).ravel()
         before = np.repeat(tails[~converged], 2)
-    raise Unsolved("narrow-gap", "a spike along the orbit is shorter than phases in doubles are exact; integrate numerically")
+    raise Unsolved(
+        "narrow-gap",
+        "a spike along the orbit is shorter than phases in doubles are exact; integrate "
+        "numerically",
+    )
 
 
 @dataclass(frozen=True)
 class _Panels:
-    """Panels of so many nodes, at first of a length of few bits: borders are exact multiples of it."""
+    """Panels of so many nodes, at first of a length of few bits: borders are exact
+    multiples of it.
+    """
 
     integrand: Callable[[Array], Array]
     in_tau1: LinearFlow
@@ -85,7 +119,8 @@ class _Panels:
 
     def lefts(self, low: float, high: float) -> Array:
         """Return where the panels over a stretch start."""
-        before, after = math.ceil(-low / self.length), math.ceil(high / self.length)
+        before = math.ceil(-low / self.length)
+        after = math.ceil(high / self.length)
         first = before + _MARGIN * (before > _NEAR)
         last = max(after + _MARGIN * (after > _NEAR), first == 0)
         return np.arange(-first, last, dtype=float) * self.length
@@ -98,13 +133,18 @@ class _Panels:
         points, to_coefficients = _chebyshev(self.nodes)
         z = self.in_tau1.phases(lefts)[:, None, :] + (points * length)[:, None] * self.in_tau1.rates
         z = z.reshape(-1, z.shape[2])
-        values = [self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)]
+        values = [
+            self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)
+        ]
         coefficients = np.concatenate(values).reshape(lefts.size, -1) @ to_coefficients
-        sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))  # zero is resolved
+        # zero is resolved
+        sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))
         return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
 
     def longer(self, low: float, high: float) -> _Panels:
-        """Return longer panels of more nodes where such resolve the integrand, and otherwise these."""
+        """Return longer panels of more nodes where such resolve the integrand, and
+        otherwise these.
+        """
         for factor in _LONGER:
             panels = replace(self, nodes=_NODES, length=factor * self.length)
             lefts = panels.lefts(low, high)
@@ -116,7 +156,10 @@ class _Panels:
 
 @lru_cache
 def _chebyshev(count: int) -> tuple[Array, Array]:
-    """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to coefficients; read-only."""
-    points, to_coefficients = np.asarray((np.cos(DOUBLE.nodes(count)) + 1) / 2), np.asarray(DOUBLE.cosine_series(np.eye(count)))
+    """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to
+    coefficients; read-only.
+    """
+    points = np.asarray((np.cos(DOUBLE.nodes(count)) + 1) / 2)
+    to_coefficients = np.asarray(DOUBLE.cosine_series(np.eye(count)))
     points.flags.writeable = to_coefficients.flags.writeable = False
     return points, to_coefficients

@@ -1,4 +1,6 @@
-"""The clock by quadrature: Chebyshev panels of dt/dτ₁ along the orbit. Cost grows with t, hardly with the genus."""
+"""The clock by quadrature: Chebyshev panels of dt/dτ₁ along the orbit. Cost grows with t, hardly
+with the genus.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +24,14 @@ Array = NDArray[np.float64]
 #: Rounding of dt/dτ₁ that all panels share, in ε.
 _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: By how much a phase moves slow parts of t, against their range: π times its order in those that matter.
+#: By how much a phase moves slow parts of t, against their range: π times its order in those that
+#: matter.
 _TURN = 3 * np.pi
 
-#: Cycles over which all other parts average out, and the highest order at which some are looked for.
-_AVERAGED, _HIGHEST = 16.0, 8
+#: Cycles over which all other parts average out, and the highest order at which some are looked
+#: for.
+_AVERAGED = 16.0
+_HIGHEST = 8
 
 #: A Newton step of this size, in half panels, leaves an error of its square.
 _SETTLED = 1e-9
@@ -40,14 +45,24 @@ class ChebyshevTimeMap(TimeMap):
 
     name: ClassVar[str] = "panels"
 
-    def __init__(self, rate: Callable[[Array], Array], mean: float, in_tau1: LinearFlow, earliest: float, latest: float) -> None:
-        self._rate, self._mean, self.in_tau1 = rate, mean, in_tau1
+    def __init__(
+        self,
+        rate: Callable[[Array], Array],
+        mean: float,
+        in_tau1: LinearFlow,
+        earliest: float,
+        latest: float,
+    ) -> None:
+        self._rate = rate
+        self._mean = mean
+        self.in_tau1 = in_tau1
         self._earliest, self._latest = min(earliest, 0.0), max(latest, 0.0)
 
     @cached_property
     def panels(self) -> Panels:
         """Return the panels; whoever has them already may set them."""
-        low, high = self._earliest / self._mean, self._latest / self._mean
+        low = self._earliest / self._mean
+        high = self._latest / self._mean
         panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         # The mean clock's estimate; extended where that was short.
         while panels.values[0] > self._earliest or panels.values[-1] < self._latest:
@@ -70,38 +85,48 @@ class ChebyshevTimeMap(TimeMap):
         tau1 = means / self._mean
         low, high = self.panels.borders[[0, -1]].tolist()
         if tau1[0] < low or tau1[-1] > high:
-            low, high = (1.5 * float(tau1[0]) if tau1[0] < low else low), (1.5 * float(tau1[-1]) if tau1[-1] > high else high)
+            low = 1.5 * float(tau1[0]) if tau1[0] < low else low
+            high = 1.5 * float(tau1[-1]) if tau1[-1] > high else high
             self.panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:
-        """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that they share.
+        """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that
+        they share.
 
         What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
         """
         panels = self.panels
         # The tails are those of t; divided by the mean rate they are those of τ₁.
         error = panels.error(tau1) / panels.mean_size
-        # The fastest phase has no part in them where it takes orders that are not there to make up for it.
+        # The fastest phase has no part in them where it takes orders that are not there to make up
+        # for it.
         rates = np.abs(self.in_tau1.rates)
         slow = _HIGHEST * (rates.sum() - rates) >= rates
         if slow.any():
             # Nor do they lead farther than the time elapsed, where little of it passes at first.
             elapsed = np.abs(np.interp(tau1, panels.borders, panels.values)) / self._mean
             error += (
-                _TURN * np.minimum(self._drift(tau1), elapsed) * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
+                _TURN
+                * np.minimum(self._drift(tau1), elapsed)
+                * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
             )
         return np.asarray(error), _SHARED_ROUNDING
 
     def _drift(self, tau1: Array) -> Array:
-        """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero and Neumann times, (N,)."""
-        borders, values = self.panels.borders, self.panels.values
+        """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero
+        and Neumann times, (N,).
+        """
+        borders = self.panels.borders
+        values = self.panels.values
         stretches = np.floor(borders * (np.max(np.abs(self.in_tau1.rates)) / _AVERAGED))
         if stretches[0] == stretches[-1]:
             return np.zeros(tau1.size)
         begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
         counts = np.diff(begins, append=borders.size)
-        centres, means = (np.add.reduceat(x, begins) / counts for x in (borders, values / self._mean - borders))
+        centres, means = (
+            np.add.reduceat(x, begins) / counts for x in (borders, values / self._mean - borders)
+        )
         first = int(np.argmin(np.abs(centres)))
         gone = np.abs(means - means[first])
         gone[first:] = np.maximum.accumulate(gone[first:])
@@ -113,7 +138,9 @@ class ChebyshevTimeMap(TimeMap):
         return self.panels.at(tau1)
 
     def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
-        """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's polynomial."""
+        """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's
+        polynomial.
+        """
         panels = self.panels
         panel = panels.panel_of(panels.values, times)
         target = times - panels.values[panel]

@@ -1,8 +1,8 @@
 """The rate of the clock, d(time)/dτ₁ as a function on the torus, and what a clock is.
 
-dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper); for the arc length of a
-geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent clocks integrate either along z = z⁰ + fτ₁: analytic.fourier_clock
-and analytic.panel_clock.
+dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper);
+for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent clocks integrate
+either along z = z⁰ + fτ₁: analytic.fourier_clock and analytic.panel_clock.
 """
 
 from __future__ import annotations
@@ -61,10 +61,12 @@ class TorusRate(ABC, Generic[P]):
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
 
-        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ · e^{−2πi m·z} over the torus is
-        F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹: one-variable integrals only.
+        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ ·
+        e^{−2πi m·z} over the torus is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the
+        weights carrying a⁻¹: one-variable integrals only.
         """
-        genus, result = self.inversion.periods.genus, []
+        genus = self.inversion.periods.genus
+        result = []
         psi = self.inversion.arithmetic.nodes(count)
         for s in range(genus):
             angles = np.zeros((count, genus), dtype=psi.dtype)
@@ -73,21 +75,28 @@ class TorusRate(ABC, Generic[P]):
         return result
 
     def _weights(self, forms: Values) -> Values:
-        """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number, shape (g, N)."""
+        """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number,
+        shape (g, N).
+        """
         periods = self.inversion.periods
-        return np.asarray(periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1]))
+        return np.asarray(
+            periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1])
+        )
 
     @cached_property
     def mean(self) -> Any:
         """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
-        means = [np.sum(self._weights(self._weight_at_nodes(s)), axis=-1) for s in range(periods.genus)]
+        means = [
+            np.sum(self._weights(self._weight_at_nodes(s)), axis=-1) for s in range(periods.genus)
+        ]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
 
 
 @dataclass(frozen=True)
 class TimeRate(TorusRate[Periods]):
-    """The rate of t, s or τ₁ itself on a hyperelliptic torus; its factors φ_s are at most one at any genus.
+    """The rate of t, s or τ₁ itself on a hyperelliptic torus; its factors φ_s are at most one at
+    any genus.
 
     time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
     """
@@ -97,7 +106,8 @@ class TimeRate(TorusRate[Periods]):
     @classmethod
     def of(cls, spectrum: Spectrum, inversion: AbelJacobi[Periods], time: str) -> TimeRate:
         """Return the rate whose scale follows from its value at the start."""
-        curve, fine = inversion.periods.curve, spectrum.arithmetic
+        curve = inversion.periods.curve
+        fine = spectrum.arithmetic
         product = fine.number(1)
         with spectrum.working():
             for s, point in enumerate(spectrum.spheroconic):
@@ -135,7 +145,9 @@ class TimeRate(TorusRate[Periods]):
         return np.asarray(sign * forms * self._factor(s, below)[..., None, :])
 
 
-def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic | Decimals) -> Any:
+def rate_factor(
+    curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic | Decimals
+) -> Any:
     """Return φ(λ_s) for the cut s = 0…g−1."""
     if time == "t":
         return arithmetic.sqrt(point / _number(curve.point(2 * s + 2), arithmetic))
@@ -147,14 +159,20 @@ def _number(value: Any, arithmetic: Arithmetic | Decimals) -> Any:
 
 
 def time_rate(spectrum: Spectrum, time: str, arithmetic: Arithmetic) -> Callable[[Values], Values]:
-    """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving directions."""
+    """Return dτ₁/d(time), a power of (q,Aq), as a function of positions (N, m) along the moving
+    directions.
+    """
     with spectrum.working():
-        start, A = arithmetic.array(spectrum.q), arithmetic.array(1 / spectrum.inverse)
-    relative, at_start = A / ((start * start) @ A), arithmetic.number(spectrum.time_rate)
+        start = arithmetic.array(spectrum.q)
+        A = arithmetic.array(1 / spectrum.inverse)
+    relative = A / ((start * start) @ A)
+    at_start = arithmetic.number(spectrum.time_rate)
 
     def rate(q: Values) -> Values:
         ratio = (q * q) @ relative
-        power = 1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
+        power = (
+            1 / arithmetic.sqrt(ratio) if time == "t" else ratio if time == "s" else 1 + 0 * ratio
+        )
         return np.asarray(at_start * power)
 
     return rate
@@ -167,7 +185,9 @@ class TimeMap(ABC):
 
     @abstractmethod
     def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
-        """Return (τ₁, z modulo 2) at physical times, doubles (N,) and their remainders (N,), which z takes with all digits."""
+        """Return (τ₁, z modulo 2) at physical times, doubles (N,) and their remainders (N,), which
+        z takes with all digits.
+        """
 
     @property
     @abstractmethod
@@ -184,10 +204,11 @@ class TimeMap(ABC):
 
     @abstractmethod
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array | float, float]:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0: what does not grow, (N,) or one for all
-        times, and what is to be multiplied with |τ₁|.
+        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0: what does
+        not grow, (N,) or one for all times, and what is to be multiplied with |τ₁|.
 
-        of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some m·f nearly vanishes.
+        of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some
+        m·f nearly vanishes.
         """
 
     @property
@@ -202,7 +223,8 @@ class UniformTimeMap(TimeMap):
     name: ClassVar[str] = "uniform"
 
     def __init__(self, in_time: LinearFlow, rate: float) -> None:
-        self._in_time, self._rate = in_time, rate
+        self._in_time = in_time
+        self._rate = rate
 
     @property
     def mean(self) -> float:

@@ -1,4 +1,6 @@
-"""Inertia operators 𝓘: 𝔤 → 𝔤 on coordinates in an orthonormal basis; on so(n) also the special one of (4.5)."""
+"""Inertia operators 𝓘: 𝔤 → 𝔤 on coordinates in an orthonormal basis; on so(n) also the special one
+of (4.5).
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,16 @@ _FORMS = '{"special": [A_1, …, A_n]} or {"matrix": …}'
 
 
 def apply_operator(operator: Any, rows: Any, ops: Operations = FLOATS) -> Any:
-    """Return a symmetric operator applied to coordinate rows (…, D); it is a matrix, or its diagonal as a vector."""
+    """Return a symmetric operator applied to coordinate rows (…, D); it is a matrix, or its
+    diagonal as a vector.
+    """
     return rows * operator if operator.ndim == 1 else ops.dot(rows, operator)
 
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """A symmetric positive definite operator and its inverse: matrices (D, D), or their diagonals (D,) where they have no more.
+    """A symmetric positive definite operator and its inverse: matrices (D, D), or their diagonals
+    (D,) where they have no more.
 
     A   the numbers of (4.5) where the operator is the special one, else None
     """
@@ -44,10 +49,11 @@ class Inertia:
 
     @classmethod
     def of(cls, value: Any, n: int) -> Inertia:
-        """Return the operator on so(n) that a mapping states, in the basis E_i∧E_j, i < j, in lexicographic order.
+        """Return the operator on so(n) that a mapping states, in the basis E_i∧E_j, i < j, in
+        lexicographic order.
 
-        ``{"special": [A_1, …, A_n]}`` is (4.5), 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j; ``{"matrix": …}`` any symmetric positive
-        definite matrix of size n(n−1)/2. Raises InvalidInput.
+        ``{"special": [A_1, …, A_n]}`` is (4.5), 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j; ``{"matrix":
+        …}`` any symmetric positive definite matrix of size n(n−1)/2. Raises InvalidInput.
         """
         if not isinstance(value, Mapping) or len(value) != 1:
             raise InvalidInput(("inertia",), _FORMS, show(value))
@@ -60,7 +66,9 @@ class Inertia:
 
     @classmethod
     def special(cls, A: Any, n: int) -> Inertia:
-        """Return the operator (4.5) of n positive numbers A, each entry rounded once from the exact data."""
+        """Return the operator (4.5) of n positive numbers A, each entry rounded once from the exact
+        data.
+        """
         path = ("inertia", "special")
         exact = exact_vector(A, path, n)
         determinant = Fraction(1)
@@ -70,35 +78,58 @@ class Inertia:
             determinant = determinant * value
         entries = [exact[i] * exact[j] / determinant for i in range(n) for j in range(i + 1, n)]
         try:
-            operator, inverse = to_float(entries), to_float([1 / entry for entry in entries])
+            operator = to_float(entries)
+            inverse = to_float([1 / entry for entry in entries])
         except OverflowError:
             operator = inverse = np.zeros(1)
         if not np.all(operator) or not np.all(inverse):
-            raise InvalidInput(path, "moments of inertia A_iA_j/det A within the range of a float", "some beyond it")
+            raise InvalidInput(
+                path,
+                "moments of inertia A_iA_j/det A within the range of a float",
+                "some beyond it",
+            )
         if max(entries) > min(entries) * Fraction(_WIDEST):
             given = f"{float(min(entries)):.3g} and {float(max(entries)):.3g}"
-            raise InvalidInput(path, f"moments of inertia A_iA_j/det A with ratios up to {_WIDEST:.0e}", given)
+            raise InvalidInput(
+                path, f"moments of inertia A_iA_j/det A with ratios up to {_WIDEST:.0e}", given
+            )
         return cls(operator, inverse, to_float(exact))
 
     @classmethod
-    def of_matrix(cls, matrix: Any, size: int, path: tuple[str | int, ...] = ("inertia",)) -> Inertia:
-        """Return the operator of a symmetric positive definite matrix of a size; raises InvalidInput otherwise."""
+    def of_matrix(
+        cls, matrix: Any, size: int, path: tuple[str | int, ...] = ("inertia",)
+    ) -> Inertia:
+        """Return the operator of a symmetric positive definite matrix of a size; raises
+        InvalidInput otherwise.
+        """
         exact = to_float(exact_matrix(matrix, path, size))
         largest = float(np.max(np.abs(exact)))
         asymmetry = np.abs(exact - exact.T)
         if np.max(asymmetry) > INPUT_TOLERANCE * largest:
             i, j = divmod(int(np.argmax(asymmetry)), size)
-            raise InvalidInput((*path, i, j), "a symmetric matrix", f"{exact[i, j]} against {exact[j, i]} across the diagonal")
+            raise InvalidInput(
+                (*path, i, j),
+                "a symmetric matrix",
+                f"{exact[i, j]} against {exact[j, i]} across the diagonal",
+            )
         unit = (exact / 2 + exact.T / 2) / (largest or 1.0)
         values, axes = np.linalg.eigh(unit)
         if values[0] * _WIDEST <= values[-1]:
-            kind = "a singular" if abs(values[0]) * _WIDEST <= np.max(np.abs(values)) else "an indefinite"
+            kind = (
+                "a singular"
+                if abs(values[0]) * _WIDEST <= np.max(np.abs(values))
+                else "an indefinite"
+            )
             given = f"{kind} one, with eigenvalue {values[0] * largest:.3g}"
             raise InvalidInput(path, "a positive definite matrix", given)
         with np.errstate(over="ignore"):  # refused below
             inverse: Array = np.asarray(axes / values @ axes.T, dtype=np.float64) / largest
         if not np.all(np.isfinite(inverse)):
-            raise InvalidInput(path, "an operator with an inverse within the range of a float", f"entries up to {largest:.3g}")
+            raise InvalidInput(
+                path,
+                "an operator with an inverse within the range of a float",
+                f"entries up to {largest:.3g}",
+            )
         operator: Array = unit * largest
         if np.count_nonzero(unit) == size:
             operator, inverse = np.diag(operator).copy(), np.asarray(1 / np.diag(operator))
@@ -114,7 +145,9 @@ class Inertia:
     @cached_property
     def moments(self) -> Array:
         """Return the principal moments of inertia (D,), increasing."""
-        found = np.sort(self.operator) if self.operator.ndim == 1 else np.linalg.eigvalsh(self.operator)
+        found = (
+            np.sort(self.operator) if self.operator.ndim == 1 else np.linalg.eigvalsh(self.operator)
+        )
         return read_only(np.asarray(found, dtype=np.float64))
 
     @property

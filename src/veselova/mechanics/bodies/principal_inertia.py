@@ -1,4 +1,6 @@
-"""The matrix A of a body: given along its principal axes, or as a symmetric matrix that is diagonalised."""
+"""The matrix A of a body: given along its principal axes, or as a symmetric matrix that is
+diagonalised.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,14 @@ __all__ = ["positive_numbers", "principal_inertia", "require_moderate", "symmetr
 _EPSILON = float(np.finfo(float).eps)
 
 #: The inverse of a smaller number is no float; the square of one up to the second is.
-_LEAST, _MODERATE = Fraction(1, 10**308), Fraction(10**120)
+_LEAST = Fraction(1, 10**308)
+_MODERATE = Fraction(10**120)
 
 
 def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
-    """Return the entries of A, two or more numbers above zero, exactly; ``name`` is that of the argument."""
+    """Return the entries of A, two or more numbers above zero, exactly; ``name`` is that of the
+    argument.
+    """
     diagonal = exact_vector(A, (name,))
     if len(diagonal) < 2:
         raise InvalidInput((name,), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
@@ -29,23 +34,32 @@ def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
         if value <= 0 or float(value) == 0:
             raise InvalidInput((name, i), "a finite number greater than 0", show(A[i]))
         if value < _LEAST:
-            raise InvalidInput((name, i), "a number whose inverse is within the range of a float", show(A[i]))
+            raise InvalidInput(
+                (name, i), "a number whose inverse is within the range of a float", show(A[i])
+            )
     return diagonal
 
 
 def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = _MODERATE) -> None:
-    """Raise InvalidInput unless the numbers and their inverses are below ``limit``: some products of them must stay floats."""
-    least, most = min(values), max(values)
+    """Raise InvalidInput unless the numbers and their inverses are below ``limit``: some products
+    of them must stay floats.
+    """
+    least = min(values)
+    most = max(values)
     if most > limit or least < 1 / limit:
         given = f"numbers from {float(least):.3g} to {float(most):.3g}"
-        raise InvalidInput((name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given)
+        raise InvalidInput(
+            (name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given
+        )
 
 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], WideAxes | None]:
-    """Return the diagonal of A as exact numbers, and the principal axes when A was given as a matrix.
+    """Return the diagonal of A as exact numbers, and the principal axes when A was given as a
+    matrix.
 
-    Both are of the symmetric part, to 2^−256 of its largest entry: what is seen along them has no rounding of theirs.
-    The axes are a rotation, determinant +1, so that vector products and determinants of frames are the same along them.
+    Both are of the symmetric part, to 2^−256 of its largest entry: what is seen along them has no
+    rounding of theirs. The axes are a rotation, determinant +1, so that vector products and
+    determinants of frames are the same along them.
     ``name``: of the argument, for its refusals.
     """
     if not is_matrix(A):
@@ -57,18 +71,29 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Wi
         raise InvalidInput((name,), "a positive definite matrix", "zero")
     axes = wide_axes(matrix)
     if axes.values[0] <= len(A) * Fraction(_EPSILON) * axes.values[-1]:
-        raise InvalidInput((name,), "a positive definite matrix", f"one with eigenvalue {float(axes.values[0]):.3g}")
+        raise InvalidInput(
+            (name,),
+            "a positive definite matrix",
+            f"one with eigenvalue {float(axes.values[0]):.3g}",
+        )
     return axes.values, axes
 
 
 def symmetric_matrix(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], ...]:
-    """Return the symmetric part of a matrix exactly; raises InvalidInput unless it is all of it to 1e-9 of the largest entry."""
+    """Return the symmetric part of a matrix exactly; raises InvalidInput unless it is all of it to
+    1e-9 of the largest entry.
+    """
     given = exact_matrix(A, (name,), len(A))
     matrix = to_float(given)
     asymmetry = np.abs(matrix / 2 - matrix.T / 2)  # a sum may leave the range of a float
     if np.max(asymmetry) > INPUT_TOLERANCE / 2 * np.max(np.abs(matrix)):
         i, j = divmod(int(np.argmax(asymmetry)), len(given))
-        raise InvalidInput((name, i, j), "a symmetric matrix", f"{matrix[i, j]} against {matrix[j, i]} across the diagonal")
+        raise InvalidInput(
+            (name, i, j),
+            "a symmetric matrix",
+            f"{matrix[i, j]} against {matrix[j, i]} across the diagonal",
+        )
     return tuple(
-        tuple((x + y) / 2 for x, y in zip(*lines, strict=True)) for lines in zip(given, zip(*given, strict=True), strict=True)
+        tuple((x + y) / 2 for x, y in zip(*lines, strict=True))
+        for lines in zip(given, zip(*given, strict=True), strict=True)
     )

@@ -1,6 +1,8 @@
-"""Inertia operators on so(n): the special one (4.5) of a diagonal A, and any other, as a symmetric positive definite matrix.
+"""Inertia operators on so(n): the special one (4.5) of a diagonal A, and any other, as a symmetric
+positive definite matrix.
 
-Both are kept in units 2^exponent near their own size, so that neither det A nor the unit of the input leaves the float range.
+Both are kept in units 2^exponent near their own size, so that neither det A nor the unit of the
+input leaves the float range.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ def _wedge(X: Any, transposed: Any, ops: Operations) -> Any:
 
 
 class BodyInertia(ABC):
-    """An inertia operator 𝓘 on so(n), in units of 2^exponent: symmetric and positive definite for ⟨X,Y⟩ = −½ tr XY."""
+    """An inertia operator 𝓘 on so(n), in units of 2^exponent: symmetric and positive definite for
+    ⟨X,Y⟩ = −½ tr XY.
+    """
 
     n: int
     exponent: int
@@ -48,7 +52,8 @@ class BodyInertia(ABC):
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
         """Return the ω ∈ 𝓓_r with pr_𝓓 𝓘ω = XPᵀ − PXᵀ: the inverse of (dotX->P), shape (..., n, n).
 
-        X, P are (..., n, r) and meet (condX); symbols have no leading axes. The condition is −(𝓘ω)X = P + XXᵀP.
+        X, P are (..., n, r) and meet (condX); symbols have no leading axes. The condition is −(𝓘ω)X
+        = P + XXᵀP.
         """
 
     @property
@@ -65,7 +70,9 @@ class BodyInertia(ABC):
 
 @dataclass(frozen=True)
 class SpecialInertia(BodyInertia):
-    """𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, equation (4.5), that is 𝓘ω = AωA/det A; A (n,) has determinant near one."""
+    """𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, equation (4.5), that is 𝓘ω = AωA/det A; A (n,) has
+    determinant near one.
+    """
 
     A: Array
     determinant: float
@@ -97,14 +104,18 @@ class SpecialInertia(BodyInertia):
         return np.asarray(self.A[:, None] * omega * (self.A / self.determinant), dtype=np.float64)
 
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
-        """Return ω = XWᵀ − WXᵀ, W = det A·(A⁻¹Y + ½XK⁻¹YᵀX)K⁻¹ with K = XᵀAX, Y = P + XXᵀP: (dot_q) for every rank.
+        """Return ω = XWᵀ − WXᵀ, W = det A·(A⁻¹Y + ½XK⁻¹YᵀX)K⁻¹ with K = XᵀAX, Y = P + XXᵀP: (dot_q)
+        for every rank.
 
         AωAX = −det A·Y is then an identity: ωAX = XWᵀAX − WK, and WᵀAX = ½ det A·K⁻¹YᵀX.
         """
         n = self.n
-        A, inverse, determinant = parameters[:n, None], parameters[n:-1, None], parameters[-1]
+        A = parameters[:n, None]
+        inverse = parameters[n:-1, None]
+        determinant = parameters[-1]
         transposed = np.swapaxes(X, -1, -2)
-        K, skewed = ops.dot(transposed, A * X), ops.dot(transposed, P)
+        K = ops.dot(transposed, A * X)
+        skewed = ops.dot(transposed, P)
         along = determinant * ops.solve(K, -skewed)
         right = inverse * (P + ops.dot(X, skewed)) + ops.dot(X, along)
         return _wedge(X, ops.solve(K, np.swapaxes(right, -1, -2)), ops)
@@ -139,22 +150,29 @@ class MatrixInertia(BodyInertia):
         return skew(coefficients(omega) @ self.operator, self.n)
 
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
-        """Return ω = XWᵀ − WXᵀ, W (n, r) the solution of −(𝓘ω)X + X(XᵀW + WᵀX) = P + XXᵀP, a definite system of nr equations.
+        """Return ω = XWᵀ − WXᵀ, W (n, r) the solution of −(𝓘ω)X + X(XᵀW + WᵀX) = P + XXᵀP, a
+        definite system of nr equations.
 
-        The second term, zero at the solution, takes away that W is determined up to X times a symmetric matrix only.
+        The second term, zero at the solution, takes away that W is determined up to X times a
+        symmetric matrix only.
         """
         n, r = X.shape[-2:]
-        size, lead = n * (n - 1) // 2, X.shape[:-2]
+        size = n * (n - 1) // 2
+        lead = X.shape[:-2]
         transposed = np.swapaxes(X, -1, -2)
         # Σ_j 𝓘_{ij,kl} X_jα, then with X_lβ: the quadratic form of W, axes i, α, k, β.
-        once = ops.dot(transposed, self._tensor(parameters.reshape(size, size)).reshape(n, -1)).reshape(*lead, r * n * n, n)
+        once = ops.dot(
+            transposed, self._tensor(parameters.reshape(size, size)).reshape(n, -1)
+        ).reshape(*lead, r * n * n, n)
         form = np.moveaxis(ops.dot(once, X).reshape(*lead, r, n, n, r), -4, -3)
         gamma = ops.dot(X, transposed)
         form = form + X[..., :, None, None, :] * transposed[..., None, :, :, None]
         for alpha in range(r):
             form[..., :, alpha, :, alpha] = form[..., :, alpha, :, alpha] + gamma
         image = P + ops.dot(X, ops.dot(transposed, P))
-        W = ops.solve(form.reshape(*lead, n * r, n * r), image.reshape(*lead, n * r, 1)).reshape(*lead, n, r)
+        W = ops.solve(form.reshape(*lead, n * r, n * r), image.reshape(*lead, n * r, 1)).reshape(
+            *lead, n, r
+        )
         return _wedge(X, np.swapaxes(W, -1, -2), ops)
 
     def _tensor(self, matrix: Any) -> Any:
@@ -169,6 +187,8 @@ class MatrixInertia(BodyInertia):
 
 
 def body_inertia(inertia: Any, n: int) -> BodyInertia:
-    """Return the operator of {"special": [A_1 … A_n]} or {"matrix": m × m numbers}, m = n(n−1)/2; raises InvalidInput."""
+    """Return the operator of {"special": [A_1 … A_n]} or {"matrix": m × m numbers}, m = n(n−1)/2;
+    raises InvalidInput.
+    """
     stated = Inertia.of(inertia, n)
     return MatrixInertia.of(stated.matrix, n) if stated.A is None else SpecialInertia.of(stated.A)

@@ -1,4 +1,6 @@
-"""Principal axes of a symmetric matrix far beyond double precision: Jacobi's rotations in integers."""
+"""Principal axes of a symmetric matrix far beyond double precision: Jacobi's
+rotations in integers.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,12 @@ Array = NDArray[np.float64]
 #: Bits after the point, of the matrix over its largest entry.
 _BITS = 320
 
-#: Entries below this many units in the last place are zero: what the roundings of all rotations leave.
+#: Entries below this many units in the last place are zero: what the roundings of all rotations
+#: leave.
 _NOTHING = 1 << 24
 
-#: Bits that are kept of what is found: two values that are equal, or a component that is zero, then come out so.
+#: Bits that are kept of what is found: two values that are equal, or a component that is zero, then
+#: come out so.
 _KEPT = 256
 
 #: Sweeps of rotations; from eigenvectors in doubles three are needed.
@@ -36,8 +40,8 @@ _ONE = 1 << _BITS
 class WideAxes:
     """The principal axes of a symmetric matrix to 2^−256, determinant +1.
 
-    values  the eigenvalues, increasing, (n,): multiple ones are equal numbers
-    columns the axes as columns of integers, 2^320 for one, (n, n) · rounded: the same as floats, each correctly rounded
+    values  the eigenvalues, increasing, (n,): multiple ones are equal numbers columns the axes as
+    columns of integers, 2^320 for one, (n, n) · rounded: the same as floats, each correctly rounded
     """
 
     values: tuple[Fraction, ...]
@@ -55,17 +59,20 @@ class WideAxes:
 def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     """Return the principal axes of a symmetric matrix, not zero.
 
-    Doubles find the axes first. Along them the matrix is diagonal to ε of its largest entry, and rotations of two axes at a time,
-    which need no distance between eigenvalues, do the rest.
+    Doubles find the axes first. Along them the matrix is diagonal to ε of its largest entry, and
+    rotations of two axes at a time, which need no distance between eigenvalues, do the rest.
     """
     largest = max(abs(x) for row in matrix for x in row)
     scaled = [[x / largest for x in row] for row in matrix]
-    M = np.array([[(x.numerator << _BITS) // x.denominator for x in row] for row in scaled], dtype=object)
+    M = np.array(
+        [[(x.numerator << _BITS) // x.denominator for x in row] for row in scaled], dtype=object
+    )
     V = _orthonormal(np.linalg.eigh(np.array(scaled, dtype=np.float64))[1])
     V = _diagonalize(_product(V.T, _product(M, V)), V)
     values = [_nearest(int(x), _BITS - _KEPT) for x in np.sum(V * _product(M, V), axis=0) >> _BITS]
     order = sorted(range(len(values)), key=values.__getitem__)
-    values, V = [values[i] for i in order], V[:, order]
+    values = [values[i] for i in order]
+    V = V[:, order]
     for i in range(1, len(values)):
         if values[i] - values[i - 1] <= 2:
             values[i] = values[i - 1]
@@ -76,8 +83,13 @@ def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
 
 
 def _orthonormal(V: Array) -> Any:
-    """Return nearly orthogonal columns, made orthogonal, as integers: each step of Newton–Schulz squares the defect."""
-    wide = np.array([[int(math.ldexp(x, 1000)) >> (1000 - _BITS) for x in row] for row in V.tolist()], dtype=object)
+    """Return nearly orthogonal columns, made orthogonal, as integers: each step of Newton–Schulz
+    squares the defect.
+    """
+    wide = np.array(
+        [[int(math.ldexp(x, 1000)) >> (1000 - _BITS) for x in row] for row in V.tolist()],
+        dtype=object,
+    )
     three = 3 * np.diag([_ONE] * V.shape[0])
     for _ in range(5):
         wide = _product(wide, three - _product(wide.T, wide)) >> 1
@@ -96,7 +108,8 @@ def _diagonalize(H: Any, V: Any) -> Any:
                 rotated = True
                 cosine, sine = _rotation(H[p, p], H[q, q], H[p, q])
                 for X in (H.T, H, V):  # the columns p and q of Hᵀ are the rows of H
-                    first, second = X[:, p].copy(), X[:, q].copy()
+                    first = X[:, p].copy()
+                    second = X[:, q].copy()
                     X[:, p] = (cosine * first - sine * second) >> _BITS
                     X[:, q] = (sine * first + cosine * second) >> _BITS
         if not rotated:

@@ -1,4 +1,6 @@
-"""Numbers beyond double precision, as every trajectory carries them: decimals, each with a radius."""
+"""Numbers beyond double precision, as every trajectory carries them: decimals, each
+with a radius.
+"""
 
 from __future__ import annotations
 
@@ -34,14 +36,18 @@ Objects = NDArray[np.object_]
 Pair: TypeAlias = tuple[Objects, Objects]
 
 #: Digits that can be asked for; the fewest are those of double precision.
-FEWEST_DIGITS, MOST_DIGITS = 15, 1000
+FEWEST_DIGITS = 15
+MOST_DIGITS = 1000
 
-#: Digits in which products are formed beyond those kept: what is rounded there is far below their radii.
+#: Digits in which products are formed beyond those kept: what is rounded there is far below their
+#: radii.
 _SPARE_DIGITS = 30
 
 
 def beyond_double(digits: int, certified: bool) -> bool:
-    """Return whether an answer with so many digits, or with certified errors, has decimals and takes its data exactly."""
+    """Return whether an answer with so many digits, or with certified errors, has decimals and
+    takes its data exactly.
+    """
     return digits > FEWEST_DIGITS or certified
 
 
@@ -51,13 +57,15 @@ def decimals_of(texts: Any) -> Objects:
 
 
 class Later(Mapping[str, Objects]):
-    """The midpoints (side 0) or radii (side 1) of series that become decimals when they are first asked for, both together.
+    """The midpoints (side 0) or radii (side 1) of series that become decimals when they are first
+    asked for, both together.
 
     pairs: by name, what makes the pair; both sides share it, and it is replaced by what it made
     """
 
     def __init__(self, pairs: dict[str, Pair | Callable[[], Pair]], side: int) -> None:
-        self._pairs, self._side = pairs, side
+        self._pairs = pairs
+        self._side = side
 
     def __getitem__(self, name: str) -> Objects:
         pair = self._pairs[name]
@@ -82,10 +90,11 @@ class Later(Mapping[str, Objects]):
 class Decimals:
     """The series of a trajectory to more digits than a double has, or with certified errors.
 
-    midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape, which may be made when they
-    are first asked for; the exact value lies within midpoint ± radius, proven where ``certified``, and otherwise
-    up to truncations that are estimated.
-    bounded: the names of the series whose every component ``error`` (N,) bounds: the largest of their radii at each time
+    midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape,
+    which may be made when they are first asked for; the exact value lies within midpoint ± radius,
+    proven where ``certified``, and otherwise up to truncations that are estimated.
+    bounded: the names of the series whose every component ``error`` (N,) bounds: the largest of
+    their radii at each time
     """
 
     digits: int
@@ -98,11 +107,15 @@ class Decimals:
     def error(self) -> Objects:
         """Return the largest radius of the bounded series at each time, (N,)."""
         radii = [self.radii[name] for name in self.bounded]
-        return np.array([max(max(values.ravel()) for values in at_time) for at_time in zip(*radii, strict=True)])
+        return np.array(
+            [max(max(values.ravel()) for values in at_time) for at_time in zip(*radii, strict=True)]
+        )
 
     def strings(self, name: str, radii: bool = False) -> Any:
         """Return a series, or its radii, as nested lists of decimal strings."""
-        return np.vectorize(str, otypes=[object])((self.radii if radii else self.midpoints)[name]).tolist()
+        return np.vectorize(str, otypes=[object])(
+            (self.radii if radii else self.midpoints)[name]
+        ).tolist()
 
     def mpmath(self, name: str) -> Objects:
         """Return the midpoints of a series as mpmath numbers of so many digits."""
@@ -110,7 +123,9 @@ class Decimals:
 
         context = mpmath.MPContext()
         context.dps = self.digits + 5
-        return np.asarray(np.vectorize(lambda x: context.mpf(str(x)), otypes=[object])(self.midpoints[name]))
+        return np.asarray(
+            np.vectorize(lambda x: context.mpf(str(x)), otypes=[object])(self.midpoints[name])
+        )
 
     def flint(self, name: str) -> Objects:
         """Return a series as python-flint balls; raises BackendMissing without python-flint."""
@@ -122,24 +137,35 @@ class Decimals:
         bits = math.ceil((self.digits + _SPARE_DIGITS) * math.log2(10))
 
         def ball(middle: Any, radius: Any) -> Any:
-            # From integers, exactly: arb's own rounding follows the precision that the caller happens to have set.
-            near, beyond = math.floor(Fraction(middle) * 2**bits), math.ceil(Fraction(radius) * 2**bits) + 1
+            # From integers, exactly: arb's own rounding follows the precision that the caller
+            # happens to have set.
+            near = math.floor(Fraction(middle) * 2**bits)
+            beyond = math.ceil(Fraction(radius) * 2**bits) + 1
             return arb((near, -bits), arb((beyond, -bits)))
 
-        return np.asarray(np.vectorize(ball, otypes=[object])(self.midpoints[name], self.radii[name]))
+        return np.asarray(
+            np.vectorize(ball, otypes=[object])(self.midpoints[name], self.radii[name])
+        )
 
     def __repr__(self) -> str:
         kind = "certified" if self.certified else "estimated"
         return f"<Decimals: {self.digits} digits, {kind} error ≤ {max(self.error):.2g}>"
 
 
-def derive_velocity_pair(midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+def derive_velocity_pair(
+    midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+) -> Pair:
     """Return ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊, from the decimals of q_dot and frame."""
-    q, q_dot = midpoints["frame"][:, :, 0], midpoints["q_dot"]
-    r, r_dot = radii["frame"][:, :, 0], radii["q_dot"]
+    q = midpoints["frame"][:, :, 0]
+    q_dot = midpoints["q_dot"]
+    r = radii["frame"][:, :, 0]
+    r_dot = radii["q_dot"]
     with localcontext(Context(prec=digits + _SPARE_DIGITS)):
         product = q[:, :, None] * q_dot[:, None, :]
-        spread = np.abs(q)[:, :, None] * r_dot[:, None, :] + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
+        spread = (
+            np.abs(q)[:, :, None] * r_dot[:, None, :]
+            + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
+        )
         return product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
 
 
@@ -152,11 +178,14 @@ def derive_position_pair(A: Sequence[Fraction], q: Objects, radii: Objects, digi
     with localcontext(Context(prec=digits + _SPARE_DIGITS)):
         squares = np.array([Decimal(a.numerator) / Decimal(a.denominator) for a in A])
         root = np.frompyfunc(Decimal.sqrt, 1, 1)
-        most, least = np.abs(q) + radii, np.abs(q) - radii
+        most = np.abs(q) + radii
+        least = np.abs(q) - radii
         least = least * (least > 0)
         low = root(np.sum(squares * least * least, axis=1))[:, None]
         along = np.sum(squares * most * radii, axis=1)[:, None]
         spread = (squares * radii + squares * most * along / (low * low)) / low
         position = squares * q / root(np.sum(squares * q * q, axis=1))[:, None]
-        rounding = np.frompyfunc(lambda x: Decimal((0, (1,), x.adjusted() - digits - 10)) if x else Decimal(0), 1, 1)(position)
+        rounding = np.frompyfunc(
+            lambda x: Decimal((0, (1,), x.adjusted() - digits - 10)) if x else Decimal(0), 1, 1
+        )(position)
         return position, spread + rounding

@@ -1,10 +1,12 @@
 """The exceptions of veselova, one tree for every door (Python, command line, HTTP).
 
 VeselovaError
-├── InvalidInput            bad input; names the field, what was required, what was given   (also a ValueError)
+├── InvalidInput            bad input; names the field, what was required, what was given   (also a
+    ValueError)
 │   └── InvalidRequest      several such faults at once
 ├── Unsolved                an engine's named outcome: it cannot serve this problem, and why
-├── BackendMissing          an optional library that was asked for is not installed          (also an ImportError)
+├── BackendMissing          an optional library that was asked for is not installed          (also
+    an ImportError)
 ├── InternalContradiction   two results that must agree do not: a bug of ours
 └── ServiceError            what the HTTP client raises
     ├── ServiceUnreachable  no answer from the server after all retries
@@ -38,7 +40,8 @@ __all__ = [
     "unknown_name",
 ]
 
-#: Longest rendering of a given value in a message: enough to recognise it, short enough for one line.
+#: Longest rendering of a given value in a message: enough to recognise it, short enough for one
+#: line.
 _SHOWN_CHARACTERS = 60
 
 #: Faults of one request that are reported, and those that its message spells out.
@@ -59,21 +62,31 @@ def show(value: object) -> str:
     if isinstance(value, str):
         value = value[: 2 * _SHOWN_CHARACTERS]
     try:
-        bare = isinstance(value, (Fraction, Decimal)) or (isinstance(value, str) and not _reads_otherwise(value))
+        bare = isinstance(value, (Fraction, Decimal)) or (
+            isinstance(value, str) and not _reads_otherwise(value)
+        )
         text = str(value) if bare else _SHORT.repr(value)
     except ValueError:  # an int of more digits than Python is willing to print
-        text = f"an integer of about {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else "a value"
+        text = (
+            f"an integer of about {value.bit_length() * 0.30103:.0f} digits"
+            if isinstance(value, int)
+            else "a value"
+        )
     text = " ".join(_writable(text).split())
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
 class _Short(Repr):
-    """``repr`` of no more than the beginning of a value: what was given may be as large as a request."""
+    """``repr`` of no more than the beginning of a value: what was given may be as large as a
+    request.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.maxlevel = 10
-        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxarray = _SHOWN_CHARACTERS
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxarray = (
+            _SHOWN_CHARACTERS
+        )
         self.maxstring = self.maxother = 4 * _SHOWN_CHARACTERS
         self.maxlong = 5000
 
@@ -82,14 +95,23 @@ class _Short(Repr):
         if level <= 0:
             return "{...}"
         items = list(x.items())[:_SHOWN_CHARACTERS] if len(x) > _SHOWN_CHARACTERS else x.items()
-        return "{" + ", ".join(f"{self.repr1(key, level - 1)}: {self.repr1(item, level - 1)}" for key, item in items) + "}"
+        return (
+            "{"
+            + ", ".join(
+                f"{self.repr1(key, level - 1)}: {self.repr1(item, level - 1)}"
+                for key, item in items
+            )
+            + "}"
+        )
 
 
 _SHORT = _Short()
 
 
 def _writable(text: str) -> str:
-    """Return a text that UTF-8 can hold: lone surrogates, which JSON strings can carry, are spelled out."""
+    """Return a text that UTF-8 can hold: lone surrogates, which JSON strings can carry, are spelled
+    out.
+    """
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
@@ -106,11 +128,14 @@ class VeselovaError(Exception):
     """The root of every exception that veselova raises on purpose."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Errors cross process borders (workers), and constructors take keywords: rebuild from the state alone.
+        # Errors cross process borders (workers), and constructors take keywords: rebuild from the
+        # state alone.
         return (_rebuild, (type(self), self.args, self.__dict__.copy()))
 
 
-def _rebuild(kind: type[VeselovaError], args: tuple[Any, ...], state: dict[str, Any]) -> VeselovaError:
+def _rebuild(
+    kind: type[VeselovaError], args: tuple[Any, ...], state: dict[str, Any]
+) -> VeselovaError:
     error = kind.__new__(kind, *args)
     error.args = args
     error.__dict__.update(state)
@@ -124,7 +149,9 @@ class InvalidInput(VeselovaError, ValueError):
     """
 
     def __init__(self, path: Sequence[str | int], required: str, given: str) -> None:
-        self.path = tuple(_writable(part[:_LONGEST_NAME]) if isinstance(part, str) else part for part in path)
+        self.path = tuple(
+            _writable(part[:_LONGEST_NAME]) if isinstance(part, str) else part for part in path
+        )
         self.required = _writable(required)
         self.given = _writable(given)
         super().__init__(f"{self.field}: required {self.required}; given {self.given}.")
@@ -138,7 +165,9 @@ class InvalidInput(VeselovaError, ValueError):
     def field(self) -> str:
         """Return the field in the notation of its Python argument, e.g. ``frame[0][2]``."""
         head, *rest = self.path or ("the request",)
-        return str(head) + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in rest)
+        return str(head) + "".join(
+            f"[{part}]" if isinstance(part, int) else f".{part}" for part in rest
+        )
 
     def below(self, *parents: str | int) -> InvalidInput:
         """Return the same error, located inside the given parents (``problem``, say)."""
@@ -146,7 +175,8 @@ class InvalidInput(VeselovaError, ValueError):
 
 
 class InvalidRequest(InvalidInput):
-    """Several faults at once, each an InvalidInput; path, required and given are those of the first.
+    """Several faults at once, each an InvalidInput; path, required and given are those of the
+    first.
 
     ``faults`` has the first MOST_FAULTS of them, and ``further`` says how many there are besides.
     """
@@ -154,7 +184,9 @@ class InvalidRequest(InvalidInput):
     def __init__(self, faults: Sequence[InvalidInput]) -> None:
         found = [single for fault in faults for single in fault.faults]
         self._faults = tuple(found[:MOST_FAULTS])
-        self.further = len(found) - len(self._faults) + sum(getattr(fault, "further", 0) for fault in faults)
+        self.further = (
+            len(found) - len(self._faults) + sum(getattr(fault, "further", 0) for fault in faults)
+        )
         first = self._faults[0]
         super().__init__(first.path, first.required, first.given)
         self.args = (summary(self._faults, self.further),)
@@ -172,29 +204,43 @@ class InvalidRequest(InvalidInput):
 
 
 def summary(faults: Sequence[InvalidInput], further: int = 0) -> str:
-    """Return the first faults in words, and how many there are besides them and ``further`` ones."""
+    """Return the first faults in words, and how many there are besides them and
+    ``further`` ones.
+    """
     unsaid = len(faults[_SPELLED_OUT:]) + further
     return " ".join(map(str, faults[:_SPELLED_OUT])) + (f" And {unsaid} more." if unsaid else "")
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
-    """Return " (did you mean …?)" with the name that is most like a given one, whatever their case, or nothing."""
+    """Return " (did you mean …?)" with the name that is most like a given one, whatever their case,
+    or nothing.
+    """
     from difflib import get_close_matches
 
     known = {name.casefold(): name for name in names}
     # Comparing takes the product of the lengths; a longer text is no name.
-    close = get_close_matches(given.casefold(), known, 1) if isinstance(given, str) and len(given) <= _LONGEST_NAME else []
+    close = (
+        get_close_matches(given.casefold(), known, 1)
+        if isinstance(given, str) and len(given) <= _LONGEST_NAME
+        else []
+    )
     return f" (did you mean {known[close[0]]}?)" if close else ""
 
 
-def unknown_name(path: Sequence[str | int], given: object, names: Sequence[str], scope: str = "") -> InvalidInput:
-    """Return the fault of a name that is none of those known, which are known in a scope such as "for system lr"."""
+def unknown_name(
+    path: Sequence[str | int], given: object, names: Sequence[str], scope: str = ""
+) -> InvalidInput:
+    """Return the fault of a name that is none of those known, which are known in a scope such as
+    "for system lr".
+    """
     required = " ".join(filter(None, (f"one of {', '.join(names)}", scope)))
     return InvalidInput(path, required, show(given) + did_you_mean(given, names))
 
 
 class Faults:
-    """Collects the faults of parts that can be looked at one by one, so that all are reported at once."""
+    """Collects the faults of parts that can be looked at one by one, so that all are reported at
+    once.
+    """
 
     def __init__(self) -> None:
         self.found: list[InvalidInput] = []
@@ -220,7 +266,9 @@ class Faults:
 
 
 class Unsolved(VeselovaError):
-    """A named outcome: the engine cannot serve this problem, with the reason and what to do instead."""
+    """A named outcome: the engine cannot serve this problem, with the reason and what to do
+    instead.
+    """
 
     def __init__(self, outcome: str, reason: str) -> None:
         self.outcome = outcome
@@ -229,15 +277,21 @@ class Unsolved(VeselovaError):
 
 
 class BackendMissing(VeselovaError, ImportError):
-    """An optional library that was asked for is not installed; ``install`` is the command that installs it."""
+    """An optional library that was asked for is not installed; ``install`` is the command that
+    installs it.
+    """
 
     def __init__(self, library: str, purpose: str, install: str) -> None:
         self.library = library
-        super().__init__(f"{purpose} needs {library}, which is not installed; install it with: {install}")
+        super().__init__(
+            f"{purpose} needs {library}, which is not installed; install it with: {install}"
+        )
 
 
 def install_extra(name: str) -> str:
-    """Return the command that installs an extra of this project. The project is on no index: only its folder has it."""
+    """Return the command that installs an extra of this project. The project is on no index: only
+    its folder has it.
+    """
     return f"pip install '.[{name}]' in the folder of this project"
 
 
@@ -245,7 +299,10 @@ class InternalContradiction(VeselovaError):
     """Two results that must agree do not: a bug of veselova, never of the input."""
 
     def __init__(self, what: str) -> None:
-        super().__init__(f"internal contradiction ({what}); this is a bug in veselova, please report the input with it")
+        super().__init__(
+            f"internal contradiction ({what}); this is a bug in veselova, please report the "
+            "input with it"
+        )
 
 
 class ServiceError(VeselovaError):

@@ -1,7 +1,7 @@
 """Numbers as given: every input becomes an exact rational before anything is rounded.
 
-A decimal string ("0.7") or a ratio ("7/10") is taken at its word; a float is the dyadic rational that it stores.
-The engines round these rationals once, to the precision they work in.
+A decimal string ("0.7") or a ratio ("7/10") is taken at its word; a float is the dyadic rational
+that it stores. The engines round these rationals once, to the precision they work in.
 """
 
 from __future__ import annotations
@@ -38,23 +38,29 @@ Number = int | float | str | Fraction | Decimal
 
 Path = tuple[str | int, ...]
 
-#: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other alphabets.
+#: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other
+#: alphabets.
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 
-#: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the memory.
+#: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the
+#: memory.
 _LARGEST_EXPONENT = 400
 
 #: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
 _LONGEST_NUMERAL = 2100
 
-_REQUIRED = 'a finite real number within the range of a float (a JSON number, or a string such as "0.7" or "7/10")'
+_REQUIRED = (
+    "a finite real number within the range of a float (a JSON number, or a string such as "
+    '"0.7" or "7/10")'
+)
 
 
 def exact_number(value: Any, path: Path) -> Fraction:
     """Return the rational number that ``value`` states exactly.
 
     Accepts int, float, NumPy real scalars, Fraction, Decimal and strings ("0.7", "-1e-3", "7/10").
-    Raises InvalidInput for booleans, NaN, infinities, anything that is not a number, and numbers beyond float range.
+    Raises InvalidInput for booleans, NaN, infinities, anything that is not a number, and numbers
+    beyond float range.
     """
     try:
         if type(value) is float:
@@ -73,7 +79,12 @@ def _parse(value: Any) -> Fraction:
         raise TypeError("a boolean is not a number")
     if isinstance(value, str):
         return _parse_numeral(value)
-    if isinstance(value, Decimal) and value.is_finite() and value and abs(value.adjusted()) > _LARGEST_EXPONENT:
+    if (
+        isinstance(value, Decimal)
+        and value.is_finite()
+        and value
+        and abs(value.adjusted()) > _LARGEST_EXPONENT
+    ):
         raise OverflowError("beyond float range")
     if isinstance(value, (Fraction, Decimal, float)):
         return Fraction(value)
@@ -110,7 +121,9 @@ def _items(values: Any, path: Path, required: str) -> list[Any]:
 
 
 def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fraction, ...]:
-    """Return the entries of a vector as exact rationals; raises InvalidInput when the length is not ``length``."""
+    """Return the entries of a vector as exact rationals; raises InvalidInput when the length is not
+    ``length``.
+    """
     required = "a list of numbers" if length is None else f"a list of {length} numbers"
     items = _items(values, path, required)
     if length is not None and len(items) != length:
@@ -118,8 +131,11 @@ def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fr
     return tuple(exact_number(item, (*path, i)) for i, item in enumerate(items))
 
 
-def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None) -> tuple[tuple[Fraction, ...], ...]:
-    """Return the rows of a matrix as exact rationals; raises InvalidInput when it has not ``size`` rows and as many columns.
+def exact_matrix(
+    values: Any, path: Path, size: int, columns: int | None = None
+) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the rows of a matrix as exact rationals; raises InvalidInput when it has not ``size``
+    rows and as many columns.
 
     ``columns`` is their number where the matrix is not square.
     """
@@ -132,8 +148,14 @@ def exact_matrix(values: Any, path: Path, size: int, columns: int | None = None)
 
 
 def whole_number(value: Any, path: Path, least: int, most: int) -> int:
-    """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0 included."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral) or not least <= int(value) <= most:
+    """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0
+    included.
+    """
+    if (
+        isinstance(value, (bool, np.bool_))
+        or not isinstance(value, Integral)
+        or not least <= int(value) <= most
+    ):
         raise InvalidInput(path, f"a whole number from {least} to {most}", show(value))
     return int(value)
 
@@ -150,7 +172,9 @@ def given_arguments(**arguments: Any) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding: ratios become strings."""
+    """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding:
+    ratios become strings.
+    """
     if type(value) in (float, bool, str) or (type(value) is int and abs(value) < 2**63):
         return value
     if type(value) is list:
@@ -192,7 +216,9 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
 
 
 def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]:
-    """Return a vector as integers and their denominator: sums and products of them need no further divisors."""
+    """Return a vector as integers and their denominator: sums and products of them need no further
+    divisors.
+    """
     common = math.lcm(*(x.denominator for x in vector))
     return [x.numerator * (common // x.denominator) for x in vector], common
 

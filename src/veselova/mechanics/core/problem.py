@@ -1,4 +1,6 @@
-"""What every problem is: a system of the paper with its state at time zero, immutable and validated on construction."""
+"""What every problem is: a system of the paper with its state at time zero, immutable and validated
+on construction.
+"""
 
 from __future__ import annotations
 
@@ -22,22 +24,27 @@ Series = Mapping[str, Array]
 
 
 class Problem(ABC):
-    """A system and its start. A subclass is one system: its data, its series, its integrals, and the field that moves it."""
+    """A system and its start. A subclass is one system: its data, its series, its integrals, and
+    the field that moves it.
+    """
 
     #: The discriminator of the JSON, and the name of the independent variable.
     system: ClassVar[str]
     time: ClassVar[str] = "t"
 
-    #: The series of a trajectory, with the names of the axes that follow the time axis; the order of every listing and file.
+    #: The series of a trajectory, with the names of the axes that follow the time axis; the order
+    #: of every listing and file.
     outputs: ClassVar[Mapping[str, tuple[str, ...]]]
-    #: Those that follow from the others, by ``derive``; and those whose true errors ``error`` bounds.
+    #: Those that follow from the others, by ``derive``; and those whose true errors ``error``
+    #: bounds.
     derived: ClassVar[tuple[str, ...]] = ()
     bounded: ClassVar[tuple[str, ...]]
 
     #: The series that tables and pictures show.
     portrait: ClassVar[str]
 
-    #: Engines that serve the system, with their methods, and the formulations that the numerical one integrates; defaults first.
+    #: Engines that serve the system, with their methods, and the formulations that the numerical
+    #: one integrates; defaults first.
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
     formulations: ClassVar[tuple[str, ...]]
 
@@ -50,11 +57,15 @@ class Problem(ABC):
     def _set(self, **fields: Any) -> None:
         """Set attributes once and for all: a problem is immutable, and its arrays are read-only."""
         for name, value in fields.items():
-            object.__setattr__(self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value)
+            object.__setattr__(
+                self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
+            )
 
     @property
     def stored(self) -> tuple[str, ...]:
-        """Return the outputs from which a trajectory can be rebuilt: the others follow from them."""
+        """Return the outputs from which a trajectory can be rebuilt: the others
+        follow from them.
+        """
         return tuple(name for name in self.outputs if name not in self.derived)
 
     @abstractmethod
@@ -92,7 +103,9 @@ class Problem(ABC):
 
     @property
     def default_engine(self) -> str:
-        """Return the engine that serves this problem where none is asked for: the closed form where the problem has one."""
+        """Return the engine that serves this problem where none is asked for: the closed form where
+        the problem has one.
+        """
         return next(iter(self.engines))
 
     @property
@@ -102,23 +115,33 @@ class Problem(ABC):
 
     @property
     def semiaxes(self) -> Array | None:
-        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to show one; None for a sphere."""
+        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to
+        show one; None for a sphere.
+        """
         return None
 
     def derive(self, name: str, series: Series) -> Array:
         """Return one of the ``derived`` series."""
         raise KeyError(name)
 
-    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
-        """Return one of the ``derived`` series as decimals with radii, from the decimals of the stored ones."""
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
+        """Return one of the ``derived`` series as decimals with radii, from the decimals of the
+        stored ones.
+        """
         raise KeyError(name)
 
     def complete(self, series: Series) -> Series:
-        """Return the series of a flow, with what it leaves to the problem, along the axes in which the problem was given."""
+        """Return the series of a flow, with what it leaves to the problem, along the axes in which
+        the problem was given.
+        """
         return series
 
     def bound(self, series: Series, error: Array) -> Array:
-        """Return the error of all bounded series, from that of those among them which are not derived."""
+        """Return the error of all bounded series, from that of those among them which are not
+        derived.
+        """
         return error
 
     def as_dict(self) -> dict[str, Any]:
@@ -126,9 +149,15 @@ class Problem(ABC):
         return {"system": self.system, **self.given}
 
     def as_request(self) -> dict[str, Any]:
-        """Return ``as_dict`` where it is the JSON that a request states; raises InvalidInput for a problem that none can."""
+        """Return ``as_dict`` where it is the JSON that a request states; raises InvalidInput for a
+        problem that none can.
+        """
         return self.as_dict()
 
     def conditioning_floor(self, times: Array) -> Array:
-        """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no method can better."""
-        return np.asarray(np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64)
+        """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no
+        method can better.
+        """
+        return np.asarray(
+            np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64
+        )

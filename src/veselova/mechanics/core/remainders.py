@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 #: Bits of the leading parts of a step, whose products with whole numbers below 2²⁴ are exact.
 _PART_BITS = 29
 
-#: Points of a grid this much nearer to zero than its ends lose digits by cancellation, and are formed as rationals.
+#: Points of a grid this much nearer to zero than its ends lose digits by cancellation, and are
+#: formed as rationals.
 _CANCELS = 1e-3
 
 
@@ -37,7 +38,9 @@ def split(numbers: Sequence[Fraction]) -> tuple[Array, Array]:
 
 
 def split_grid(start: Fraction, step: Fraction, count: int) -> tuple[Array, Array]:
-    """Return start + k·step for k = 0 … count−1 < 2²⁴ as doubles and remainders, right to 1e-28 of each number."""
+    """Return start + k·step for k = 0 … count−1 < 2²⁴ as doubles and remainders, right to 1e-28 of
+    each number.
+    """
     k = np.arange(count, dtype=np.float64)
     coarse = _leading_part(step)
     middle = _leading_part(step - Fraction(coarse))
@@ -48,7 +51,9 @@ def split_grid(start: Fraction, step: Fraction, count: int) -> tuple[Array, Arra
     doubles, remainders = exact_sum(doubles, (first + second) + (rest + k * fine))
     near_zero = np.flatnonzero(np.abs(doubles) < _CANCELS * np.max(np.abs(doubles[[0, -1]])))
     if near_zero.size:
-        doubles[near_zero], remainders[near_zero] = split([start + int(i) * step for i in near_zero])
+        doubles[near_zero], remainders[near_zero] = split(
+            [start + int(i) * step for i in near_zero]
+        )
     return doubles, remainders
 
 

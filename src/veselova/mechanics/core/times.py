@@ -1,6 +1,8 @@
-"""The times at which a motion is asked for: finite, in any order, repeated or not; t = 0 is the start, negative times are fine.
+"""The times at which a motion is asked for: finite, in any order, repeated or not; t = 0 is the
+start, negative times are fine.
 
-A time is taken exactly as it is stated. Engines take it as the nearest double and a remainder, which is a second double.
+A time is taken exactly as it is stated. Engines take it as the nearest double and a remainder,
+which is a second double.
 """
 
 from __future__ import annotations
@@ -18,7 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain, read_only, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    exact_vector,
+    plain,
+    read_only,
+    to_float,
+)
 from veselova.mechanics.core.remainders import split, split_grid
 
 __all__ = ["MOST_TIMES", "TimeGrid", "as_request"]
@@ -38,7 +46,8 @@ _REQUIRED = "a number, a list of numbers, or exactly the fields start, stop, cou
 
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
-    """The different times asked for, in increasing order, and where each time asked for is among them.
+    """The different times asked for, in increasing order, and where each time asked for is among
+    them.
 
     doubles (N,) nearest to the exact times, increasing; two different times may have one double ·
     remainders (N,) what the exact times are beyond the doubles, None where that is nothing ·
@@ -53,11 +62,13 @@ class TimeGrid:
 
     @classmethod
     def of(cls, times: Any, exact: bool = False) -> TimeGrid:
-        """Return the times that a number, a list or an array states, or a mapping of start, stop and count.
+        """Return the times that a number, a list or an array states, or a mapping of start, stop
+        and count.
 
-        A grid of start, stop and count has the points of ``numpy.linspace`` where both ends are doubles. Where an end is a text,
-        a Fraction or a Decimal, or where ``exact`` asks for it, the points are start + k(stop − start)/(count − 1) exactly.
-        Raises InvalidInput, located at ``times``, unless all are finite and there is one at least.
+        A grid of start, stop and count has the points of ``numpy.linspace`` where both ends are
+        doubles. Where an end is a text, a Fraction or a Decimal, or where ``exact`` asks for it,
+        the points are start + k(stop − start)/(count − 1) exactly. Raises InvalidInput, located at
+        ``times``, unless all are finite and there is one at least.
         """
         if isinstance(times, TimeGrid):
             return times
@@ -85,11 +96,17 @@ class TimeGrid:
     @property
     def asked_remainders(self) -> Array | None:
         """Return the remainders of the times asked for, (M,)."""
-        return self.remainders if self.remainders is None or self.places is None else self.remainders[self.places]
+        return (
+            self.remainders
+            if self.remainders is None or self.places is None
+            else self.remainders[self.places]
+        )
 
 
 def as_request(times: Any) -> Any:
-    """Return valid times as the JSON of a request states them, without rounding; raises InvalidInput as ``TimeGrid.of``."""
+    """Return valid times as the JSON of a request states them, without rounding; raises
+    InvalidInput as ``TimeGrid.of``.
+    """
     TimeGrid.of(times)
     stated = plain(times)
     return stated if isinstance(stated, (list, dict)) else [stated]
@@ -108,9 +125,15 @@ def _is_number(times: Any) -> bool:
 
 
 def _as_doubles(times: Any) -> Array | None:
-    """Return a copy of times that are doubles as they stand, or whole numbers that are; None for others."""
+    """Return a copy of times that are doubles as they stand, or whole numbers that are; None for
+    others.
+    """
     if type(times) is list:
-        return np.array(times, dtype=np.float64) if all(isinstance(time, float) for time in times) else None
+        return (
+            np.array(times, dtype=np.float64)
+            if all(isinstance(time, float) for time in times)
+            else None
+        )
     if isinstance(times, range):
         within = all(abs(end) <= _LARGEST_WHOLE_DOUBLE for end in (*times[:1], *times[-1:]))
         return np.arange(times.start, times.stop, times.step, dtype=np.float64) if within else None
@@ -118,7 +141,11 @@ def _as_doubles(times: Any) -> Array | None:
         return None
     if times.dtype.kind == "f" and times.dtype.itemsize <= np.dtype(np.float64).itemsize:
         return np.array(times, dtype=np.float64)
-    if times.dtype.kind in "iu" and times.size and max(-int(times.min()), int(times.max())) <= _LARGEST_WHOLE_DOUBLE:
+    if (
+        times.dtype.kind in "iu"
+        and times.size
+        and max(-int(times.min()), int(times.max())) <= _LARGEST_WHOLE_DOUBLE
+    ):
         return np.array(times, dtype=np.float64)
     return None
 
@@ -127,7 +154,8 @@ def _of_doubles(doubles: Array, times: Any) -> TimeGrid:
     if doubles.size == 0:
         raise InvalidInput(("times",), "at least one time", "none")
     places = None
-    # NaN is greater than nothing: where each is greater than the one before it, all are finite if the first and the last are.
+    # NaN is greater than nothing: where each is greater than the one before it, all are finite if
+    # the first and the last are.
     increasing = bool((doubles[1:] > doubles[:-1]).all())
     if not (increasing and np.isfinite(doubles[[0, -1]]).all()):
         if not np.isfinite(doubles).all():
@@ -148,7 +176,10 @@ def _of_rationals(numbers: Sequence[Fraction]) -> TimeGrid:
 
 
 def _split(
-    doubles: Array, remainders: Array, places: NDArray[np.intp] | None, rationals: Callable[[], Sequence[Exact]]
+    doubles: Array,
+    remainders: Array,
+    places: NDArray[np.intp] | None,
+    rationals: Callable[[], Sequence[Exact]],
 ) -> TimeGrid:
     kept = read_only(remainders) if remainders.any() else None
     return TimeGrid(read_only(doubles), kept, places, rationals)
@@ -158,8 +189,11 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
     """Return the grid of a mapping with start, stop and count, both ends included."""
     if set(grid) != {"start", "stop", "count"}:
         given = f"the fields {', '.join(map(str, grid)) or 'none'}"
-        raise InvalidInput(("times",), "a list of numbers, or exactly the fields start, stop, count", show(given))
-    ends, count = [exact_number(grid[key], ("times", key)) for key in ("start", "stop")], grid["count"]
+        raise InvalidInput(
+            ("times",), "a list of numbers, or exactly the fields start, stop, count", show(given)
+        )
+    ends = [exact_number(grid[key], ("times", key)) for key in ("start", "stop")]
+    count = grid["count"]
     if isinstance(count, (bool, np.bool_)) or not isinstance(count, (int, np.integer)):
         raise InvalidInput(("times", "count"), "a whole number", show(count))
     if count < 1:
@@ -168,10 +202,16 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
         raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(count)[:30])
     count, (start, stop) = int(count), ends
     if count > 1 and not start < stop:
-        raise InvalidInput(("times", "stop"), f"a time greater than start ({show(grid['start'])})", show(grid["stop"]))
+        raise InvalidInput(
+            ("times", "stop"),
+            f"a time greater than start ({show(grid['start'])})",
+            show(grid["stop"]),
+        )
     low, high = to_float(ends).tolist()
     if not np.isfinite(high - low):
-        raise InvalidInput(("times", "stop"), "a span within the range of a float", f"{low!r} to {high!r}")
+        raise InvalidInput(
+            ("times", "stop"), "a span within the range of a float", f"{low!r} to {high!r}"
+        )
     if not exact and all(_is_double(grid[key]) for key in ("start", "stop")):
         return _of_doubles(np.linspace(low, high, count), [])
     step = (stop - start) / max(count - 1, 1)

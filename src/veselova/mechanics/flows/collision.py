@@ -1,4 +1,6 @@
-"""Flows in potentials that are infinite where a coordinate vanishes: motions run into such planes, or turn back before them."""
+"""Flows in potentials that are infinite where a coordinate vanishes: motions run into such planes,
+or turn back before them.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,9 @@ __all__ = ["SingularFlow"]
 
 Array = NDArray[np.float64]
 
-#: Units of time left to an attracting plane at which a motion counts as having run into it: steps are still thousands of
-#: roundings of the time, and the rest of the way does not show in the seven digits of the time that is named.
+#: Units of time left to an attracting plane at which a motion counts as having run into it: steps
+#: are still thousands of roundings of the time, and the rest of the way does not show in the seven
+#: digits of the time that is named.
 _LEFT = 1e-8
 
 
@@ -28,7 +31,9 @@ class SingularFlow(Flow):
     @property
     @abstractmethod
     def _singular(self) -> Mapping[Any, Callable[[Array], Any]]:
-        """Return, by the indices of the coordinates at whose zeros the potential is infinite, the part of it that is."""
+        """Return, by the indices of the coordinates at whose zeros the potential is infinite, the
+        part of it that is.
+        """
 
     @abstractmethod
     def _coordinates(self, state: Array) -> tuple[Array, Array]:
@@ -48,19 +53,32 @@ class SingularFlow(Flow):
         return not self._singular
 
     def clearance(self, state: Array) -> float:
-        """Return the distance to the nearest singular plane, less what an attracting one makes good at once."""
+        """Return the distance to the nearest singular plane, less what an attracting one makes good
+        at once.
+        """
         x, speed = self._coordinates(state)
-        left = (x[i] * self._sides[i] - _LEFT * abs(speed[i]) * (part(x) < 0) for i, part in self._singular.items())
+        left = (
+            x[i] * self._sides[i] - _LEFT * abs(speed[i]) * (part(x) < 0)
+            for i, part in self._singular.items()
+        )
         return float(min(left, default=1.0))
 
     def ending(self, time: float, state: Array) -> Unsolved:
-        """Return what happened at the nearest singular plane: a collision, or a barrier that was stepped over."""
+        """Return what happened at the nearest singular plane: a collision, or a barrier that was
+        stepped over.
+        """
         x, speed = self._coordinates(state)
         nearest = min(self._singular, key=lambda i: x[i] * self._sides[i])
         arrival = (time - x[nearest] / speed[nearest]) * self.time_unit
-        place = f"{self._plane(nearest)} = 0 at about t = {arrival:.7g}, where the potential is infinite"
-        for i in self._singular:  # beyond a plane odd powers have changed sign: look at it from the side of the start
+        place = (
+            f"{self._plane(nearest)} = 0 at about t = {arrival:.7g}, where the potential is "
+            "infinite"
+        )
+        # beyond a plane odd powers have changed sign: look at it from the side of the start
+        for i in self._singular:
             x[i] = abs(x[i]) * self._sides[i]
         if self._singular[nearest](x) < 0:
             return Unsolved("collision", f"the motion runs into {place}; ask for earlier times")
-        return Unsolved("thin-barrier", f"the motion turns back nearer than the integration resolves to {place}")
+        return Unsolved(
+            "thin-barrier", f"the motion turns back nearer than the integration resolves to {place}"
+        )

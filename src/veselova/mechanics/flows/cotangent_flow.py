@@ -1,7 +1,8 @@
-"""The reduced LR flow on T*V(r,n), equation (dot_P), and the same motion by its momentum equation (4.1c).
+"""The reduced LR flow on T*V(r,n), equation (dot_P), and the same motion by its momentum equation
+(4.1c).
 
-Momenta are measured in units in which the inertia operator is near one and the angular velocity at the start is one: the field
-is then of order one whatever the scales of the input.
+Momenta are measured in units in which the inertia operator is near one and the angular velocity at
+the start is one: the field is then of order one whatever the scales of the input.
 """
 
 from __future__ import annotations
@@ -30,16 +31,19 @@ __all__ = ["CotangentFlow", "MomentumFlow"]
 
 Array = NDArray[np.float64]
 
-#: The torque, squared, below which turning the state no longer restores the energy: its rounding would turn it farther.
+#: The torque, squared, below which turning the state no longer restores the energy: its rounding
+#: would turn it farther.
 _LEAST_TORQUE = 1e-4
 
 
 @dataclass(frozen=True)
 class CotangentFlow(Flow):
-    """Ẋ = −ωX, Ṗ = −ωP, equation (dot_P), ω ∈ 𝓓_r from (dotX->P); a state is the flat array (X, P) of length 2nr.
+    """Ẋ = −ωX, Ṗ = −ωP, equation (dot_P), ω ∈ 𝓓_r from (dotX->P); a state is the flat array (X, P)
+    of length 2nr.
 
-    Both factors are turned by the same rotation, so that XᵀX, XᵀP and PᵀP are constant; of a state that left the manifold by
-    rounding the nearest rotation of the start is kept, turned along the torque until the energy is that of the start.
+    Both factors are turned by the same rotation, so that XᵀX, XᵀP and PᵀP are constant; of a state
+    that left the manifold by rounding the nearest rotation of the start is kept, turned along the
+    torque until the energy is that of the start.
     """
 
     inertia: BodyInertia
@@ -50,7 +54,9 @@ class CotangentFlow(Flow):
 
     @classmethod
     def of(cls, inertia: BodyInertia, X: Array, omega: Array) -> CotangentFlow:
-        """Return the flow of a moving body (ω ≠ 0) that starts in X with angular velocity ω ∈ 𝓓_r, in units of the problem."""
+        """Return the flow of a moving body (ω ≠ 0) that starts in X with angular velocity ω ∈ 𝓓_r,
+        in units of the problem.
+        """
         speed = float(np.max(np.abs(omega)))
         speed *= float(np.sqrt(product(omega / speed, omega / speed)))
         P = cotangent(X, inertia.apply(omega / speed))
@@ -79,7 +85,9 @@ class CotangentFlow(Flow):
 
     def _momenta(self, pairs: Array) -> tuple[Array, Array]:
         """Return ω and 𝓘ω at (X, P), shape (..., n, n)."""
-        omega = self.inertia.angular_velocity(pairs[..., 0, :, :], pairs[..., 1, :, :], self.parameters, FLOATS)
+        omega = self.inertia.angular_velocity(
+            pairs[..., 0, :, :], pairs[..., 1, :, :], self.parameters, FLOATS
+        )
         return omega, self.inertia.apply(omega)
 
     @cached_property
@@ -98,27 +106,40 @@ class CotangentFlow(Flow):
 
     def _rotate(self, pairs: Array) -> Array:
         """Return the rotations of the start that are nearest to (X, P), shape (..., 2, n, r)."""
-        now, start = (np.concatenate([pair[..., 0, :, :], pair[..., 1, :, :]], axis=-1) for pair in (pairs, self.start))
+        now, start = (
+            np.concatenate([pair[..., 0, :, :], pair[..., 1, :, :]], axis=-1)
+            for pair in (pairs, self.start)
+        )
         left, _, right = np.linalg.svd(now @ start.T)
         return np.asarray((left @ right)[..., None, :, :] @ self.start, dtype=np.float64)
 
     def neighbour(self, distance: float) -> CotangentFlow:
-        """Return the flow of a start moved by about ``distance`` on the manifold, energy included: how data rounding acts."""
+        """Return the flow of a start moved by about ``distance`` on the manifold, energy included:
+        how data rounding acts.
+        """
         X, P = self.start
-        move = np.random.default_rng(self.inertia.n).normal(size=self.start.shape) / np.sqrt(self.inertia.n)
+        move = np.random.default_rng(self.inertia.n).normal(size=self.start.shape) / np.sqrt(
+            self.inertia.n
+        )
         X = nearest_orthonormal(X + distance * move[0])
         P = P + distance * float(np.linalg.norm(P)) * move[1]
         return replace(self, start=np.stack([X, tangent_part(X, P)]))
 
     def unpack(self, states: Array) -> dict[str, Array]:
-        """Return X and P in units of the problem, on the manifold: between its steps an integrator has fewer digits."""
+        """Return X and P in units of the problem, on the manifold: between its steps an integrator
+        has fewer digits.
+        """
         pairs = self.project(states).reshape(-1, *self.start.shape)
-        return {"X": pairs[:, 0], "P": np.ldexp(pairs[:, 1] * self.momentum_unit, self.inertia.exponent)}
+        return {
+            "X": pairs[:, 0],
+            "P": np.ldexp(pairs[:, 1] * self.momentum_unit, self.inertia.exponent),
+        }
 
 
 @dataclass(frozen=True)
 class MomentumFlow(Flow):
-    """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c), (4.2a), 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω; a state is (X, 𝓜), 𝓜 by its coefficients.
+    """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c), (4.2a), 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω; a state is (X, 𝓜), 𝓜 by
+    its coefficients.
 
     Here ω solves the full linear system (4.2) of n(n−1)/2 equations, in floating point only.
     """
@@ -148,9 +169,13 @@ class MomentumFlow(Flow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (−ωX, [𝓜,ω])."""
         inertia, (X, momentum) = self.reduced.inertia, self._parts(state)
-        system = coefficients(self._basis + admissible_part(X, inertia.apply(self._basis) - self._basis))
+        system = coefficients(
+            self._basis + admissible_part(X, inertia.apply(self._basis) - self._basis)
+        )
         omega = skew(np.linalg.solve(system.T, coefficients(momentum)), inertia.n)
-        return np.concatenate([(-omega @ X).ravel(), coefficients(momentum @ omega - omega @ momentum)])
+        return np.concatenate(
+            [(-omega @ X).ravel(), coefficients(momentum @ omega - omega @ momentum)]
+        )
 
     @cached_property
     def _basis(self) -> Array:
@@ -158,7 +183,8 @@ class MomentumFlow(Flow):
         return skew(np.eye(n * (n - 1) // 2), n)
 
     def _parts(self, states: Array) -> tuple[Array, Array]:
-        n, r = self.reduced.inertia.n, self.reduced.rank
+        n = self.reduced.inertia.n
+        r = self.reduced.rank
         return states[..., : n * r].reshape(*states.shape[:-1], n, r), skew(states[..., n * r :], n)
 
     def _pairs(self, states: Array) -> Array:

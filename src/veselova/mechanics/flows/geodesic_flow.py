@@ -1,4 +1,6 @@
-"""The geodesic equation of an ellipsoid in ℝⁿ, with the normals of the touching quadrics carried along."""
+"""The geodesic equation of an ellipsoid in ℝⁿ, with the normals of the touching quadrics carried
+along.
+"""
 
 from __future__ import annotations
 
@@ -17,27 +19,38 @@ Array = NDArray[np.float64]
 
 
 class GeodesicFlow(PointFlow):
-    """X'' = −(V,A⁻¹V)/(X,A⁻²X) A⁻¹X, V = X', with N' = −(q∧dq/ds)N (norms) for N = (n_2 … n_{n−1}), and dτ₁/ds (knorrer).
+    """X'' = −(V,A⁻¹V)/(X,A⁻²X) A⁻¹X, V = X', with N' = −(q∧dq/ds)N (norms) for N = (n_2 … n_{n−1}),
+    and dτ₁/ds (knorrer).
 
-    Flat states (X, V, N, τ₁) in units of the longest semiaxis; parameters are the I_i in these units.
+    Flat states (X, V, N, τ₁) in units of the longest semiaxis; parameters are the I_i in these
+    units.
     """
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return d(X, V, N, τ₁)/ds."""
         n = parameters.size
-        X, V, N = state[:n], state[n : 2 * n], state[2 * n : -1].reshape(n, n - 2)
-        u, w = parameters * X, parameters * V  # along q and dq
-        uu, VIV = ops.dot(u, u), ops.dot(V, w)
+        X = state[:n]
+        V = state[n : 2 * n]
+        N = state[2 * n : -1].reshape(n, n - 2)
+        # along q and dq
+        u = parameters * X
+        w = parameters * V
+        uu = ops.dot(u, u)
+        VIV = ops.dot(V, w)
         derivative = np.empty_like(state)
         derivative[:n] = V
         derivative[n : 2 * n] = -(VIV / uu) * u
         if n > 2:
-            derivative[2 * n : -1] = (np.outer(w / uu, ops.dot(u, N)) - np.outer(u / uu, ops.dot(w, N))).ravel()
+            derivative[2 * n : -1] = (
+                np.outer(w / uu, ops.dot(u, N)) - np.outer(u / uu, ops.dot(w, N))
+            ).ravel()
         derivative[-1] = ops.sqrt(VIV / uu) * ops.dot(X, u)
         return derivative
 
     def project(self, state: Array) -> Array:
-        """Return the state with X on the ellipsoid, V a unit tangent, N orthonormal and orthogonal to V and the normal."""
+        """Return the state with X on the ellipsoid, V a unit tangent, N orthonormal and orthogonal
+        to V and the normal.
+        """
         n = self.n
         E = self._frames(state[None])[0]
         X = state[:n] / np.sqrt(state[:n] @ (self.parameters * state[:n]))

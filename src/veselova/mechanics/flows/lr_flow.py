@@ -1,4 +1,6 @@
-"""The two fields of an LR system: its momentum equation on the group alone, and Euler–Poincaré equations with multipliers."""
+"""The two fields of an LR system: its momentum equation on the group alone, and Euler–Poincaré
+equations with multipliers.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,10 @@ _LARGEST_SYMBOLIC = 66
 class LRFlow(SingularFlow):
     """An LR system in scaled units: moments of inertia near one, angular velocities near one.
 
-    along (d,)   m_k = ⟨𝓘ω, 𝒲_k⟩ at the start · across (m,)  the constants c_s = ⟨ω, ℱ_s⟩ of the constraints
-    conserves    whether the Jacobi–Painlevé integral is one: not where v changes along constants c_s ≠ 0
+    along (d,)   m_k = ⟨𝓘ω, 𝒲_k⟩ at the start · across (m,)  the constants c_s = ⟨ω, ℱ_s⟩ of the
+        constraints
+    conserves    whether the Jacobi–Painlevé integral is one: not where v changes along constants
+        c_s ≠ 0
     """
 
     distribution: Distribution
@@ -73,20 +77,32 @@ class LRFlow(SingularFlow):
     def omega(self, g: Array, along: Array) -> Array:
         """Return ω from m_k and the group elements, in coordinates (…, D)."""
         W, F = self.distribution.in_body(g)
-        return np.asarray(self.distribution.velocity(self._operator, W, F, along, self.across), dtype=np.float64)
+        return np.asarray(
+            self.distribution.velocity(self._operator, W, F, along, self.across), dtype=np.float64
+        )
 
     def jacobi(self, g: Array, omega: Array) -> Array:
         """Return the Jacobi–Painlevé integral, shape (…)."""
-        return jacobi_integral(self.distribution, self.inertia, self.across, self.potential, g, omega)
+        return jacobi_integral(
+            self.distribution, self.inertia, self.across, self.potential, g, omega
+        )
 
     def neighbour(self, distance: float) -> LRFlow:
-        """Return the flow of a start moved by about ``distance``, its momentum and constraints in proportion."""
-        group, rng = self.distribution.group, np.random.default_rng(self.g.size)
+        """Return the flow of a start moved by about ``distance``, its momentum and constraints in
+        proportion.
+        """
+        group = self.distribution.group
+        rng = np.random.default_rng(self.g.size)
         turn = distance * rng.normal(size=group.dimension) / np.sqrt(group.size)
         kicks = (1 + distance * rng.normal(size=x.size) for x in (self.along, self.across))
         g = group.project(self.g + self.g @ group.element(turn))
         along, across = (x * kick for x, kick in zip((self.along, self.across), kicks, strict=True))
-        side = distance * float(np.linalg.norm(self.along)) * rng.normal(size=along.size) / np.sqrt(max(along.size, 1))
+        side = (
+            distance
+            * float(np.linalg.norm(self.along))
+            * rng.normal(size=along.size)
+            / np.sqrt(max(along.size, 1))
+        )
         return replace(self, g=g, along=along + side, across=across)
 
     def _coordinates(self, state: Array) -> tuple[Array, Array]:
@@ -97,7 +113,11 @@ class LRFlow(SingularFlow):
     @cached_property
     def _singular(self) -> Mapping[tuple[int, int], Callable[[Array], Any]]:
         v = self.potential
-        return {} if v is None else {entry: v.singular_part(entry).value for entry in v.singular_entries}
+        return (
+            {}
+            if v is None
+            else {entry: v.singular_part(entry).value for entry in v.singular_entries}
+        )
 
     def _plane(self, index: tuple[int, int]) -> str:
         return f"g_{index[0] + 1}{index[1] + 1}"
@@ -116,10 +136,12 @@ class LRFlow(SingularFlow):
 
 @dataclass(frozen=True)
 class MomentumFlow(LRFlow):
-    """ġ = g ω(g) with ω from (mom) and the momentum in space, m = g𝓜g⁻¹, constant: (mom_eq) solved once for all.
+    """ġ = g ω(g) with ω from (mom) and the momentum in space, m = g𝓜g⁻¹, constant: (mom_eq) solved
+    once for all.
 
-    All integrals but those that a potential breaks are restored; the other formulation leaves them as integrated. A potential
-    turns the 𝔡-part of m by its torque: the state is (g, m_1 … m_d) then, else g alone.
+    All integrals but those that a potential breaks are restored; the other formulation leaves them
+    as integrated. A potential turns the 𝔡-part of m by its torque: the state is (g, m_1 … m_d)
+    then, else g alone.
     """
 
     @cached_property
@@ -129,9 +151,17 @@ class MomentumFlow(LRFlow):
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
-        """Return the operator that (mom) is solved with, the constants c unless all are zero, and m or the potential's."""
+        """Return the operator that (mom) is solved with, the constants c unless all are zero, and m
+        or the potential's.
+        """
         constants = self.across if np.any(self.across) else np.empty(0)
-        return np.concatenate([self._operator.ravel(), constants, self._coefficients if self.potential else self.along])
+        return np.concatenate(
+            [
+                self._operator.ravel(),
+                constants,
+                self._coefficients if self.potential else self.along,
+            ]
+        )
 
     def _split(self, state: Any) -> tuple[Any, Any]:
         area = self.g.size
@@ -155,19 +185,24 @@ class MomentumFlow(LRFlow):
         return float(self.jacobi(self.g, self.omega(self.g, self.along)))
 
     def _restore(self, states: Array) -> tuple[Array, Array]:
-        """Return g and m_k of states (…, m) with g on the group and the energy of the start, by one step along its gradient.
+        """Return g and m_k of states (…, m) with g on the group and the energy of the start, by one
+        step along its gradient.
 
         The gradient at constant momentum is [ω,𝓘ω] + y(v); it vanishes at steady rotations too.
         """
         group, (g, along) = self.distribution.group, self._split(states)
-        g, m = group.project(g), along if self.potential else self.along
+        g = group.project(g)
+        m = along if self.potential else self.along
         if not self.conserves:
             return g, along
         omega = self.omega(g, m)
-        momentum, excess = self.inertia(omega), self.jacobi(g, omega) - self._energy
+        momentum = self.inertia(omega)
+        excess = self.jacobi(g, omega) - self._energy
         turn = group.bracket(omega, momentum) - self._torque(g, self.parameters, FLOATS)
         # Twice the kinetic part: constants of the constraints add one like it.
-        size = np.sum(np.abs(omega * momentum), axis=-1) + (self.potential.magnitude(g) if self.potential else 0.0)
+        size = np.sum(np.abs(omega * momentum), axis=-1) + (
+            self.potential.magnitude(g) if self.potential else 0.0
+        )
         step = restoring_step(-excess, np.sum(turn * turn, axis=-1), size)[..., None]
         return group.project(g + g @ group.element(step * turn)), along
 
@@ -177,14 +212,17 @@ class MomentumFlow(LRFlow):
         return np.concatenate([g.ravel(), along])
 
     def motion(self, states: Array) -> tuple[Array, Array]:
-        """Return g and ω, with the energy restored: between steps the integrator interpolates, ten times less accurately."""
+        """Return g and ω, with the energy restored: between steps the integrator interpolates, ten
+        times less accurately.
+        """
         g, along = self._restore(states)
         return g, self.omega(g, along if self.potential else self.along)
 
 
 @dataclass(frozen=True)
 class MultiplierFlow(LRFlow):
-    """𝓘ω̇ = [𝓘ω,ω] − y(v) + Σ λ_s ℱ_s, ġ = gω, equation (EPS), for states (ω, g); λ from ⟨ω̇, ℱ_s⟩ = 0.
+    """𝓘ω̇ = [𝓘ω,ω] − y(v) + Σ λ_s ℱ_s, ġ = gω, equation (EPS), for states (ω, g); λ from ⟨ω̇, ℱ_s⟩
+    = 0.
 
     Only the group is restored: constraints, momentum and energy are left as integrated, to be seen.
     """
@@ -197,7 +235,9 @@ class MultiplierFlow(LRFlow):
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
         """Return 𝓘⁻¹, 𝓘 and the potential's coefficients."""
-        return np.concatenate([self.inertia.inverse.ravel(), self.inertia.operator.ravel(), self._coefficients])
+        return np.concatenate(
+            [self.inertia.inverse.ravel(), self.inertia.operator.ravel(), self._coefficients]
+        )
 
     def _split(self, state: Any) -> tuple[Any, Any]:
         D = self.distribution.group.dimension
@@ -206,9 +246,13 @@ class MultiplierFlow(LRFlow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (ω̇, gω)."""
         group, (omega, g) = self.distribution.group, self._split(state)
-        shape, area = self.inertia.operator.shape, self.inertia.operator.size
-        inverse, operator = parameters[:area].reshape(shape), parameters[area : 2 * area].reshape(shape)
-        force = group.bracket(apply_operator(operator, omega, ops), omega, ops) + self._torque(g, parameters, ops)
+        shape = self.inertia.operator.shape
+        area = self.inertia.operator.size
+        inverse = parameters[:area].reshape(shape)
+        operator = parameters[area : 2 * area].reshape(shape)
+        force = group.bracket(apply_operator(operator, omega, ops), omega, ops) + self._torque(
+            g, parameters, ops
+        )
         omega_dot = apply_operator(inverse, force, ops)
         if self.distribution.constraints:
             F = self.distribution.in_body(g, ops)[1]
@@ -228,12 +272,23 @@ class MultiplierFlow(LRFlow):
 
 
 def jacobi_integral(
-    distribution: Distribution, inertia: Inertia, across: Array, potential: GroupPotential | None, g: Array, omega: Array
+    distribution: Distribution,
+    inertia: Inertia,
+    across: Array,
+    potential: GroupPotential | None,
+    g: Array,
+    omega: Array,
 ) -> Array:
-    """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape (…)."""
+    """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape
+    (…).
+    """
     momentum = inertia(omega)
     vertical = distribution.components(g, momentum)[1] @ across
-    return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - vertical + (potential.value(g) if potential else 0.0))
+    return np.asarray(
+        np.sum(momentum * omega, axis=-1) / 2
+        - vertical
+        + (potential.value(g) if potential else 0.0)
+    )
 
 
 def multipliers_of(inverse: Any, F: Any, force: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:

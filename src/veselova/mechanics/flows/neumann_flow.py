@@ -1,4 +1,6 @@
-"""Equation (4.7) with the frame carried along, ė = −(q∧q')e: Neumann's system in its own time, and a geodesic's in arc length."""
+"""Equation (4.7) with the frame carried along, ė = −(q∧q')e: Neumann's system in its own time, and
+a geodesic's in arc length.
+"""
 
 from __future__ import annotations
 
@@ -18,19 +20,25 @@ Array = NDArray[np.float64]
 
 
 class NeumannFlow(PointFlow):
-    """Neumann's system for flat states (q', E), q the first column of the frame E; parameters are the I_i."""
+    """Neumann's system for flat states (q', E), q the first column of the frame E; parameters are
+    the I_i.
+    """
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q'', E')."""
         return _neumann_field(state, parameters, ops)
 
     def project(self, state: Array) -> Array:
-        """Return the state with E orthonormal, q' tangent, and, by one step along its gradient, the energy of the start."""
+        """Return the state with E orthonormal, q' tangent, and, by one step along its gradient, the
+        energy of the start.
+        """
         (v, E), (v_start, E_start) = _on_sphere(state, self.n), _on_sphere(self.initial, self.n)
         q = E[:, 0]
         energy = self._energy(q, v)
         force = self.parameters * q - (q @ (self.parameters * q)) * q
-        step = restoring_step(energy - self._energy(E_start[:, 0], v_start), force @ force + v @ v, energy)
+        step = restoring_step(
+            energy - self._energy(E_start[:, 0], v_start), force @ force + v @ v, energy
+        )
         E = np.column_stack([q - step * force, E[:, 1:]])
         return np.concatenate(_flat(_on_sphere(np.concatenate([v - step * v, E.ravel()]), self.n)))
 
@@ -49,7 +57,8 @@ class NeumannFlow(PointFlow):
 
 
 class GaussFlow(PointFlow):
-    """A geodesic on the ellipsoid through its unit normal q (Theorem Kno): states (q', E, τ₁) in arc length.
+    """A geodesic on the ellipsoid through its unit normal q (Theorem Kno): states (q', E, τ₁) in
+    arc length.
 
     dτ₁/ds = √J (q,Aq); parameters are the I_i, the A_i and √J, in units of the longest semiaxis.
     """
@@ -74,7 +83,9 @@ class GaussFlow(PointFlow):
         return np.concatenate([*_flat((v, E)), state[-1:]])
 
     def neighbour(self, distance: float) -> GaussFlow:
-        """Return the flow of a start moved by about ``distance``, and √J, a datum of its own here, by half of it."""
+        """Return the flow of a start moved by about ``distance``, and √J, a datum of its own here,
+        by half of it.
+        """
         initial = self.project(np.append(_perturb(self.initial[:-1], distance, self.n), 0.0))
         side = 1 if self.n % 2 else -1  # either would do, and not always the same one
         root_J = self.parameters[-1] * (1 + side * distance / 2)
@@ -89,7 +100,8 @@ class GaussFlow(PointFlow):
 def _neumann_field(state: Any, inverse: Any, ops: Operations) -> Any:
     """Return (q'', E'), with λ divided by (q,q): off the sphere the motion is then not unstable."""
     n = inverse.size
-    v, E = state[:n], state[n:].reshape(n, n)
+    v = state[:n]
+    E = state[n:].reshape(n, n)
     q = E[:, 0]
     multiplier = (ops.dot(inverse * q, q) - ops.dot(v, v)) / ops.dot(q, q)
     rotated = np.outer(v, ops.dot(q, E)) - np.outer(q, ops.dot(v, E))
@@ -97,7 +109,9 @@ def _neumann_field(state: Any, inverse: Any, ops: Operations) -> Any:
 
 
 def _perturb(state: Array, distance: float, n: int) -> Array:
-    """Return a state (a vector, then a frame) whose vector and first column are moved by about ``distance``."""
+    """Return a state (a vector, then a frame) whose vector and first column are moved by about
+    ``distance``.
+    """
     direction = np.random.default_rng(n).normal(size=(2, n)) / np.sqrt(n)
     size = max(float(np.linalg.norm(state[:n])), 1.0)
     E = state[n:].reshape(n, -1).copy()
@@ -112,7 +126,8 @@ def _on_sphere(state: Array, n: int) -> tuple[Array, Array]:
 
 
 def _on_spheres(states: Array, n: int) -> tuple[Array, Array]:
-    v, E = states[:, :n], states[:, n:].reshape(-1, n, n)
+    v = states[:, :n]
+    E = states[:, n:].reshape(-1, n, n)
     q = E[:, :, :1] / np.linalg.norm(E[:, :, :1], axis=1, keepdims=True)
     rest = E[:, :, 1:] - q @ (np.swapaxes(q, 1, 2) @ E[:, :, 1:])
     E = orthonormalize(np.concatenate([q, rest], axis=2))

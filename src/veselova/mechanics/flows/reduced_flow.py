@@ -1,7 +1,8 @@
 """The reduced flow on T*Sⁿ⁻¹ with the frame carried along: vector field, projection, and its units.
 
-Momenta are measured in units of 1/det A (so det A never appears), lengths of A in units of 2^k near its geometric mean,
-and time in units of 1/|q̇(0)|: the field is then of order one whatever the scales of the input.
+Momenta are measured in units of 1/det A (so det A never appears), lengths of A in units of 2^k near
+its geometric mean, and time in units of 1/|q̇(0)|: the field is then of order one whatever the
+scales of the input.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ Array = NDArray[np.float64]
 class ReducedFlow(Flow):
     """The extended system (extended) with ė_k = −ω e_k and dτ₁/dt, for one body and one energy.
 
-    A state is the flat array (p, E, τ₁) of length n + n² + 1: momentum, frame matrix (row-major, columns e_k, e_1 = q), and
-    Neumann time. ``twice_energy`` is W = (p,A⁻¹p)/(q,Aq), the conserved 2h det A in these units.
+    A state is the flat array (p, E, τ₁) of length n + n² + 1: momentum, frame matrix (row-major,
+    columns e_k, e_1 = q), and Neumann time. ``twice_energy`` is W = (p,A⁻¹p)/(q,Aq), the conserved
+    2h det A in these units.
     """
 
     A: Array
@@ -47,7 +49,9 @@ class ReducedFlow(Flow):
         twice_energy = float(p @ (p / scaled) / (q @ (scaled * q)))
         initial = np.concatenate([p, frame.ravel(), [0.0]])
         # dτ₁/dt = √(W/(q,Aq)) is homogeneous of degree ½ in A and 1 in q̇.
-        return cls(scaled, 1 / scaled, twice_energy, 1 / speed, float(np.sqrt(np.ldexp(1.0, k))), initial)
+        return cls(
+            scaled, 1 / scaled, twice_energy, 1 / speed, float(np.sqrt(np.ldexp(1.0, k))), initial
+        )
 
     @staticmethod
     def _momentum(A: Array, q: Array, q_dot: Array) -> Array:
@@ -55,17 +59,22 @@ class ReducedFlow(Flow):
         return np.asarray(A * w * (q @ (A * q)), dtype=np.float64)
 
     def neighbour(self, distance: float) -> ReducedFlow:
-        """Return the flow of a start moved by about ``distance`` on the manifold, energy included: how data rounding acts."""
+        """Return the flow of a start moved by about ``distance`` on the manifold, energy included:
+        how data rounding acts.
+        """
         n = self.n
         direction = np.random.default_rng(n).normal(size=self.initial.size) / np.sqrt(n)
-        p, E = self.initial[:n], self.initial[n:-1].reshape(n, n)
+        p = self.initial[:n]
+        E = self.initial[n:-1].reshape(n, n)
         q = E[:, 0] + distance * direction[:n]
         q /= np.linalg.norm(q)
         E = orthonormalize(np.column_stack([q, E[:, 1:]]))
         p = p + distance * float(np.linalg.norm(p)) * direction[n : 2 * n]
         p = p - (p @ E[:, 0]) * E[:, 0]
         twice_energy = float(p @ (self.inverse * p) / (E[:, 0] @ (self.A * E[:, 0])))
-        return replace(self, twice_energy=twice_energy, initial=np.concatenate([p, E.ravel(), [0.0]]))
+        return replace(
+            self, twice_energy=twice_energy, initial=np.concatenate([p, E.ravel(), [0.0]])
+        )
 
     @property
     def n(self) -> int:
@@ -78,25 +87,36 @@ class ReducedFlow(Flow):
         return np.concatenate([self.A, self.inverse, [self.twice_energy]])
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return the derivative of a state: (extended) for q and p, (Po) for the frame, (4.6) for τ₁."""
+        """Return the derivative of a state: (extended) for q and p, (Po) for the frame, (4.6) for
+        τ₁.
+        """
         n = self.n
-        p, E = state[:n], state[n:-1].reshape(n, n)
-        A, inverse, twice_energy = parameters[:n], parameters[n:-1], parameters[-1]
+        p = state[:n]
+        E = state[n:-1].reshape(n, n)
+        A = parameters[:n]
+        inverse = parameters[n:-1]
+        twice_energy = parameters[-1]
         q = E[:, 0]
-        Aq, p_inverse = A * q, inverse * p
-        qAq, qq, along, pp, pq = (ops.dot(a, b) for a, b in ((q, Aq), (q, q), (p_inverse, q), (p, p_inverse), (p, q)))
+        Aq = A * q
+        p_inverse = inverse * p
+        qAq, qq, along, pp, pq = (
+            ops.dot(a, b) for a, b in ((q, Aq), (q, q), (p_inverse, q), (p, p_inverse), (p, q))
+        )
         q_dot = (p_inverse - (along / qq) * q) / qAq
         derivative = np.empty_like(state)
         derivative[:n] = (-(pp * qq - pq * along) / (qAq * qq * qq)) * q
-        # −(q∧q̇)E = q̇(qᵀE) − q(q̇ᵀE); its first column is q̇(q,q) − q(q̇,q) = q̇ since (extended) keeps (q̇,q) = 0.
+        # −(q∧q̇)E = q̇(qᵀE) − q(q̇ᵀE); its first column is q̇(q,q) − q(q̇,q) = q̇ since (extended)
+        # keeps (q̇,q) = 0.
         derivative[n:-1] = (np.outer(q_dot, ops.dot(q, E)) - np.outer(q, ops.dot(q_dot, E))).ravel()
         derivative[-1] = ops.sqrt(twice_energy / qAq)
         return derivative
 
     def project(self, state: Array) -> Array:
-        """Return the state back on the manifold: frame orthonormal, (q,p) = 0, p rescaled to the energy.
+        """Return the state back on the manifold: frame orthonormal, (q,p) = 0, p rescaled to the
+        energy.
 
-        Without it a start that is one rounding off the manifold makes the energy drift quadratically in time.
+        Without it a start that is one rounding off the manifold makes the energy drift
+        quadratically in time.
         """
         n = self.n
         E = orthonormalize(state[n:-1].reshape(n, n))
@@ -106,12 +126,15 @@ class ReducedFlow(Flow):
         return np.concatenate([p, E.ravel(), state[-1:]])
 
     def unpack(self, states: Array) -> dict[str, Array]:
-        """Return frame, q_dot and tau1 along the principal axes, from states of shape (N, n + n² + 1).
+        """Return frame, q_dot and tau1 along the principal axes, from states of shape (N, n + n² +
+        1).
 
-        Frames are made orthonormal and p orthogonal to q; the energy is left as integrated, so that its drift can be seen.
+        Frames are made orthonormal and p orthogonal to q; the energy is left as integrated, so that
+        its drift can be seen.
         """
         n = self.n
-        p, E = states[:, :n], orthonormalize(states[:, n:-1].reshape(-1, n, n))
+        p = states[:, :n]
+        E = orthonormalize(states[:, n:-1].reshape(-1, n, n))
         q = E[:, :, 0]
         p_inverse = self.inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
         qAq = np.sum(q * self.A * q, axis=1, keepdims=True)

@@ -1,4 +1,6 @@
-"""A rigid body about a fixed point in a potential V(γ), free or with (Ω,γ) constant: vector field and projection."""
+"""A rigid body about a fixed point in a potential V(γ), free or with (Ω,γ) constant: vector field
+and projection.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +21,22 @@ __all__ = ["RigidBodyFlow", "angular_velocity", "momentum"]
 
 Array = NDArray[np.float64]
 
-#: Constants whose gradients turn into each other by less than this (near steady rotations, at rest) are not restored separately:
-#: the step, their defect divided by it, would do more harm than good.
+#: Constants whose gradients turn into each other by less than this (near steady rotations, at rest)
+#: are not restored separately: the step, their defect divided by it, would do more harm than good.
 _PARALLEL = 0.1
 
 
 @dataclass(frozen=True)
 class RigidBodyFlow(SingularFlow):
-    """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E = [e_1 e_2 e_3], e_1 = γ.
+    """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E =
+    [e_1 e_2 e_3], e_1 = γ.
 
-    inertia, inverse  the tensor and its inverse, (3, 3) · potential  V(γ) · Omega, frame  the start, all in scaled units
+    inertia, inverse  the tensor and its inverse, (3, 3) · potential  V(γ) · Omega, frame  the
+        start, all in scaled units
     constrained  whether a multiplier λγ keeps (Ω,γ) constant
-    spatial      states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of (Ω, E): with V = 0 the
-                 equation is one of first order on the group alone, and in any potential m_1 = (𝔪,γ) does not move
+    spatial      states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of
+                 (Ω, E): with V = 0 the equation is one of first order on the group alone, and in
+                 any potential m_1 = (𝔪,γ) does not move
 
     A state is flat, of length 3 + 9; frames are row-major.
     """
@@ -53,24 +58,40 @@ class RigidBodyFlow(SingularFlow):
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
         """Return 𝓘, 𝓘⁻¹ and the coefficients of ∂V/∂γ."""
-        return np.concatenate([self.inertia.ravel(), self.inverse.ravel(), self.potential.slopes[1]])
+        return np.concatenate(
+            [self.inertia.ravel(), self.inverse.ravel(), self.potential.slopes[1]]
+        )
 
     @property
     def structure(self) -> Hashable | None:
         """Return what determines the field besides its parameters."""
-        return type(self), self.constrained, self.spatial, self.potential.slopes[0].tobytes(), self.potential.slopes[2].tobytes()
+        return (
+            type(self),
+            self.constrained,
+            self.spatial,
+            self.potential.slopes[0].tobytes(),
+            self.potential.slopes[2].tobytes(),
+        )
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (Ω̇, Ė) or (ṁ, Ė)."""
         E = state[3:].reshape(3, 3)
-        gamma, inertia, inverse = E[:, 0], parameters[:9].reshape(3, 3), parameters[9:18].reshape(3, 3)
+        gamma = E[:, 0]
+        inertia = parameters[:9].reshape(3, 3)
+        inverse = parameters[9:18].reshape(3, 3)
         across = ops.dot(inverse, gamma)
         if self.spatial:
             Omega = ops.dot(inverse, ops.dot(E, state[:3]))
             if self.constrained:
-                excess = (ops.dot(Omega, gamma) - ops.dot(state[:3], ops.dot(E.T, gamma))) / ops.dot(gamma, across)
+                excess = (
+                    ops.dot(Omega, gamma) - ops.dot(state[:3], ops.dot(E.T, gamma))
+                ) / ops.dot(gamma, across)
                 Omega = Omega - excess * across
-            rate = ops.dot(E.T, self._torque(gamma, parameters, ops)) if self.potential else np.zeros(3)
+            rate = (
+                ops.dot(E.T, self._torque(gamma, parameters, ops))
+                if self.potential
+                else np.zeros(3)
+            )
         else:
             Omega = state[:3]
             torque = _cross(ops.dot(inertia, Omega), Omega)
@@ -87,13 +108,16 @@ class RigidBodyFlow(SingularFlow):
         return _cross(gamma, ops.dot(components, terms))
 
     def project(self, state: Array) -> Array:
-        """Return states (..., 12) with orthonormal frames; where they hold Ω, also with the constants of the start.
+        """Return states (..., 12) with orthonormal frames; where they hold Ω, also with the
+        constants of the start.
 
-        These are (Ω,γ) (free: (𝓘Ω,γ)) and the energy, restored by the shortest step in Ω and the attitude. With the momentum in
-        space the constraint holds by itself, and the energy is left as a check. The additional integral is always left: near
-        separatrices it hardly differs from the energy, and restoring it cost a digit there.
+        These are (Ω,γ) (free: (𝓘Ω,γ)) and the energy, restored by the shortest step in Ω and the
+        attitude. With the momentum in space the constraint holds by itself, and the energy is left
+        as a check. The additional integral is always left: near separatrices it hardly differs from
+        the energy, and restoring it cost a digit there.
         """
-        first, E = state[..., :3], orthonormalize(_frames(state))
+        first = state[..., :3]
+        E = orthonormalize(_frames(state))
         if not self.spatial:
             values, slopes, sizes = self._constants(first, E)
             lengths = np.linalg.norm(slopes, axis=-1)
@@ -109,16 +133,25 @@ class RigidBodyFlow(SingularFlow):
         return self._constants(self.Omega, self.frame)[0]
 
     def _constants(self, Omega: Array, E: Array) -> tuple[Array, Array, Array]:
-        """Return the constants (..., 2), their derivatives by Ω and by a rotation x → x + x×δ, (..., 2, 6), and sizes (..., 2).
+        """Return the constants (..., 2), their derivatives by Ω and by a rotation x → x + x×δ,
+        (..., 2, 6), and sizes (..., 2).
 
-        Sizes are those of ``restoring_step``, 0 for the linear constant: its slope never vanishes, and it is restored in full.
+        Sizes are those of ``restoring_step``, 0 for the linear constant: its slope never vanishes,
+        and it is restored in full.
         """
-        gamma, M, across = E[..., 0], Omega @ self.inertia, E[..., 0] @ self.inertia
-        kinetic, by_Omega, by_gamma = _dot(Omega, M) / 2, M, self.potential.gradient(gamma)
-        energy, size = kinetic + self.potential.value(gamma), kinetic + self.potential.magnitude(gamma)
+        gamma = E[..., 0]
+        M = Omega @ self.inertia
+        across = E[..., 0] @ self.inertia
+        kinetic = _dot(Omega, M) / 2
+        by_Omega = M
+        by_gamma = self.potential.gradient(gamma)
+        energy = kinetic + self.potential.value(gamma)
+        size = kinetic + self.potential.magnitude(gamma)
         if self.constrained:
-            linear, along = _dot(Omega, gamma), _dot(M, gamma)
-            energy, size = energy - linear * along, size + np.abs(linear * along)
+            linear = _dot(Omega, gamma)
+            along = _dot(M, gamma)
+            energy = energy - linear * along
+            size = size + np.abs(linear * along)
             by_Omega = by_Omega - _by(along, gamma) - _by(linear, across)
             by_gamma = by_gamma - _by(along, Omega) - _by(linear, M)
             rows = [(gamma, Omega), (by_Omega, by_gamma)]
@@ -135,11 +168,17 @@ class RigidBodyFlow(SingularFlow):
         return Omega + _by((self._wanted[0] - _dot(Omega, across)) / _dot(gamma, across), gamma)
 
     def _state(self, Omega: Array, E: Array) -> Array:
-        first = E.T @ momentum(self.inertia, Omega, E[:, 0], self.constrained) if self.spatial else Omega
+        first = (
+            E.T @ momentum(self.inertia, Omega, E[:, 0], self.constrained)
+            if self.spatial
+            else Omega
+        )
         return np.concatenate([first, E.ravel()])
 
     def neighbour(self, distance: float) -> RigidBodyFlow:
-        """Return the flow of a start moved by about ``distance``; (Ω,γ) or (𝓘Ω,γ) keeps its value."""
+        """Return the flow of a start moved by about ``distance``; (Ω,γ) or (𝓘Ω,γ)
+        keeps its value.
+        """
         direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
         E = orthonormalize(self.frame + distance * _turning(direction[:3]) @ self.frame)
         size = max(1.0, float(np.linalg.norm(self.Omega)))
@@ -149,7 +188,8 @@ class RigidBodyFlow(SingularFlow):
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return Omega and frame of states put back on the manifold."""
         states = self.project(states)
-        E, Omega = _frames(states), states[:, :3]
+        E = _frames(states)
+        Omega = states[:, :3]
         if self.spatial:
             body = np.einsum("tij,tj->ti", E, Omega)
             Omega = angular_velocity(self.inverse, body, E[..., 0], self.constrained)
@@ -159,7 +199,11 @@ class RigidBodyFlow(SingularFlow):
     def _coordinates(self, state: Array) -> tuple[Array, Array]:
         """Return γ and γ̇."""
         E = state[3:].reshape(3, 3)
-        Omega = angular_velocity(self.inverse, E @ state[:3], E[:, 0], self.constrained) if self.spatial else state[:3]
+        Omega = (
+            angular_velocity(self.inverse, E @ state[:3], E[:, 0], self.constrained)
+            if self.spatial
+            else state[:3]
+        )
         return E[:, 0].copy(), np.cross(E[:, 0], Omega)
 
     @cached_property
@@ -171,7 +215,9 @@ class RigidBodyFlow(SingularFlow):
 
 
 def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> Array:
-    """Return 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, after (4.2a), or 𝓘Ω where the body is free, shape (..., 3)."""
+    """Return 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, after (4.2a), or 𝓘Ω where the body is free,
+    shape (..., 3).
+    """
     M = Omega @ inertia
     if not constrained:
         return np.asarray(M)
@@ -179,7 +225,9 @@ def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> A
 
 
 def angular_velocity(inverse: Array, body: Array, gamma: Array, constrained: bool) -> Array:
-    """Return Ω from 𝔪: 𝓘Ω = 𝔪 − [((𝔪,𝓘⁻¹γ) − (𝔪,γ))/(γ,𝓘⁻¹γ)] γ, after (4.2a) corrected, shape (..., 3)."""
+    """Return Ω from 𝔪: 𝓘Ω = 𝔪 − [((𝔪,𝓘⁻¹γ) − (𝔪,γ))/(γ,𝓘⁻¹γ)] γ, after (4.2a) corrected, shape
+    (..., 3).
+    """
     Omega = body @ inverse
     if not constrained:
         return np.asarray(Omega)

@@ -20,19 +20,24 @@ Array = NDArray[np.float64]
 
 
 class SeparableFlow(PointFlow, SingularFlow):
-    """The extended system (extended) for q and p with the tangential force of V = α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
+    """The extended system (extended) for q and p with the tangential force of V =
+    α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
 
-    Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det A, in units of time.
+    Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det
+    A, in units of time.
     """
 
     lists: ClassVar[int] = 3
     further: ClassVar[int] = 2
 
     @classmethod
-    def of(cls, A: Array, q: Array, q_dot: Array, potential: tuple[float, float, Array], turning: float) -> SeparableFlow:
+    def of(
+        cls, A: Array, q: Array, q_dot: Array, potential: tuple[float, float, Array], turning: float
+    ) -> SeparableFlow:
         """Return the flow of a start (q, q̇) in the potential (α₁, α₂, β)."""
         scaled, k = unit_scale(A)
-        n, inverse = A.size, 1 / scaled
+        n = A.size
+        inverse = 1 / scaled
         p = scaled * sliding_velocity(scaled, q, q_dot / turning) * (q @ (scaled * q))
         # T is A²/det A; V in its units, with I in units of 2^−k.
         unit = float(np.prod(scaled)) * 2.0 ** (k * (n - 2))
@@ -44,22 +49,32 @@ class SeparableFlow(PointFlow, SingularFlow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q̇, ṗ): (extended), and −∂V/∂q along the sphere."""
         n = self.n
-        q, p = state[:n], state[n:]
-        A, inverse = parameters[:n], parameters[n : 2 * n]
+        q = state[:n]
+        p = state[n:]
+        A = parameters[:n]
+        inverse = parameters[n : 2 * n]
         p_inverse = inverse * p
-        qAq, qq, along, pp, pq = (ops.dot(a, b) for a, b in ((q, A * q), (q, q), (p_inverse, q), (p, p_inverse), (p, q)))
+        qAq, qq, along, pp, pq = (
+            ops.dot(a, b) for a, b in ((q, A * q), (q, q), (p_inverse, q), (p, p_inverse), (p, q))
+        )
         force = self._force(q, parameters, ops)
         derivative = np.empty_like(state)
         derivative[:n] = (p_inverse - (along / qq) * q) / qAq
-        derivative[n:] = (-(pp * qq - pq * along) / (qAq * qq * qq)) * q + force - (ops.dot(force, q) / qq) * q
+        derivative[n:] = (
+            (-(pp * qq - pq * along) / (qAq * qq * qq)) * q + force - (ops.dot(force, q) / qq) * q
+        )
         return derivative
 
     def _force(self, q: Any, parameters: Any, ops: Operations) -> Any:
         n = self.n
-        inverse, betas = parameters[n : 2 * n], parameters[2 * n : 3 * n]
-        quartic, quadratic = parameters[3 * n], parameters[3 * n + 1]
+        inverse = parameters[n : 2 * n]
+        betas = parameters[2 * n : 3 * n]
+        quartic = parameters[3 * n]
+        quadratic = parameters[3 * n + 1]
         moment = ops.dot(inverse * q, q)
-        force = (-2.0 * quartic) * (inverse * inverse * q) + (4.0 * quartic * moment - 2.0 * quadratic) * (inverse * q)
+        force = (-2.0 * quartic) * (inverse * inverse * q) + (
+            4.0 * quartic * moment - 2.0 * quadratic
+        ) * (inverse * q)
         walls = np.zeros(n, dtype=q.dtype)
         for i in np.flatnonzero(self._walls):
             walls[i] = 2.0 * betas[i] / (q[i] * q[i] * q[i])
@@ -76,27 +91,38 @@ class SeparableFlow(PointFlow, SingularFlow):
 
     def _energies(self, q: Array, p: Array) -> Array:
         """Return the parts of the energy."""
-        n, parameters = self.n, self.parameters
-        A, inverse, betas = parameters[:n], parameters[n : 2 * n], self._walls
-        moment, live = inverse @ (q * q), betas != 0
+        n = self.n
+        parameters = self.parameters
+        A = parameters[:n]
+        inverse = parameters[n : 2 * n]
+        betas = self._walls
+        moment = inverse @ (q * q)
+        live = betas != 0
         quartic = parameters[3 * n] * np.array([(inverse * inverse) @ (q * q), -moment * moment])
         kinetic = p @ (inverse * p) / (2 * (q @ (A * q)))
-        return np.array([kinetic, *quartic, parameters[3 * n + 1] * moment, *(betas[live] / q[live] ** 2)])
+        return np.array(
+            [kinetic, *quartic, parameters[3 * n + 1] * moment, *(betas[live] / q[live] ** 2)]
+        )
 
     def _on_sphere(self, state: Array) -> tuple[Array, Array]:
-        q, p = state[: self.n], state[self.n :]
+        q = state[: self.n]
+        p = state[self.n :]
         q = q / np.linalg.norm(q)
         return q, p - (p @ q) * q
 
     def project(self, state: Array) -> Array:
-        """Return the state with |q| = 1, (q,p) = 0 and the energy of the start, by one step along its gradient."""
+        """Return the state with |q| = 1, (q,p) = 0 and the energy of the start, by one step along
+        its gradient.
+        """
         q, p = self._on_sphere(state)
         n = self.n
-        A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
+        A = self.parameters[:n]
+        inverse = self.parameters[n : 2 * n]
         qAq = q @ (A * q)
         by_q = -(p @ (inverse * p) / qAq**2) * (A * q) - self._force(q, self.parameters, FLOATS)
         by_p = inverse * p / qAq
-        by_q, by_p = by_q - (by_q @ q) * q, by_p - (by_p @ q) * q
+        by_q = by_q - (by_q @ q) * q
+        by_p = by_p - (by_p @ q) * q
         parts = self._energies(q, p)
         excess = parts.sum() - self._energies(*self._on_sphere(self.initial)).sum()
         step = restoring_step(excess, by_q @ by_q + by_p @ by_p, np.abs(parts).sum())
@@ -105,17 +131,24 @@ class SeparableFlow(PointFlow, SingularFlow):
     def neighbour(self, distance: float) -> SeparableFlow:
         """Return the flow of a start moved by about ``distance``."""
         direction = np.random.default_rng(self.n).normal(size=self.initial.size) / np.sqrt(self.n)
-        direction[: self.n] *= np.abs(self.initial[: self.n]) ** (self._walls != 0)  # what is near a wall moves relative to it
-        return replace(self, initial=np.concatenate(self._on_sphere(self.initial + distance * direction)))
+        # what is near a wall moves relative to it
+        direction[: self.n] *= np.abs(self.initial[: self.n]) ** (self._walls != 0)
+        return replace(
+            self, initial=np.concatenate(self._on_sphere(self.initial + distance * direction))
+        )
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return q and q_dot, on the manifold."""
         n = self.n
         states = np.array([self.project(state) for state in states])
-        q, p = states[:, :n], states[:, n:]
-        A, inverse = self.parameters[:n], self.parameters[n : 2 * n]
+        q = states[:, :n]
+        p = states[:, n:]
+        A = self.parameters[:n]
+        inverse = self.parameters[n : 2 * n]
         p_inverse = inverse * p
-        q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / np.sum(q * A * q, axis=1, keepdims=True)
+        q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / np.sum(
+            q * A * q, axis=1, keepdims=True
+        )
         return {"q": q, "q_dot": q_dot / self.time_unit}
 
     def _coordinates(self, state: Array) -> tuple[Array, Array]:

@@ -1,1 +1,3 @@
-"""Functions of states: sphere and spheroconic coordinates, frames, so(n), Stiefel varieties, integrals of motion."""
+"""Functions of states: sphere and spheroconic coordinates, frames, so(n), Stiefel varieties,
+integrals of motion.
+"""

@@ -1,4 +1,6 @@
-"""A frame [e_1 … e_n] as given: admitted to rounding, or made orthonormal where that was asked for."""
+"""A frame [e_1 … e_n] as given: admitted to rounding, or made orthonormal where that
+was asked for.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,10 @@ __all__ = ["ExactFrame", "admissible_frame", "given_frame"]
 Array = NDArray[np.float64]
 ExactFrame = tuple[tuple[Fraction, ...], ...]
 
-#: Bits after the point of a mended frame: beyond all digits that can be asked for, and, in dimensions without digits, beyond
-#: doubles.
-_ALL_BITS, _DOUBLE_BITS = 4096, 320
+#: Bits after the point of a mended frame: beyond all digits that can be asked for, and, in
+#: dimensions without digits, beyond doubles.
+_ALL_BITS = 4096
+_DOUBLE_BITS = 320
 
 #: The largest dimension with digits.
 _WITH_DIGITS = 8
@@ -30,12 +33,15 @@ _WITH_DIGITS = 8
 _DEPENDENT = 10**12
 
 
-def given_frame(frame: Any, q: tuple[Fraction, ...], normalize: bool, name: str = "q") -> ExactFrame:
+def given_frame(
+    frame: Any, q: tuple[Fraction, ...], normalize: bool, name: str = "q"
+) -> ExactFrame:
     """Return the columns of a frame exactly, row by row; ``q``, of any length, and its ``name``.
 
-    As given, where it is orthogonal with e_1 = q/|q| to 1e-9. With ``normalize`` any other is mended: e_1 becomes q/|q|, and
-    e_2 … e_n are made orthonormal in turn, each against those before it. The sign of the determinant is kept, by reversing e_n
-    where the new e_1 would change it. Raises InvalidInput unless the columns are independent, with q in place of e_1 as well.
+    As given, where it is orthogonal with e_1 = q/|q| to 1e-9. With ``normalize`` any other is
+    mended: e_1 becomes q/|q|, and e_2 … e_n are made orthonormal in turn, each against those before
+    it. The sign of the determinant is kept, by reversing e_n where the new e_1 would change it.
+    Raises InvalidInput unless the columns are independent, with q in place of e_1 as well.
     """
     exact = exact_matrix(frame, ("frame",), len(q))
     try:
@@ -55,7 +61,9 @@ def admissible_frame(frame: Array, q: Array) -> Array:
 
 
 def _require_admissible(frame: Array, q: Array, name: str) -> None:
-    """Raise InvalidInput unless the frame is orthogonal with first column q, both to the tolerance."""
+    """Raise InvalidInput unless the frame is orthogonal with first column q, both to
+    the tolerance.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         defect = float(np.max(np.abs(frame.T @ frame - np.eye(q.size))))
     if not defect <= INPUT_TOLERANCE:
@@ -84,16 +92,23 @@ def _mend(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
             rest = rest - ((unit * (int(unit @ rest) >> bits)) >> bits)
         if _DEPENDENT * math.isqrt(int(rest @ rest)) <= math.isqrt(int(column @ column)):
             raise InvalidInput(
-                ("frame",), f"columns independent of each other and of {name}", f"column {i} in the span of others"
+                ("frame",),
+                f"columns independent of each other and of {name}",
+                f"column {i} in the span of others",
             )
         found.append(_to_unit(rest, bits))
-    before, after = (np.array([[float(Fraction(int(y), 1 << bits)) for y in x] for x in vectors]) for vectors in (columns, found))
+    before, after = (
+        np.array([[float(Fraction(int(y), 1 << bits)) for y in x] for x in vectors])
+        for vectors in (columns, found)
+    )
     signs = [np.linalg.slogdet(vectors)[0] for vectors in (before, after)]
     if np.linalg.svd(before, compute_uv=False)[-1] <= 1 / _DEPENDENT:
         raise InvalidInput(("frame",), "linearly independent columns", "e_1 in the span of others")
     if signs[0] != signs[1]:
         found[-1] = -found[-1]
-    return tuple(tuple(Fraction(int(x), 1 << bits) for x in row) for row in zip(*found, strict=True))
+    return tuple(
+        tuple(Fraction(int(x), 1 << bits) for x in row) for row in zip(*found, strict=True)
+    )
 
 
 def _scale(vector: tuple[Fraction, ...], bits: int) -> Any:

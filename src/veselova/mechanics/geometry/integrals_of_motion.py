@@ -1,7 +1,8 @@
-"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5), and of Neumann's.
+"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5),
+and of Neumann's.
 
-Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works along the leading axes.
-I_i = 1/A_i throughout.
+Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works
+along the leading axes. I_i = 1/A_i throughout.
 """
 
 from __future__ import annotations
@@ -33,15 +34,19 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Binary digits before or after the point that a float may have, with room for the rounding of constants along a motion.
+#: Binary digits before or after the point that a float may have, with room for the rounding of
+#: constants along a motion.
 _MOST_BINARY_DIGITS = 1020
 
-#: I_i and I_j closer than this (relative) share one Neumann integral: their quotient P_ij²/(I_i−I_j) carries no digits.
+#: I_i and I_j closer than this (relative) share one Neumann integral: their quotient
+#: P_ij²/(I_i−I_j) carries no digits.
 _COINCIDENT = 1e-12
 
 
 def unit_scale(A: Array) -> tuple[Array, int]:
-    """Return A/2^k with determinant near one, and k: det A itself leaves the float range for large n."""
+    """Return A/2^k with determinant near one, and k: det A itself leaves the float range for large
+    n.
+    """
     k = round(sum(map(math.log2, A.tolist())) / A.size)
     return np.ldexp(A, -k), k
 
@@ -65,7 +70,9 @@ def norm(vectors: Array) -> Array:
 
 
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape (...)."""
+    """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape
+    (...).
+    """
     return StateIntegrals(A, q, q_dot).energy
 
 
@@ -77,7 +84,8 @@ def momentum(A: Array, q: Array, q_dot: Array) -> Array:
 def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
     """Return dτ₁/dt = √(2h det A/(q,Aq)), equation (4.6), shape (...).
 
-    Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is A-orthogonal to q.
+    Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is
+    A-orthogonal to q.
     """
     return norm(np.sqrt(A) * sliding_velocity(A, q, q_dot))
 
@@ -100,24 +108,32 @@ def _quotient(values: Array, sizes: Array) -> Array:
 
 
 def linear_integrals(p: Array, frame: Array) -> Array:
-    """Return l_k = (1/det A)⟨AωA, e_1∧e_k⟩ = (p, e_k), k = 2…n, from p and the frame, shape (..., n−1)."""
+    """Return l_k = (1/det A)⟨AωA, e_1∧e_k⟩ = (p, e_k), k = 2…n, from p and the frame, shape (...,
+    n−1).
+    """
     return np.asarray(np.einsum("...i,...ik->...k", p, frame[..., :, 1:]))
 
 
 def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return F_i of the Neumann motion that a Veselova motion is in τ₁, shape (..., n): ``uhlenbeck_integrals`` with q'."""
+    """Return F_i of the Neumann motion that a Veselova motion is in τ₁, shape (..., n):
+    ``uhlenbeck_integrals`` with q'.
+    """
     return StateIntegrals(A, q, q_dot).neumann
 
 
 def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
-    """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1), P = q∧q', shape (..., n).
+    """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1), P = q∧q', shape (...,
+    n).
 
-    Where several A's coincide only the sum of their F_i exists; each of them is then given the mean of that sum.
+    Where several A's coincide only the sum of their F_i exists; each of them is then given the mean
+    of that sum.
     """
     inverse = 1 / A
-    gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])  # I_i − I_j without cancellation
+    # I_i − I_j without cancellation
+    gap = (A[None, :] - A[:, None]) * (inverse[:, None] * inverse[None, :])
     same = np.abs(gap) <= _COINCIDENT * np.maximum(inverse[:, None], inverse[None, :])
-    q, q_prime = _along(q), _along(q_prime)
+    q = _along(q)
+    q_prime = _along(q_prime)
     product = q[:, None] * q_prime
     P = product - product.swapaxes(0, 1)
     P *= P
@@ -130,16 +146,22 @@ def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
     return np.asarray(F @ share.T, dtype=np.float64)
 
 
-def neumann_polynomial(point: Any, inverse: Any, q_squared: Any, wedge_squared: Any) -> tuple[Any, Any]:
+def neumann_polynomial(
+    point: Any, inverse: Any, q_squared: Any, wedge_squared: Any
+) -> tuple[Any, Any]:
     """Return N(λ) = Σ_{i<j} P_ij² Π_{k≠i,j}(λ−I_k) + Σ_i q_i² Π_{k≠i}(λ−I_k), and its derivative.
 
-    ``inverse`` holds the I_i, ``q_squared`` the q_i², ``wedge_squared`` the P_ij². N = Φ𝓕 with 𝓕 of (family1) and
-    Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division occurs, so I's may coincide. Works in any arithmetic
-    with + − ×: floats, arrays of λ, multiprecision numbers, fractions.
+    ``inverse`` holds the I_i, ``q_squared`` the q_i², ``wedge_squared`` the P_ij². N = Φ𝓕 with 𝓕 of
+    (family1) and Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division occurs, so I's
+    may coincide. Works in any arithmetic with + − ×: floats, arrays of λ, multiprecision numbers,
+    fractions.
     """
     zero = 0 * point
-    product, slope = zero + 1, zero  # Π_{k<m}(λ−I_k) and its derivative
-    value, value_slope = zero, zero
+    # Π_{k<m}(λ−I_k) and its derivative
+    product = zero + 1
+    slope = zero
+    value = zero
+    value_slope = zero
     partial: list[tuple[Any, Any]] = []  # Π_{k<m, k≠i}(λ−I_k) for each i < m, with derivatives
     for m, I_m in enumerate(inverse):
         x = point - I_m
@@ -155,21 +177,30 @@ def neumann_polynomial(point: Any, inverse: Any, q_squared: Any, wedge_squared: 
 
 
 def tangent_basis(q: Array) -> Array:
-    """Return an orthonormal basis of q⊥ as columns, shape (..., n, n−1): n−1 columns of the reflection that swaps q and ∓E_n."""
+    """Return an orthonormal basis of q⊥ as columns, shape (..., n, n−1): n−1 columns of the
+    reflection that swaps q and ∓E_n.
+    """
     u = _mirror(q).T
     norm = (u * u).sum(axis=-1)[..., None, None]
-    return np.asarray(np.eye(q.shape[-1])[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm, dtype=np.float64)
+    return np.asarray(
+        np.eye(q.shape[-1])[:, :-1] - 2 * u[..., :, None] * u[..., None, :-1] / norm,
+        dtype=np.float64,
+    )
 
 
 def _mirror(q: Array) -> Array:
-    """Return u of the reflection 1 − 2uuᵀ/(u,u) that swaps q and ∓E_n, as ``_along`` has vectors."""
+    """Return u of the reflection 1 − 2uuᵀ/(u,u) that swaps q and ∓E_n, as ``_along``
+    has vectors.
+    """
     u = np.array(_along(q), dtype=np.float64)
     u[-1] += np.where(u[-1] >= 0, 1.0, -1.0)  # the sign that adds: no cancellation
     return u
 
 
 def _along(vectors: Array) -> Array:
-    """Return vectors (..., n) as (n, ...), leading axes in reverse, in memory: sums over n are then sums of long rows."""
+    """Return vectors (..., n) as (n, ...), leading axes in reverse, in memory: sums over n are then
+    sums of long rows.
+    """
     return np.ascontiguousarray(vectors.T)
 
 
@@ -184,36 +215,46 @@ def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
 def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
     """Return c_1 ≤ … ≤ c_{n−1}, the roots of Φ𝓕 of (family1), shape (..., n−1).
 
-    They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse constants), so they come from
-    a symmetric eigenproblem with absolute error of a few ε·max(I_i, |q'|²), whatever coincides.
+    They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse
+    constants), so they come from a symmetric eigenproblem with absolute error of a few ε·max(I_i,
+    |q'|²), whatever coincides.
     """
-    # In the basis of ``tangent_basis``, q⊥ seen through H = 1 − wuᵀ with w = 2u/(u,u): HDH = D + wyᵀ + ywᵀ, y = ½(u,Du)w − Du.
-    u, velocity, diagonal = _mirror(q), _along(q_prime), (1 / A).reshape(-1, *(1,) * (q.ndim - 1))
-    w, Du = u * (2 / (u * u).sum(axis=0)), diagonal * u
+    # In the basis of ``tangent_basis``, q⊥ seen through H = 1 − wuᵀ with w = 2u/(u,u): HDH = D +
+    # wyᵀ + ywᵀ, y = ½(u,Du)w − Du.
+    u = _mirror(q)
+    velocity = _along(q_prime)
+    diagonal = (1 / A).reshape(-1, *(1,) * (q.ndim - 1))
+    w = u * (2 / (u * u).sum(axis=0))
+    Du = diagonal * u
     y = (u * Du).sum(axis=0) / 2 * w - Du
     mirrored = velocity - (u * velocity).sum(axis=0) * w
-    w, y, mirrored = w[:-1], y[:-1], mirrored[:-1]
+    w = w[:-1]
+    y = y[:-1]
+    mirrored = mirrored[:-1]
     product = w[:, None] * y
     form = product + product.swapaxes(0, 1)
     form -= mirrored[:, None] * mirrored
     for k, entry in enumerate(diagonal[:-1]):
         form[k, k] += entry
     if len(form) == 2:  # as accurate, and ten times as fast for many states
-        middle, radius = (form[0, 0] + form[1, 1]) / 2, np.hypot((form[0, 0] - form[1, 1]) / 2, form[0, 1])
+        middle = (form[0, 0] + form[1, 1]) / 2
+        radius = np.hypot((form[0, 0] - form[1, 1]) / 2, form[0, 1])
         return np.stack([(middle - radius).T, (middle + radius).T], axis=-1)
     return np.asarray(np.linalg.eigvalsh(form.T), dtype=np.float64)
 
 
 class StateIntegrals:
-    """The integrals of states, by the functions above; what several of them are made of is computed once.
+    """The integrals of states, by the functions above; what several of them are made of is computed
+    once.
 
-    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and F_i has no units. ``q_prime``
-    is the q' of that A.
+    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and
+    F_i has no units. ``q_prime`` is the q' of that A.
     """
 
     def __init__(self, A: Array, q: Array, q_dot: Array) -> None:
         self.A, self._k = unit_scale(A)
-        self._q, self._q_dot = q, q_dot
+        self._q = q
+        self._q_dot = q_dot
         self._unit = self._k * (2 - A.size)  # of h and p
 
     @cached_property
@@ -235,13 +276,18 @@ class StateIntegrals:
     @property
     def scaled_energy(self) -> Array:
         """Return the h of A over 2^k, shape (...)."""
-        with np.errstate(over="ignore"):  # beyond float range it is infinite, and the problem refuses it
-            return np.asarray(self._rate * self._rate * (self._qAq / (2 * self.A.prod())), dtype=np.float64)
+        # beyond float range it is infinite, and the problem refuses it
+        with np.errstate(over="ignore"):
+            return np.asarray(
+                self._rate * self._rate * (self._qAq / (2 * self.A.prod())), dtype=np.float64
+            )
 
     @property
     def scaled_momentum(self) -> Array:
         """Return the p of A over 2^k, shape (..., n)."""
-        return np.asarray(self.A * self._sliding * self._qAq[..., None] / self.A.prod(), dtype=np.float64)
+        return np.asarray(
+            self.A * self._sliding * self._qAq[..., None] / self.A.prod(), dtype=np.float64
+        )
 
     @property
     def energy(self) -> Array:
@@ -257,9 +303,14 @@ class StateIntegrals:
 
     @property
     def has_units(self) -> bool:
-        """Return whether h and |p| of a first state, both constant along its motion, are floats with all their digits."""
+        """Return whether h and |p| of a first state, both constant along its motion, are floats
+        with all their digits.
+        """
         sizes = self.scaled_energy.ravel()[:1], norm(self.scaled_momentum).ravel()[:1]
-        return all(not size.any() or abs(np.log2(size[0]) + self._unit) < _MOST_BINARY_DIGITS for size in sizes)
+        return all(
+            not size.any() or abs(np.log2(size[0]) + self._unit) < _MOST_BINARY_DIGITS
+            for size in sizes
+        )
 
     @property
     def neumann(self) -> Array:
@@ -269,4 +320,7 @@ class StateIntegrals:
     @property
     def constants(self) -> Array:
         """Return c_2 ≤ … ≤ c_{n−1}, shape (..., n−2)."""
-        return np.asarray(np.ldexp(moser_eigenvalues(self.A, self._q, self.q_prime)[..., 1:], -self._k), dtype=np.float64)
+        return np.asarray(
+            np.ldexp(moser_eigenvalues(self.A, self._q, self.q_prime)[..., 1:], -self._k),
+            dtype=np.float64,
+        )

@@ -1,4 +1,6 @@
-"""The natural frame {q, n_2, …, n_{n−1}, γ} of Theorem recon0: normals of confocal quadrics and the geodesic's tangent."""
+"""The natural frame {q, n_2, …, n_{n−1}, γ} of Theorem recon0: normals of confocal quadrics and the
+geodesic's tangent.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,11 @@ Array = NDArray[np.float64]
 _BITS = 320
 
 #: Steps of refinement; one that turns by less than 2^−_ENOUGH is the last.
-_STEPS, _ENOUGH = 5, 35
+_STEPS = 5
+_ENOUGH = 35
 
-#: The largest turn from which it converges: where constants are nearer than 1e-14 of the largest, the frame stays as it is.
+#: The largest turn from which it converges: where constants are nearer than 1e-14 of the largest,
+#: the frame stays as it is.
 _LARGEST_TURN = 0.05
 
 #: Constants within 2^−_NEAREST of each other count as equal: their difference may be rounding.
@@ -34,22 +38,27 @@ _LARGEST_REFINED = 48
 
 
 def natural_frame(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return the natural frame at a state, columns q, n_2 … n_{n−1}, γ, shape (n, n), determinant +1.
+    """Return the natural frame at a state, columns q, n_2 … n_{n−1}, γ, shape (n, n), determinant
+    +1.
 
-    n_k ∝ (A⁻¹ − c_k)⁻¹(q' + S_k q) are the eigenvectors of A⁻¹ − q'q'ᵀ restricted to q⊥ with eigenvalues c_k, and γ is the
-    one of c_1 = 0, which stays true where the formula divides zero by zero (coinciding A's, turning points).
-    Signs: (q', n_k) ≥ 0 for k ≥ 3 and (q', γ) ≥ 0; the sign of n_2 (of γ when n = 2) makes the determinant +1.
-    A body at rest gets the eigenvectors of A⁻¹ restricted to q⊥ in the same places.
+    n_k ∝ (A⁻¹ − c_k)⁻¹(q' + S_k q) are the eigenvectors of A⁻¹ − q'q'ᵀ restricted to q⊥ with
+    eigenvalues c_k, and γ is the one of c_1 = 0, which stays true where the formula divides zero by
+    zero (coinciding A's, turning points).
+    Signs: (q', n_k) ≥ 0 for k ≥ 3 and (q', γ) ≥ 0; the sign of n_2 (of γ when n = 2) makes the
+    determinant +1. A body at rest gets the eigenvectors of A⁻¹ restricted to q⊥ in the same places.
     """
     return moser_frame(A, q, neumann_velocity(A, q, q_dot))
 
 
 def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
-    """Return the same for a Neumann motion with velocity q' of any size, γ being the eigenvector of the least constant c_1."""
+    """Return the same for a Neumann motion with velocity q' of any size, γ being the eigenvector of
+    the least constant c_1.
+    """
     basis = tangent_basis(q)
     along = q_prime @ basis
     restricted = (basis.T / A) @ basis - along[:, None] * along
-    vectors = basis @ np.linalg.eigh(restricted)[1]  # columns γ, n_2, …, n_{n−1}: c_1 = 0 is the smallest
+    # columns γ, n_2, …, n_{n−1}: c_1 = 0 is the smallest
+    vectors = basis @ np.linalg.eigh(restricted)[1]
     frame = np.empty_like(vectors, shape=(q.size, q.size))
     frame[:, 0], frame[:, 1:-1], frame[:, -1] = q, vectors[:, 1:], vectors[:, 0]
     frame[:, 1:] *= np.where(q_prime @ frame[:, 1:] < 0, -1.0, 1.0)
@@ -68,25 +77,33 @@ def orthonormalize(frame: Array) -> Array:
 
 
 def refine(
-    frame: Array, A: Sequence[Fraction], q: Sequence[Fraction], tangent: Sequence[Fraction], rate_squared: Fraction | None = None
+    frame: Array,
+    A: Sequence[Fraction],
+    q: Sequence[Fraction],
+    tangent: Sequence[Fraction],
+    rate_squared: Fraction | None = None,
 ) -> Array:
     """Return a natural frame to the last bit, from one in double precision and the exact data.
 
-    Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS bits, H = NᵀMN with
-    M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii), which squares the turn. A frame whose constants
-    nearly coincide is returned as it is, and so is one at rest or of high dimension. ``rate_squared`` is (dτ₁/d(time))² for the
-    time of ``tangent``, that of a Veselova problem where it is left out.
+    Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS
+    bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
+    which squares the turn. A frame whose constants nearly coincide is returned as it is, and so is
+    one at rest or of high dimension. ``rate_squared`` is (dτ₁/d(time))² for the time of
+    ``tangent``, that of a Veselova problem where it is left out.
     """
     if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
     largest = 1 / min(A)
     if rate_squared is None:
-        qAq, vAv, qAv = (_weighted_product(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent)))
+        qAq, vAv, qAv = (
+            _weighted_product(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent))
+        )
         rate_squared = (vAv * qAq - qAv * qAv) / qAq
     velocity = _outer_square(tangent, 1 / (rate_squared * largest))
     M = _to_fixed_point(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
     unit = _unit_vector(q)
-    N, one = _to_fixed_point(frame[:, 1:].tolist()), np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
+    N = _to_fixed_point(frame[:, 1:].tolist())
+    one = np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
     for _ in range(_STEPS):
         N = N - _product(unit, _product(unit.T, N))
         N = _product(N, 3 * one - _product(N.T, N)) >> 1
@@ -106,7 +123,9 @@ def refine(
     return np.column_stack([frame[:, 0], (N / (1 << _BITS)).astype(np.float64)])
 
 
-def _weighted_product(A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
+def _weighted_product(
+    A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]
+) -> Fraction:
     (a, over_a), (b, over_b), (c, over_c) = map(over_common_denominator, (A, x, y))
     return Fraction(sum(map(math.prod, zip(a, b, c, strict=True))), over_a * over_b * over_c)
 
@@ -123,7 +142,8 @@ def _shift(numerator: int, denominator: int) -> int:
 def _outer_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
     """Return scale·vvᵀ as integers of _BITS bits after the point."""
     whole, common = over_common_denominator(vector)
-    times, over = scale.numerator, scale.denominator * common**2
+    times = scale.numerator
+    over = scale.denominator * common**2
     return np.array([[_shift(x * y * times, over) for y in whole] for x in whole], dtype=object)
 
 

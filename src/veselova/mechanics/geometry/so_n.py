@@ -1,4 +1,6 @@
-"""Skew matrices and their coefficients in the basis E_i∧E_j of so(n), i < j, in lexicographic order."""
+"""Skew matrices and their coefficients in the basis E_i∧E_j of so(n), i < j, in lexicographic
+order.
+"""
 
 from __future__ import annotations
 
@@ -21,5 +23,7 @@ def skew(vector: Any, n: int) -> Array:
 
 
 def coefficients(matrix: Array) -> Array:
-    """Return the coefficients of skew matrices (..., n, n) in the basis E_i∧E_j, shape (..., n(n−1)/2)."""
+    """Return the coefficients of skew matrices (..., n, n) in the basis E_i∧E_j, shape (...,
+    n(n−1)/2).
+    """
     return np.asarray(matrix[(..., *np.triu_indices(matrix.shape[-1], 1))], dtype=np.float64)

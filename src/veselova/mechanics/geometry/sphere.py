@@ -15,11 +15,20 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_vector, over_common_denominator, to_float
 
-__all__ = ["INPUT_TOLERANCE", "ExactState", "exact_cross", "inverse_length", "over_largest", "point_on_sphere", "unit"]
+__all__ = [
+    "INPUT_TOLERANCE",
+    "ExactState",
+    "exact_cross",
+    "inverse_length",
+    "over_largest",
+    "point_on_sphere",
+    "unit",
+]
 
 Array = NDArray[np.float64]
 
-#: How far from unit length, tangency and orthogonality an input may be: ten-digit data pass, typing errors do not.
+#: How far from unit length, tangency and orthogonality an input may be: ten-digit data pass, typing
+#: errors do not.
 INPUT_TOLERANCE = 1e-9
 
 
@@ -27,7 +36,8 @@ INPUT_TOLERANCE = 1e-9
 class ExactState:
     """The data as exact rationals in principal axes, q not yet scaled and q_dot not yet projected.
 
-    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the natural one was left to us
+    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the
+    natural one was left to us
     """
 
     A: tuple[Fraction, ...]
@@ -37,21 +47,26 @@ class ExactState:
 
     @property
     def natural(self) -> bool:
-        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a sign matrix."""
+        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a
+        sign matrix.
+        """
         return self.frame is None
 
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:
         """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
-        # In integers over common denominators, of which that of q cancels: one division for each entry.
+        # In integers over common denominators, of which that of q cancels: one division for each
+        # entry.
         (q, _), (q_dot, over) = over_common_denominator(self.q), over_common_denominator(self.q_dot)
-        qq, qv = sum(map(mul, q, q)), sum(map(mul, q, q_dot))
+        qq = sum(map(mul, q, q))
+        qv = sum(map(mul, q, q_dot))
         return tuple(Fraction(b * qq - qv * a, over * qq) for a, b in zip(q, q_dot, strict=True))
 
 
 def unit(vector: Array) -> Array:
     """Return the vector scaled to unit length."""
-    scaled = vector / np.max(np.abs(vector))  # squares of very large or small entries would leave the float range
+    # squares of very large or small entries would leave the float range
+    scaled = vector / np.max(np.abs(vector))
     return np.asarray(scaled / np.linalg.norm(scaled), dtype=np.float64)
 
 
@@ -63,7 +78,8 @@ def exact_cross(a: tuple[Fraction, ...], b: tuple[Fraction, ...]) -> tuple[Fract
 def inverse_length(vector: tuple[Fraction, ...], bits: int) -> Fraction:
     """Return 1/|x|, exactly where it is rational, and otherwise to a part 2^−bits of itself."""
     square = sum((x * x for x in vector), Fraction())
-    above, below = math.isqrt(square.numerator), math.isqrt(square.denominator)
+    above = math.isqrt(square.numerator)
+    below = math.isqrt(square.denominator)
     if (above * above, below * below) == square.as_integer_ratio():
         return Fraction(below, above)
     bits += max(0, square.numerator.bit_length() - square.denominator.bit_length())
@@ -79,11 +95,15 @@ def over_largest(vector: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
 def point_on_sphere(
     A: tuple[Fraction, ...], q: Any, velocity: Any, normalize: bool, name: str = "q_dot"
 ) -> tuple[ExactState, Array]:
-    """Return a given point and its velocity of that name, exactly, and the point as floats, over its largest entry to normalize.
+    """Return a given point and its velocity of that name, exactly, and the point as floats, over
+    its largest entry to normalize.
 
-    Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0 to the tolerance.
+    Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0
+    to the tolerance.
     """
-    state = ExactState(A, exact_vector(q, ("q",), len(A)), exact_vector(velocity, (name,), len(A)), None)
+    state = ExactState(
+        A, exact_vector(q, ("q",), len(A)), exact_vector(velocity, (name,), len(A)), None
+    )
     if not any(state.q):
         raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
     position = to_float(over_largest(state.q) if normalize else state.q)
@@ -93,15 +113,21 @@ def point_on_sphere(
 
 
 def _require_on_sphere(q: Array, velocity: Array, name: str) -> None:
-    """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to the tolerance."""
+    """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to
+    the tolerance.
+    """
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(q))
     if abs(length - 1) > INPUT_TOLERANCE:
-        raise InvalidInput(("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
+        raise InvalidInput(
+            ("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
+        )
     largest = float(np.max(np.abs(velocity)))
     if largest > 0:
         slope = float((velocity / largest) @ q) / float(np.linalg.norm(velocity / largest))
         if abs(slope) > INPUT_TOLERANCE:
             raise InvalidInput(
-                (name,), "a vector orthogonal to q to 1e-9 of its length (or normalize=True)", f"cosine {slope:.3g} with q"
+                (name,),
+                "a vector orthogonal to q to 1e-9 of its length (or normalize=True)",
+                f"cosine {slope:.3g} with q",
             )

@@ -1,4 +1,6 @@
-"""Right-invariant distributions D_g = 𝔡·g on a compact group, and the momentum (mom) that an inertia operator makes with one."""
+"""Right-invariant distributions D_g = 𝔡·g on a compact group, and the momentum (mom) that an
+inertia operator makes with one.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ __all__ = ["Distribution"]
 Array = NDArray[np.float64]
 
 #: Spanning elements of 𝔥 count as dependent below this, and 𝔥 as a subalgebra: ten-digit data pass.
-_INDEPENDENT, _CLOSED = 1e-10, 1e-9
+_INDEPENDENT = 1e-10
+_CLOSED = 1e-9
 
 #: Entries of Ad_g that are held at once, some tens of megabytes.
 _MOST_ENTRIES = 2_000_000
@@ -34,7 +37,8 @@ class Distribution:
     space   (D, D) orthonormal coordinate rows: w_1 … w_d of 𝔡, then h_1 … h_m of 𝔥
     rank    d = dim 𝔡
 
-    At g the constraints are ω ∈ g⁻¹𝔡g, or f_s = ⟨ω, ℱ_s⟩ = c_s with ℱ_s = g⁻¹h_s g, equation (dist); 𝒲_k = g⁻¹w_k g.
+    At g the constraints are ω ∈ g⁻¹𝔡g, or f_s = ⟨ω, ℱ_s⟩ = c_s with ℱ_s = g⁻¹h_s g, equation
+    (dist); 𝒲_k = g⁻¹w_k g.
     """
 
     group: MatrixGroup
@@ -43,14 +47,18 @@ class Distribution:
 
     @classmethod
     def of_rank(cls, n: int, rank: int) -> Distribution:
-        """Return D_r of (4.1) on SO(n): 𝔥 is spanned by E_p∧E_q, r < p < q ≤ n, the last elements of the basis."""
+        """Return D_r of (4.1) on SO(n): 𝔥 is spanned by E_p∧E_q, r < p < q ≤ n, the last elements
+        of the basis.
+        """
         group = MatrixGroup.so(n)
         constraints = (n - rank) * (n - rank - 1) // 2
         return cls(group, np.eye(group.dimension), group.dimension - constraints)
 
     @classmethod
     def orthogonal_to(cls, group: MatrixGroup, h: Any) -> Distribution:
-        """Return the distribution whose 𝔥 is spanned by given matrices of 𝔤; none leaves the group free. Raises InvalidInput."""
+        """Return the distribution whose 𝔥 is spanned by given matrices of 𝔤; none leaves the group
+        free. Raises InvalidInput.
+        """
         if isinstance(h, (str, bytes)) or not isinstance(h, (Sequence, np.ndarray)):
             raise InvalidInput(("h",), "a list of matrices of the Lie algebra", show(h))
         rows = [group.algebra_element(matrix, ("h", s)) for s, matrix in enumerate(h)]
@@ -61,11 +69,19 @@ class Distribution:
             for _ in range(2):
                 rest = rest - sum(((rest @ other) * other for other in done), np.zeros_like(rest))
             if not np.linalg.norm(rest) > _INDEPENDENT:
-                raise InvalidInput(("h", s), "linearly independent elements", "one in the span of those before it, or zero")
+                raise InvalidInput(
+                    ("h", s),
+                    "linearly independent elements",
+                    "one in the span of those before it, or zero",
+                )
             done.append(rest / np.linalg.norm(rest))
         constraints = np.array(done).reshape(-1, group.dimension)
         # The orthogonal complement: the last right singular vectors of the rows of 𝔥.
-        rest = np.linalg.svd(constraints, full_matrices=True)[2][len(done) :] if done else np.eye(group.dimension)
+        rest = (
+            np.linalg.svd(constraints, full_matrices=True)[2][len(done) :]
+            if done
+            else np.eye(group.dimension)
+        )
         return cls(group, read_only(np.vstack([rest, constraints])), len(rest))
 
     @property
@@ -84,14 +100,19 @@ class Distribution:
 
     @cached_property
     def subalgebra_defect(self) -> float:
-        """Return how far 𝔥 is from a subalgebra: the largest 𝔡-coordinate of a bracket of its basis."""
-        h, w = self.space[self.rank :], self.space[: self.rank]
+        """Return how far 𝔥 is from a subalgebra: the largest 𝔡-coordinate of a bracket of its
+        basis.
+        """
+        h = self.space[self.rank :]
+        w = self.space[: self.rank]
         brackets = self.group.bracket(h[:, None, :], h[None, :, :])
         return float(np.max(np.abs(brackets @ w.T), initial=0.0))
 
     @property
     def is_subalgebra(self) -> bool:
-        """Return whether 𝔥 is a Lie algebra, so that the system is a generalized Chaplygin system on G → H\\G."""
+        """Return whether 𝔥 is a Lie algebra, so that the system is a generalized Chaplygin system
+        on G → H\\G.
+        """
         return self.subalgebra_defect <= _CLOSED
 
     def in_body(self, g: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:
@@ -102,12 +123,18 @@ class Distribution:
         return rows[..., : self.rank, :], rows[..., self.rank :, :]
 
     def parts(self, *arrays: Array) -> Iterator[tuple[Array, ...]]:
-        """Return arrays along times cut into parts short enough for ``seen`` of one to fit in memory."""
+        """Return arrays along times cut into parts short enough for ``seen`` of one to fit in
+        memory.
+        """
         count = len(arrays[0]) * self.group.dimension * self.group.size**2 // _MOST_ENTRIES + 1
-        return zip(*(np.array_split(array, min(count, len(array))) for array in arrays), strict=True)
+        return zip(
+            *(np.array_split(array, min(count, len(array))) for array in arrays), strict=True
+        )
 
     def components(self, g: Array, x: Array) -> tuple[Array, Array]:
-        """Return ⟨x, 𝒲_k⟩ and ⟨x, ℱ_s⟩ of elements x (…, D) in body coordinates, leading axes along."""
+        """Return ⟨x, 𝒲_k⟩ and ⟨x, ℱ_s⟩ of elements x (…, D) in body coordinates, leading axes
+        along.
+        """
         spatial = self.group.adjoint(g, x) @ self.space.T
         return spatial[..., : self.rank], spatial[..., self.rank :]
 
@@ -117,21 +144,27 @@ class Distribution:
         return self.group.adjoint(np.swapaxes(g, -1, -2), spatial)
 
     def momentum(self, inertia: Any, g: Array, omega: Array) -> Array:
-        """Return 𝓜 = pr_{g⁻¹𝔡g} 𝓘ω + pr_{g⁻¹𝔥g} ω, equation (mom), in coordinates; ``inertia`` maps rows."""
+        """Return 𝓜 = pr_{g⁻¹𝔡g} 𝓘ω + pr_{g⁻¹𝔥g} ω, equation (mom), in coordinates; ``inertia`` maps
+        rows.
+        """
         along, _ = self.components(g, inertia(omega))
         _, across = self.components(g, omega)
         return self.body(g, along, across)
 
     @property
     def uses_inverse(self) -> bool:
-        """Return whether ``velocity`` solves m equations with 𝓘⁻¹ rather than d with 𝓘: whichever are fewer."""
+        """Return whether ``velocity`` solves m equations with 𝓘⁻¹ rather than d with 𝓘: whichever
+        are fewer.
+        """
         return self.constraints <= self.rank
 
-    def velocity(self, operator: Any, W: Any, F: Any, m: Any, c: Any, ops: Operations = FLOATS) -> Any:
+    def velocity(
+        self, operator: Any, W: Any, F: Any, m: Any, c: Any, ops: Operations = FLOATS
+    ) -> Any:
         """Return the ω with ⟨𝓘ω, 𝒲_k⟩ = m_k and ⟨ω, ℱ_s⟩ = c_s, the inverse of (mom), (…, D).
 
-        ``operator`` is 𝓘⁻¹ where ``uses_inverse``, else 𝓘. Either 𝓘ω = Σ m_k𝒲_k + Σ s_l ℱ_l with m equations for s, or
-        ω = Σ u_k 𝒲_k + Σ c_s ℱ_s with d equations for u.
+        ``operator`` is 𝓘⁻¹ where ``uses_inverse``, else 𝓘. Either 𝓘ω = Σ m_k𝒲_k + Σ s_l ℱ_l with m
+        equations for s, or ω = Σ u_k 𝒲_k + Σ c_s ℱ_s with d equations for u.
         """
         given, unknown, known, wanted = (m, F, W, c) if self.uses_inverse else (c, W, F, m)
         part = combine(given, known, ops)

@@ -1,4 +1,6 @@
-"""Compact matrix groups by a basis of their Lie algebra: ad-invariant product, brackets, Ad_g, projection onto the group."""
+"""Compact matrix groups by a basis of their Lie algebra: ad-invariant product, brackets, Ad_g,
+projection onto the group.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +26,23 @@ Array = NDArray[np.float64]
 #: Largest n of SO(n) and SU(n): dim SO(64) is 2016, and Ad_g has as many rows.
 LARGEST = 64
 
-#: Basis elements whose orthogonal parts are shorter than this, relative to the longest element, count as dependent.
+#: Basis elements whose orthogonal parts are shorter than this, relative to the longest element,
+#: count as dependent.
 _INDEPENDENT = 1e-10
 
 
 class MatrixGroup:
-    """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY, which is Ad-invariant.
+    """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY,
+    which is Ad-invariant.
 
-    basis   (D, N, N) orthonormal basis Y_1 … Y_D of 𝔤, real and skew; a complex matrix A + iB is kept as [[A, −B], [B, A]]
+    basis   (D, N, N) orthonormal basis Y_1 … Y_D of 𝔤, real and skew; a complex matrix A + iB is
+        kept as [[A, −B], [B, A]]
 
-    ``MatrixGroup(basis)`` takes any basis (skew-symmetric, or skew-Hermitian with complex entries), which is made orthonormal in
-    the order given; ``so(n)``, ``su(n)`` and ``product(…)`` are ready-made. Elements of 𝔤 are coordinates (…, D) in ``basis``.
-    Whether the group that 𝔤 generates is closed is not looked at: a dense winding of a torus is taken as it is, and a winding
-    with unequal weights is kept on that torus, not on itself.
+    ``MatrixGroup(basis)`` takes any basis (skew-symmetric, or skew-Hermitian with complex entries),
+    which is made orthonormal in the order given; ``so(n)``, ``su(n)`` and ``product(…)`` are
+    ready-made. Elements of 𝔤 are coordinates (…, D) in ``basis``.
+    Whether the group that 𝔤 generates is closed is not looked at: a dense winding of a torus is
+    taken as it is, and a winding with unequal weights is kept on that torus, not on itself.
     Raises InvalidInput for a basis that is dependent, not closed under brackets, or not skew.
     """
 
@@ -49,9 +55,12 @@ class MatrixGroup:
         self._require_closed()
 
     def _become(self, basis: Array, weight: Array | float, *, full: bool) -> None:
-        """Set the orthonormal basis; ``weight`` scales ⟨X,Y⟩ = ½ Σ X_ij Y_ij of its blocks, ``full`` says that 𝔤 = so(N)."""
+        """Set the orthonormal basis; ``weight`` scales ⟨X,Y⟩ = ½ Σ X_ij Y_ij of its blocks,
+        ``full`` says that 𝔤 = so(N).
+        """
         self.basis = read_only(np.array(basis))
-        # X is skew: its upper half says everything, and with it a symbolic field has half the products.
+        # X is skew: its upper half says everything, and with it a symbolic field has half the
+        # products.
         self._weight = np.broadcast_to(np.asarray(weight), basis.shape[1:])
         self._dual = read_only(np.triu(basis * self._weight).reshape(len(basis), -1).T)
         self._flat = read_only(basis.reshape(len(basis), -1))
@@ -67,7 +76,9 @@ class MatrixGroup:
 
     @classmethod
     def su(cls, n: int) -> MatrixGroup:
-        """Return SU(n), n ≥ 2: E_jk−E_kj and i(E_jk+E_kj), j < k, then n−1 diagonal elements (for n = 2 i times Pauli's)."""
+        """Return SU(n), n ≥ 2: E_jk−E_kj and i(E_jk+E_kj), j < k, then n−1 diagonal elements (for n
+        = 2 i times Pauli's).
+        """
         size = whole_number(n, ("n",), 2, LARGEST)
         elements = []
         for j, k in combinations(range(size), 2):
@@ -76,24 +87,30 @@ class MatrixGroup:
                 matrix[j, k], matrix[k, j] = one, other
                 elements.append(matrix)
         diagonals = (np.array([1j] * k + [-1j * k] + [0] * (size - k - 1)) for k in range(1, size))
-        elements += [np.diag(diagonal) * np.sqrt(2) / np.linalg.norm(diagonal) for diagonal in diagonals]
+        elements += [
+            np.diag(diagonal) * np.sqrt(2) / np.linalg.norm(diagonal) for diagonal in diagonals
+        ]
         group = cls.__new__(cls)
         group._become(np.array([_real_form(matrix) for matrix in elements]), 0.5, full=False)
         return group
 
     @classmethod
     def product(cls, *factors: MatrixGroup) -> MatrixGroup:
-        """Return the direct product, block-diagonal, with the sum of the products; the bases follow one another."""
+        """Return the direct product, block-diagonal, with the sum of the products; the bases follow
+        one another.
+        """
         if not factors or not all(isinstance(factor, MatrixGroup) for factor in factors):
             raise InvalidInput(("factors",), "one or more matrix groups", show(factors))
         size = sum(factor.size for factor in factors)
-        basis, weight = np.zeros((sum(factor.dimension for factor in factors), size, size)), np.zeros((size, size))
+        basis = np.zeros((sum(factor.dimension for factor in factors), size, size))
+        weight = np.zeros((size, size))
         corner = first = 0
         for factor in factors:
             block = slice(corner, corner + factor.size)
             basis[first : first + factor.dimension, block, block] = factor.basis
             weight[block, block] = factor._weight
-            corner, first = corner + factor.size, first + factor.dimension
+            corner = corner + factor.size
+            first = first + factor.dimension
         group = cls.__new__(cls)
         group._become(basis, weight, full=False)
         return group
@@ -130,18 +147,25 @@ class MatrixGroup:
 
     def bracket(self, x: Any, y: Any, ops: Operations = FLOATS) -> Any:
         """Return [x,y] in coordinates."""
-        X, Y = self.element(x, ops), self.element(y, ops)
+        X = self.element(x, ops)
+        Y = self.element(y, ops)
         return self.coordinates(ops.dot(X, Y) - ops.dot(Y, X), ops)
 
     @cached_property
     def structure_constants(self) -> Array:
-        """Return c_abk with [Y_a,Y_b] = Σ_k c_abk Y_k, shape (D, D, D); totally antisymmetric, as the basis is orthonormal."""
+        """Return c_abk with [Y_a,Y_b] = Σ_k c_abk Y_k, shape (D, D, D); totally antisymmetric, as
+        the basis is orthonormal.
+        """
         products = self.basis[:, None] @ self.basis[None, :]
         return read_only(self.coordinates(products - np.swapaxes(products, 0, 1)))
 
     def adjoint_matrix(self, g: Any, ops: Operations = FLOATS) -> Any:
-        """Return R (…, D, D) whose row a has the coordinates of g⁻¹Y_a g; Ad_g = R acts on columns, Ad_{g⁻¹} = Rᵀ."""
-        N, D, leading = self.size, self.dimension, g.shape[:-2]
+        """Return R (…, D, D) whose row a has the coordinates of g⁻¹Y_a g; Ad_g = R acts on columns,
+        Ad_{g⁻¹} = Rᵀ.
+        """
+        N = self.size
+        D = self.dimension
+        leading = g.shape[:-2]
         wide = self.basis.transpose(1, 0, 2).reshape(N, D * N)
         half = ops.dot(np.swapaxes(g, -1, -2), wide).reshape((*leading, N, D, N))
         tall = np.swapaxes(half, -3, -2).reshape((*leading, D * N, N))
@@ -149,7 +173,9 @@ class MatrixGroup:
 
     def adjoint(self, g: Array, x: Array) -> Array:
         """Return the coordinates of g x g⁻¹, leading axes along."""
-        return np.asarray(self.coordinates(g @ self.element(x) @ np.swapaxes(g, -1, -2)), dtype=np.float64)
+        return np.asarray(
+            self.coordinates(g @ self.element(x) @ np.swapaxes(g, -1, -2)), dtype=np.float64
+        )
 
     def exponential(self, x: Array) -> Array:
         """Return exp of the element with coordinates x, (D,)."""
@@ -162,28 +188,39 @@ class MatrixGroup:
         return GroupProjection(self.basis, trivial=self._full)
 
     def project(self, g: Array) -> Array:
-        """Return elements of the group next to matrices that are off it by rounding or truncation, (…, N, N).
+        """Return elements of the group next to matrices that are off it by rounding or truncation,
+        (…, N, N).
 
-        SO(n): one step of Newton–Schulz. Others: put back also into the group's associative algebra, its normaliser, and to unit
-        determinants, each to second order. Elements of O(N) that normalise 𝔤 stay what they are: only Ad_g enters an LR system.
+        SO(n): one step of Newton–Schulz. Others: put back also into the group's associative
+        algebra, its normaliser, and to unit determinants, each to second order. Elements of O(N)
+        that normalise 𝔤 stay what they are: only Ad_g enters an LR system.
         """
         return self._projection.project(g)
 
     def defect(self, g: Array) -> Array:
-        """Return how far matrices (…, N, N) are from the group, (…): the largest entry of what ``project`` has to mend."""
+        """Return how far matrices (…, N, N) are from the group, (…): the largest entry of what
+        ``project`` has to mend.
+        """
         return self._projection.defect(g)
 
     def validate(self, g: Any, path: tuple[str | int, ...] = ("g",)) -> Array:
-        """Return a given matrix (real, or complex where the group is) on the group; raises InvalidInput beyond 1e-9."""
+        """Return a given matrix (real, or complex where the group is) on the group; raises
+        InvalidInput beyond 1e-9.
+        """
         matrix = self._of_this_size(g, path)
         largest = float(np.max(np.abs(matrix)))
-        defect = float(self.defect(matrix)) if largest < 2 else largest  # squares of huge entries overflow
+        # squares of huge entries overflow
+        defect = float(self.defect(matrix)) if largest < 2 else largest
         if not defect <= INPUT_TOLERANCE:
-            raise InvalidInput(path, "a matrix of the group to 1e-9", f"one that is off it by {defect:.3g}")
+            raise InvalidInput(
+                path, "a matrix of the group to 1e-9", f"one that is off it by {defect:.3g}"
+            )
         return self.project(matrix)
 
     def algebra_element(self, X: Any, path: tuple[str | int, ...]) -> Array:
-        """Return the coordinates of a given matrix of 𝔤; raises InvalidInput when it is off 𝔤 by more than 1e-9 of its size."""
+        """Return the coordinates of a given matrix of 𝔤; raises InvalidInput when it is off 𝔤 by
+        more than 1e-9 of its size.
+        """
         matrix = self._of_this_size(X, path)
         largest = float(np.max(np.abs(matrix)))
         if largest == 0:
@@ -193,25 +230,44 @@ class MatrixGroup:
         distance = float(np.max(np.abs(self.element(x) - unit)))
         if distance > INPUT_TOLERANCE:
             symmetric = float(np.max(np.abs(unit + unit.T)))
-            kind = "a skew matrix" if self._full or symmetric > INPUT_TOLERANCE else "a matrix of the group's Lie algebra"
+            kind = (
+                "a skew matrix"
+                if self._full or symmetric > INPUT_TOLERANCE
+                else "a matrix of the group's Lie algebra"
+            )
             defect = symmetric if kind == "a skew matrix" else distance
-            raise InvalidInput(path, f"{kind} to 1e-9 of its largest entry", f"one that is off by {defect:.3g} of it")
+            raise InvalidInput(
+                path,
+                f"{kind} to 1e-9 of its largest entry",
+                f"one that is off by {defect:.3g} of it",
+            )
         return np.asarray(largest * x, dtype=np.float64)
 
     def _of_this_size(self, matrix: Any, path: tuple[str | int, ...]) -> Array:
         rows = _square(matrix, path)
-        found = rows.real if not np.iscomplexobj(rows) and rows.shape[0] == self.size else _real_form(rows)
+        found = (
+            rows.real
+            if not np.iscomplexobj(rows) and rows.shape[0] == self.size
+            else _real_form(rows)
+        )
         if found.shape != (self.size, self.size):
-            raise InvalidInput(path, f"{self.size} rows of {self.size} numbers", f"{len(rows)} rows")
+            raise InvalidInput(
+                path, f"{self.size} rows of {self.size} numbers", f"{len(rows)} rows"
+            )
         return np.array(found, dtype=np.float64)
 
     def _require_closed(self) -> None:
         products = self.basis[:, None] @ self.basis[None, :]
         brackets = products - np.swapaxes(products, 0, 1)
-        distance = np.max(np.abs(self.element(self.coordinates(brackets)) - brackets), axis=(-2, -1))
+        distance = np.max(
+            np.abs(self.element(self.coordinates(brackets)) - brackets), axis=(-2, -1)
+        )
         a, b = (int(i) for i in np.unravel_index(np.argmax(distance), distance.shape))
         if distance[a, b] > INPUT_TOLERANCE:
-            given = f"a bracket of (orthonormalised) elements {a} and {b} that leaves their span by {distance[a, b]:.3g}"
+            given = (
+                f"a bracket of (orthonormalised) elements {a} and {b} that leaves their span "
+                f"by {distance[a, b]:.3g}"
+            )
             raise InvalidInput(("basis",), "a basis closed under brackets to 1e-9", given)
 
 
@@ -241,14 +297,22 @@ def _entry(value: Any, path: tuple[str | int, ...]) -> float | complex:
 
 
 def _matrices(basis: Any) -> tuple[Array, float]:
-    """Return given basis matrices in real form, and the weight of ⟨X,Y⟩ there: ½ where they were complex."""
-    items = list(basis) if isinstance(basis, (Sequence, np.ndarray)) and not isinstance(basis, (str, bytes)) else []
+    """Return given basis matrices in real form, and the weight of ⟨X,Y⟩ there: ½ where they were
+    complex.
+    """
+    items = (
+        list(basis)
+        if isinstance(basis, (Sequence, np.ndarray)) and not isinstance(basis, (str, bytes))
+        else []
+    )
     if not items:
         raise InvalidInput(("basis",), "a list of square matrices", show(basis))
     found = [_square(matrix, ("basis", a)) for a, matrix in enumerate(items)]
     for a, matrix in enumerate(found):
         if matrix.shape != found[0].shape:
-            raise InvalidInput(("basis", a), f"{len(found[0])} rows like the first", f"{len(matrix)} rows")
+            raise InvalidInput(
+                ("basis", a), f"{len(found[0])} rows like the first", f"{len(matrix)} rows"
+            )
     if any(np.iscomplexobj(matrix) for matrix in found):
         return np.array([_real_form(matrix) for matrix in found]), 0.5
     return np.array(found), 1.0
@@ -259,12 +323,21 @@ def _require_skew(matrices: Array) -> None:
         largest = float(np.max(np.abs(matrix)))
         defect = float(np.max(np.abs(matrix + matrix.T)))
         if largest == 0 or defect > INPUT_TOLERANCE * largest:
-            required = "a nonzero skew-symmetric (or skew-Hermitian) matrix, as the algebra of a compact group has"
-            raise InvalidInput(("basis", a), required, "zero" if largest == 0 else f"one with |X + Xᵀ| up to {defect:.3g}")
+            required = (
+                "a nonzero skew-symmetric (or skew-Hermitian) matrix, as the algebra of a "
+                "compact group has"
+            )
+            raise InvalidInput(
+                ("basis", a),
+                required,
+                "zero" if largest == 0 else f"one with |X + Xᵀ| up to {defect:.3g}",
+            )
 
 
 def _orthonormal(matrices: Array, weight: float) -> Array:
-    """Return the basis after Gram–Schmidt (twice, so that it is orthonormal to rounding), in the order given."""
+    """Return the basis after Gram–Schmidt (twice, so that it is orthonormal to rounding), in the
+    order given.
+    """
     matrices = matrices / np.max(np.abs(matrices), axis=(-2, -1), keepdims=True)
     flat = ((matrices - np.swapaxes(matrices, -1, -2)) / 2).reshape(len(matrices), -1)
     done: list[Array] = []
@@ -279,4 +352,6 @@ def _orthonormal(matrices: Array, weight: float) -> Array:
             given = f"element {a} within {length:.1g} of the span of those before it"
             raise InvalidInput(("basis",), "linearly independent matrices", given)
         done.append(rest / length)
-    return np.asarray(np.array(done).reshape(matrices.shape) * np.sqrt(2 / weight), dtype=np.float64)
+    return np.asarray(
+        np.array(done).reshape(matrices.shape) * np.sqrt(2 / weight), dtype=np.float64
+    )

@@ -1,4 +1,6 @@
-"""The way back onto a compact matrix group from a matrix that is off it by rounding or truncation."""
+"""The way back onto a compact matrix group from a matrix that is off it by rounding
+or truncation.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ __all__ = ["GroupProjection"]
 
 Array = NDArray[np.float64]
 
-#: Singular values below this, relative to the largest, count as zero: the bases are orthonormal to rounding.
+#: Singular values below this, relative to the largest, count as zero: the bases are orthonormal to
+#: rounding.
 _NULL = 1e-8
 
 #: A trace below this vanishes.
@@ -19,10 +22,13 @@ _TRACELESS = 1e-9
 
 
 class GroupProjection:
-    """What distinguishes the group of an algebra 𝔤 ⊂ so(N), in the order in which a matrix is mended.
+    """What distinguishes the group of an algebra 𝔤 ⊂ so(N), in the order in which a matrix is
+    mended.
 
-    1. It lies in the associative algebra that 𝔤 and 1 generate (its *envelope*).   2. It is orthogonal.   3. Ad_g keeps 𝔤.
-    4. On every block where a central complex structure lives and 𝔤 has no trace, its complex determinant is 1.
+    1. It lies in the associative algebra that 𝔤 and 1 generate (its *envelope*).   2. It is
+    orthogonal.   3. Ad_g keeps 𝔤.
+    4. On every block where a central complex structure lives and 𝔤 has no trace, its complex
+    determinant is 1.
 
     With ``trivial`` (𝔤 = so(N)) only 2 is left.
     """
@@ -39,16 +45,23 @@ class GroupProjection:
         self._envelope = None if len(span) == N * N else span.T @ span
         self._transverse = _skew_complement(span.reshape(-1, N, N), basis)
         if len(self._transverse):
-            rotated = self._transverse[None] @ basis[:, None] - basis[:, None] @ self._transverse[None]  # [Z_z, Y_a]
+            # [Z_z, Y_a]
+            rotated = (
+                self._transverse[None] @ basis[:, None] - basis[:, None] @ self._transverse[None]
+            )
             turning = np.moveaxis(self._off(rotated), 1, -1).reshape(-1, len(self._transverse))
             left, values, right = np.linalg.svd(turning, full_matrices=False)
             moved = values > _NULL  # the others commute with 𝔤
             self._mend = right[moved].T / values[moved] @ left[:, moved].T
-            self._blocks = _traceless_blocks(np.tensordot(right[~moved], self._transverse, 1), basis)
+            self._blocks = _traceless_blocks(
+                np.tensordot(right[~moved], self._transverse, 1), basis
+            )
 
     def _off(self, matrices: Array) -> Array:
         """Return the coordinates of skew matrices along the complement of 𝔤, (…, c)."""
-        return np.asarray(np.tensordot(matrices, self._transverse, ([-2, -1], [-2, -1])), dtype=np.float64)
+        return np.asarray(
+            np.tensordot(matrices, self._transverse, ([-2, -1], [-2, -1])), dtype=np.float64
+        )
 
     def _turn(self, g: Array) -> Array:
         """Return the Z ⊥ 𝔤 with g ≈ (an element that keeps 𝔤) · (1 + Z), to first order."""
@@ -70,13 +83,16 @@ class GroupProjection:
             g = orthonormalize(g - g @ self._turn(g))
         for V, phase in zip(self._blocks, self._phases(g), strict=True):
             projector = V @ V.conj().T
-            plane, rotation = 2 * projector.real, -2 * projector.imag
+            plane = 2 * projector.real
+            rotation = -2 * projector.imag
             angle = np.asarray(phase)[..., None, None]
             g = g + g @ ((np.cos(angle) - 1) * plane - np.sin(angle) * rotation)
         return g
 
     def defect(self, g: Array) -> Array:
-        """Return the largest of |gᵀg − 1|, the distance to the envelope, the turn out of 𝔤 and the phases of determinants."""
+        """Return the largest of |gᵀg − 1|, the distance to the envelope, the turn out of 𝔤 and the
+        phases of determinants.
+        """
         found = [np.abs(np.swapaxes(g, -1, -2) @ g - np.eye(g.shape[-1]))]
         if self._envelope is not None:
             flat = g.reshape((*g.shape[:-2], -1))
@@ -85,13 +101,19 @@ class GroupProjection:
             h = g[..., None, :, :]
             found.append(np.abs(self._off(h @ self._basis @ np.swapaxes(h, -1, -2))))
         found += [np.abs(phase)[..., None, None] for phase in self._phases(g)]
-        return np.asarray(np.max([np.max(part, axis=(-2, -1)) for part in found], axis=0), dtype=np.float64)
+        return np.asarray(
+            np.max([np.max(part, axis=(-2, -1)) for part in found], axis=0), dtype=np.float64
+        )
 
 
 def _rows_spanning(rows: Array) -> Array:
     """Return an orthonormal basis of the span of rows."""
     _, values, vectors = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray(vectors[values > _NULL * values[0]], dtype=np.float64) if values[0] > 0 else vectors[:0]
+    return (
+        np.asarray(vectors[values > _NULL * values[0]], dtype=np.float64)
+        if values[0] > 0
+        else vectors[:0]
+    )
 
 
 def _envelope(basis: Array) -> Array:
@@ -107,7 +129,9 @@ def _envelope(basis: Array) -> Array:
 
 
 def _skew_complement(span: Array, basis: Array) -> Array:
-    """Return an orthonormal basis (c, N, N) of the skew matrices of an algebra that are orthogonal to 𝔤."""
+    """Return an orthonormal basis (c, N, N) of the skew matrices of an algebra that are orthogonal
+    to 𝔤.
+    """
     flat = basis.reshape(len(basis), -1)
     flat = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     skew = (span - np.swapaxes(span, -1, -2)).reshape(len(span), -1) / 2
@@ -117,13 +141,16 @@ def _skew_complement(span: Array, basis: Array) -> Array:
 
 
 def _traceless_blocks(central: Array, basis: Array) -> list[NDArray[np.complex128]]:
-    """Return orthonormal columns V (N, k) of the +i spaces of the central complex structures on which 𝔤 has no trace."""
+    """Return orthonormal columns V (N, k) of the +i spaces of the central complex structures on
+    which 𝔤 has no trace.
+    """
     if not len(central):
         return []
     # A generic central element has different eigenvalues on different blocks.
     weights = np.random.default_rng(len(central)).normal(size=len(central))
     values, vectors = np.linalg.eigh(-1j * np.tensordot(weights, central, 1))
-    blocks, done = [], np.zeros(values.size, dtype=bool)
+    blocks = []
+    done = np.zeros(values.size, dtype=bool)
     for i, value in enumerate(values):
         if done[i] or value < _NULL:
             continue

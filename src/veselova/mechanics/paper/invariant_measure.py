@@ -1,6 +1,8 @@
-"""Densities of the invariant measures of LR systems (section 3 and (IM3) ff.), and the divergence by which they are checked.
+"""Densities of the invariant measures of LR systems (section 3 and (IM3) ff.), and the divergence
+by which they are checked.
 
-Every density is real-analytic in its arguments and takes complex ones, so that ``divergence`` can use complex steps.
+Every density is real-analytic in its arguments and takes complex ones, so that ``divergence`` can
+use complex steps.
 """
 
 from __future__ import annotations
@@ -45,14 +47,17 @@ def restricted_determinant(operator: Any, rows: Any) -> Any:
 
 
 def density(inertia: Inertia, F: Any) -> Any:
-    """Return μ = √det⟨ℱ_s, 𝓘⁻¹ℱ_l⟩, equation (measure1), for the rows ℱ_s (…, m, D): (EPS1) keeps μ dω∧dℱ_1∧…∧dℱ_m."""
+    """Return μ = √det⟨ℱ_s, 𝓘⁻¹ℱ_l⟩, equation (measure1), for the rows ℱ_s (…, m, D): (EPS1) keeps μ
+    dω∧dℱ_1∧…∧dℱ_m.
+    """
     return np.sqrt(restricted_determinant(inertia.solve, F))
 
 
 def momentum_density(inertia: Inertia, W: Any) -> Any:
     """Return μ̃ = √det⟨𝒲_i, 𝓘𝒲_j⟩, equation (tilded_den), for the rows 𝒲_k (…, d, D).
 
-    (mom_eq1) keeps μ̃ dω∧d𝒲_1∧…∧d𝒲_d = μ̃⁻¹ d𝓜∧d𝒲_1∧…∧d𝒲_d, equation (measure2); on SO(n), 𝒲 = e_i∧e_p, it is (IM3).
+    (mom_eq1) keeps μ̃ dω∧d𝒲_1∧…∧d𝒲_d = μ̃⁻¹ d𝓜∧d𝒲_1∧…∧d𝒲_d, equation (measure2); on SO(n), 𝒲 =
+    e_i∧e_p, it is (IM3).
     """
     return np.sqrt(restricted_determinant(inertia, W))
 
@@ -61,7 +66,9 @@ def duality_defect(distribution: Distribution, inertia: Inertia, g: Array) -> Ar
     """Return μ² det 𝓘/μ̃² − 1, zero by (duality), at group elements (…, N, N)."""
     W, F = distribution.in_body(g)
     total = np.prod(inertia.moments)
-    return np.asarray(restricted_determinant(inertia.solve, F) * total / restricted_determinant(inertia, W) - 1)
+    return np.asarray(
+        restricted_determinant(inertia.solve, F) * total / restricted_determinant(inertia, W) - 1
+    )
 
 
 def plucker_coordinates(X: Any) -> Any:
@@ -85,7 +92,9 @@ def rho(n: int, r: int) -> int:
 
 
 def special_determinant(A: Array, X: Any) -> Any:
-    """Return det(𝓘|_{𝒟_r}) = (det A)^ϱ [Σ_I A_I (e_1∧…∧e_r)_I²]^{n−r−1}, equation (det_sp), for the inertia (4.5)."""
+    """Return det(𝓘|_{𝒟_r}) = (det A)^ϱ [Σ_I A_I (e_1∧…∧e_r)_I²]^{n−r−1}, equation (det_sp), for the
+    inertia (4.5).
+    """
     n, r = X.shape
     return np.prod(A) ** float(rho(n, r)) * plucker_form(A, X) ** (n - r - 1)
 
@@ -97,9 +106,11 @@ def special_density(A: Array, X: Any) -> Any:
 
 
 def divergence(measure: Callable[[Any], Any], field: Callable[[Any], Any], point: Array) -> float:
-    """Return div(measure · field)/Σ|∂_i(measure · field)_i| at a point, zero where the field keeps the measure.
+    """Return div(measure · field)/Σ|∂_i(measure · field)_i| at a point, zero where the field keeps
+    the measure.
 
-    The derivatives are complex steps, exact to rounding: what is left is about 1e-16 times the number of coordinates.
+    The derivatives are complex steps, exact to rounding: what is left is about 1e-16 times the
+    number of coordinates.
     """
     slopes = np.empty(point.size)
     for i in range(point.size):
@@ -111,13 +122,18 @@ def divergence(measure: Callable[[Any], Any], field: Callable[[Any], Any], point
 
 
 def constraint_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (EPS1) at rows (ω, ℱ_1 … ℱ_m), flat or (1+m, D): ω̇ = 𝓘⁻¹([𝓘ω,ω] + Σ λ_sℱ_s), ℱ̇_s = [ℱ_s,ω]."""
+    """Return the field (EPS1) at rows (ω, ℱ_1 … ℱ_m), flat or (1+m, D): ω̇ = 𝓘⁻¹([𝓘ω,ω] + Σ
+    λ_sℱ_s), ℱ̇_s = [ℱ_s,ω].
+    """
     rows = state.reshape(-1, group.dimension)
-    omega, F = rows[0], rows[1:]
+    omega = rows[0]
+    F = rows[1:]
     force = group.bracket(inertia(omega), omega)
     multipliers, rotated = multipliers_of(inertia.inverse, F, force)
     omega_dot = inertia.solve(force) + multipliers @ rotated
-    return np.vstack([omega_dot, group.bracket(F, np.broadcast_to(omega, F.shape))]).reshape(state.shape)
+    return np.vstack([omega_dot, group.bracket(F, np.broadcast_to(omega, F.shape))]).reshape(
+        state.shape
+    )
 
 
 def _velocity(inertia: Inertia, M: Any, W: Any) -> Any:
@@ -126,18 +142,25 @@ def _velocity(inertia: Inertia, M: Any, W: Any) -> Any:
 
 
 def momentum_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (mom_eq1) at rows (𝓜, 𝒲_1 … 𝒲_d), flat or (1+d, D): 𝓜̇ = [𝓜,ω], 𝒲̇_k = [𝒲_k,ω]."""
+    """Return the field (mom_eq1) at rows (𝓜, 𝒲_1 … 𝒲_d), flat or (1+d, D): 𝓜̇ = [𝓜,ω], 𝒲̇_k =
+    [𝒲_k,ω].
+    """
     rows = state.reshape(-1, group.dimension)
     omega = _velocity(inertia, rows[0], rows[1:])
     return group.bracket(rows, np.broadcast_to(omega, rows.shape)).reshape(state.shape)
 
 
 def frame_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (4.1c), (4.2), (Po) on SO(n) at a flat (𝓜, e_1 … e_r): 𝓜̇ = [𝓜,ω], ė_i = −ωe_i."""
+    """Return the field (4.1c), (4.2), (Po) on SO(n) at a flat (𝓜, e_1 … e_r): 𝓜̇ = [𝓜,ω], ė_i =
+    −ωe_i.
+    """
     D = group.dimension
-    M, rows = state[:D], state[D:].reshape(-1, group.size)  # rows e_i
+    # rows e_i
+    M = state[:D]
+    rows = state[D:].reshape(-1, group.size)
     Gamma = rows.T @ rows
     excess = group.element(inertia.matrix - np.eye(D))  # (𝓘 − 1)Y_a
     along = group.coordinates(excess @ Gamma + Gamma @ excess - Gamma @ excess @ Gamma)
     omega = np.linalg.solve(np.eye(D) + along.T, M)
-    return np.concatenate([group.bracket(M, omega), (rows @ group.element(omega)).ravel()])  # (−ωe)ᵀ = eᵀω
+    # (−ωe)ᵀ = eᵀω
+    return np.concatenate([group.bracket(M, omega), (rows @ group.element(omega)).ravel()])

@@ -1,7 +1,9 @@
-"""Generalized Chaplygin reduction of an LR system to H\\G: reduced Lagrangian and equations, momentum equation, invariants.
+"""Generalized Chaplygin reduction of an LR system to H\\G: reduced Lagrangian and equations,
+momentum equation, invariants.
 
-The redundant coordinates of a point q = Hg of H\\G are those of any g over it; a velocity q̇ is what ġ is up to 𝔥·g. Everything
-here depends on Hg alone, which the tests hold, because 𝔥 is a subalgebra and v is H-invariant.
+The redundant coordinates of a point q = Hg of H\\G are those of any g over it; a velocity q̇ is
+what ġ is up to 𝔥·g. Everything here depends on Hg alone, which the tests hold, because 𝔥 is a
+subalgebra and v is H-invariant.
 """
 
 from __future__ import annotations
@@ -26,33 +28,49 @@ _NULL = 1e-9
 
 @dataclass(frozen=True)
 class ChaplyginReduction:
-    """The reduced system on Q = H\\G of an LR system with a subalgebra 𝔥, an H-invariant potential and c_s = 0.
+    """The reduced system on Q = H\\G of an LR system with a subalgebra 𝔥, an H-invariant potential
+    and c_s = 0.
 
-    g, g_dot, … are matrices (N, N), elements of 𝔤 too; g_dot and the variations xi are tangent at g. Raises InvalidInput, which
-    names ``h``, ``potential`` or ``omega``, where the system is no generalized Chaplygin system.
+    g, g_dot, … are matrices (N, N), elements of 𝔤 too; g_dot and the variations xi are tangent at
+    g. Raises InvalidInput, which names ``h``, ``potential`` or ``omega``, where the system is no
+    generalized Chaplygin system.
     """
 
     system: LRSystem
 
     def __post_init__(self) -> None:
-        distribution, potential = self.system.distribution, self.system.potential
+        distribution = self.system.distribution
+        potential = self.system.potential
         if not distribution.is_subalgebra:
             given = f"a space whose brackets leave it by {distribution.subalgebra_defect:.3g}"
-            raise InvalidInput(("h",), "a subalgebra 𝔥 (closed under brackets to 1e-9), for a reduction to H\\G", given)
+            raise InvalidInput(
+                ("h",),
+                "a subalgebra 𝔥 (closed under brackets to 1e-9), for a reduction to H\\G",
+                given,
+            )
         if potential is not None:
             h = distribution.space[distribution.rank :]
-            changing = len(h) - len(potential.invariant_directions(distribution.group, h)) if len(h) else 0
+            changing = (
+                len(h) - len(potential.invariant_directions(distribution.group, h)) if len(h) else 0
+            )
             if changing:
                 given = f"one that changes along {changing} of its {len(h)} dimensions"
-                raise InvalidInput(("potential",), "a potential that is constant along the orbits of H", given)
+                raise InvalidInput(
+                    ("potential",), "a potential that is constant along the orbits of H", given
+                )
         if np.any(self.system.constraint):
             given = f"one that is off them by {np.max(np.abs(self.system.constraint)):.3g}"
-            raise InvalidInput(("omega",), "an angular velocity that satisfies the constraints with c = 0", given)
+            raise InvalidInput(
+                ("omega",), "an angular velocity that satisfies the constraints with c = 0", given
+            )
 
     @cached_property
     def fixed_vectors(self) -> Array:
-        """Return orthonormal columns (N, f) of the vectors that H fixes: E_1 … E_r for D_r of (4.1)."""
-        distribution, N = self.system.distribution, self.system.distribution.group.size
+        """Return orthonormal columns (N, f) of the vectors that H fixes: E_1 … E_r for D_r of
+        (4.1).
+        """
+        distribution = self.system.distribution
+        N = self.system.distribution.group.size
         h = distribution.group.element(distribution.space[distribution.rank :]).reshape(-1, N)
         if not len(h):
             return np.eye(N)
@@ -61,21 +79,31 @@ class ChaplyginReduction:
         # Along coordinate axes where the fixed space is one of coordinates.
         projector = vectors.T @ vectors
         axes = np.flatnonzero(np.abs(np.diag(projector) - 1) < _NULL)
-        return np.eye(N)[:, axes] if len(axes) == len(vectors) else np.asarray(vectors.T, dtype=np.float64)
+        return (
+            np.eye(N)[:, axes]
+            if len(axes) == len(vectors)
+            else np.asarray(vectors.T, dtype=np.float64)
+        )
 
     def coordinates(self, g: Array) -> Array:
-        """Return 𝒳 = g⁻¹·(fixed vectors), (N, f), functions on H\\G: (e_1 … e_r) on the Stiefel variety V(r, n)."""
+        """Return 𝒳 = g⁻¹·(fixed vectors), (N, f), functions on H\\G: (e_1 … e_r) on the Stiefel
+        variety V(r, n).
+        """
         return np.swapaxes(g, -1, -2) @ self.fixed_vectors
 
     def projector(self, g: Array) -> Array:
-        """Return the matrix (D, D) of pr_{g⁻¹𝔡g}, functions on H\\G that are there also where H fixes no vector."""
+        """Return the matrix (D, D) of pr_{g⁻¹𝔡g}, functions on H\\G that are there also where H
+        fixes no vector.
+        """
         W, _ = self.system.distribution.in_body(g)
         return np.asarray(np.swapaxes(W, -1, -2) @ W, dtype=np.float64)
 
     def _quasivelocity(self, g: Array, g_dot: Array) -> Array:
         """Return u_k with Φ(q,q̇) = Σ u_k 𝒲_k."""
         group = self.system.distribution.group
-        return self.system.distribution.components(g, group.coordinates(np.swapaxes(g, -1, -2) @ g_dot))[0]
+        return self.system.distribution.components(
+            g, group.coordinates(np.swapaxes(g, -1, -2) @ g_dot)
+        )[0]
 
     def _element(self, x: Any) -> Array:
         return np.asarray(self.system.distribution.group.element(x), dtype=np.float64)
@@ -101,16 +129,22 @@ class ChaplyginReduction:
         return self.system.potential.value(g) if self.system.potential else np.zeros(g.shape[:-2])
 
     def metric(self, g: Array) -> Array:
-        """Return ⟨𝓘𝒲_k, 𝒲_l⟩, the metric ds²_{𝓘,D} in the frame of Q whose quasivelocities are u_k, (…, d, d)."""
+        """Return ⟨𝓘𝒲_k, 𝒲_l⟩, the metric ds²_{𝓘,D} in the frame of Q whose quasivelocities are u_k,
+        (…, d, d).
+        """
         W, _ = self.system.distribution.in_body(g)
         return np.asarray(self.system.inertia(W) @ np.swapaxes(W, -1, -2), dtype=np.float64)
 
     def curvature(self, g: Array, g_dot: Array, xi: Array) -> Array:
-        """Return pr_{g⁻¹𝔥g}[Φ(q,q̇), Φ(q,ξ)], g⁻¹ times the curvature B(ġ,ξ) of the connection, an element of 𝔤."""
+        """Return pr_{g⁻¹𝔥g}[Φ(q,q̇), Φ(q,ξ)], g⁻¹ times the curvature B(ġ,ξ) of the connection, an
+        element of 𝔤.
+        """
         distribution = self.system.distribution
         one, other = (self._lift(g, self._quasivelocity(g, vector)) for vector in (g_dot, xi))
         _, across = distribution.components(g, distribution.group.bracket(one, other))
-        return self._element(distribution.body(g, np.zeros((*across.shape[:-1], distribution.rank)), across))
+        return self._element(
+            distribution.body(g, np.zeros((*across.shape[:-1], distribution.rank)), across)
+        )
 
     def constraint_force(self, g: Array, g_dot: Array, xi: Array) -> Array:
         """Return ⟨𝓘Φ(q,q̇), pr_{g⁻¹𝔥g}[Φ(q,q̇),Φ(q,ξ)]⟩, the right side of (1.2)."""
@@ -119,10 +153,12 @@ class ChaplyginReduction:
         return np.asarray(np.sum(self.system.inertia(phi) * curvature, axis=-1))
 
     def acceleration(self, g: Array, g_dot: Array) -> Array:
-        """Return u̇_k from (1.2), for u of the velocity given, (d,): the reduced Lagrange–d'Alembert equation solved.
+        """Return u̇_k from (1.2), for u of the velocity given, (d,): the reduced
+        Lagrange–d'Alembert equation solved.
 
-        In the chart x ↦ H exp(Σ x_k w_k) g of Q, centred at q, where ẋ = u and ẍ = u̇, the left side of (1.2) for ξ = w_l is
-        ⟨𝓘Φ, (1 + pr_𝔥)[Φ,𝒲_l]⟩ − ⟨𝓘𝒲_l, Σ u̇_k𝒲_k⟩ − ∂_l V: the derivative of exp gives [Φ,𝒲_l] its factor 1 − ½pr_𝔡, twice.
+        In the chart x ↦ H exp(Σ x_k w_k) g of Q, centred at q, where ẋ = u and ẍ = u̇, the left
+        side of (1.2) for ξ = w_l is ⟨𝓘Φ, (1 + pr_𝔥)[Φ,𝒲_l]⟩ − ⟨𝓘𝒲_l, Σ u̇_k𝒲_k⟩ − ∂_l V: the
+        derivative of exp gives [Φ,𝒲_l] its factor 1 − ½pr_𝔡, twice.
         """
         distribution = self.system.distribution
         group = distribution.group
@@ -134,7 +170,9 @@ class ChaplyginReduction:
         left = (brackets + vertical) @ self.system.inertia(phi)
         if self.system.potential:
             left = left - W @ self.system.potential.gradient(group, g)
-        right = np.array([self.constraint_force(g, g_dot, g @ element) for element in group.element(W)])
+        right = np.array(
+            [self.constraint_force(g, g_dot, g @ element) for element in group.element(W)]
+        )
         return np.asarray(np.linalg.solve(self.metric(g), left - right), dtype=np.float64)
 
     def momentum(self, g: Array, g_dot: Array) -> Array:
@@ -145,23 +183,29 @@ class ChaplyginReduction:
         return self._element(self._lift(g, along))
 
     def velocity(self, g: Array, momentum: Array) -> Array:
-        """Return Φ(q,q̇) of the velocity with p = ∂L/∂q̇, from Φ*(q,p): the inverse of (*), an element of 𝔤."""
+        """Return Φ(q,q̇) of the velocity with p = ∂L/∂q̇, from Φ*(q,p): the inverse of (*), an
+        element of 𝔤.
+        """
         distribution = self.system.distribution
         along, _ = distribution.components(g, distribution.group.coordinates(momentum))
         return self._element(self._lift(g, np.linalg.solve(self.metric(g), along)))
 
     def momentum_rate(self, g: Array, momentum: Array) -> Array:
-        """Return [Φ*(q,p), Φ(q,q̇)], the right side of the reduced momentum equation (**), without potential."""
+        """Return [Φ*(q,p), Φ(q,q̇)], the right side of the reduced momentum equation (**), without
+        potential.
+        """
         phi = self.velocity(g, momentum)
         return momentum @ phi - phi @ momentum
 
     def invariants(self, momentum: Array) -> Array:
-        """Return tr M², tr M⁴, … of M = Φ*(q,p), (…, ⌊N/2⌋): with them every function of the algebra 𝒜 is known, up to signs.
+        """Return tr M², tr M⁴, … of M = Φ*(q,p), (…, ⌊N/2⌋): with them every function of the
+        algebra 𝒜 is known, up to signs.
 
         They are integrals without potential. (Odd traces of a real skew matrix vanish.)
         """
         square = momentum @ momentum
-        power, found = square, [np.trace(square, axis1=-2, axis2=-1)]
+        power = square
+        found = [np.trace(square, axis1=-2, axis2=-1)]
         for _ in range(1, momentum.shape[-1] // 2):
             power = power @ square
             found.append(np.trace(power, axis1=-2, axis2=-1))
@@ -171,9 +215,12 @@ class ChaplyginReduction:
     def independent_invariants(self) -> int:
         """Return the number of independent functions in 𝒜: dim pr_𝔡(ann ξ) for a generic ξ ∈ 𝔡."""
         distribution = self.system.distribution
-        group, w = distribution.group, distribution.space[: distribution.rank]
+        group = distribution.group
+        w = distribution.space[: distribution.rank]
         xi = np.random.default_rng(group.dimension).normal(size=distribution.rank) @ w
-        brackets = group.bracket(np.broadcast_to(xi, (group.dimension, group.dimension)), np.eye(group.dimension))
+        brackets = group.bracket(
+            np.broadcast_to(xi, (group.dimension, group.dimension)), np.eye(group.dimension)
+        )
         _, values, vectors = np.linalg.svd(brackets.T)
         annihilator = vectors[int(np.sum(values > _NULL)) :]
         return int(np.linalg.matrix_rank(annihilator @ w.T, tol=_NULL)) if len(annihilator) else 0

@@ -1,7 +1,8 @@
 """Theorem recon0: all motions of the body over one q(t), and the integrals that tell them apart.
 
-Over the trajectory of q the natural frame N = [q, n_2, …, n_{n−1}, γ] is one motion, and E = N diag(1, ℜ), equation (orth), with
-ℜ constant in O(n−1), are all others. The momentum p is along γ, so the linear integrals are (p,γ) times the last row of ℜ.
+Over the trajectory of q the natural frame N = [q, n_2, …, n_{n−1}, γ] is one motion, and E = N
+diag(1, ℜ), equation (orth), with ℜ constant in O(n−1), are all others. The momentum p is along γ,
+so the linear integrals are (p,γ) times the last row of ℜ.
 """
 
 from __future__ import annotations
@@ -24,36 +25,48 @@ Array = NDArray[np.float64]
 
 
 def rotation(problem: Veselova) -> Array:
-    """Return the constant ℜ of (orth), (n−1, n−1), that takes the natural frame at the start to the frame of the problem."""
+    """Return the constant ℜ of (orth), (n−1, n−1), that takes the natural frame at the start to the
+    frame of the problem.
+    """
     return orthonormalize(_natural(problem).frame[:, 1:].T @ problem.frame[:, 1:])
 
 
 def with_rotation(problem: Veselova, matrix: Any) -> Veselova:
-    """Return the problem with the same q(t) whose frame is the natural one turned by ℜ; raises InvalidInput unless ℜ ∈ O(n−1)."""
+    """Return the problem with the same q(t) whose frame is the natural one turned by ℜ; raises
+    InvalidInput unless ℜ ∈ O(n−1).
+    """
     rotated = _turn(_natural(problem).frame, _orthogonal(matrix, problem.n - 1))
     return Veselova(**_without_frame(problem), frame=problem.to_body_axes(rotated[None])[0])
 
 
 def natural_frames(trajectory: Trajectory) -> Array:
-    """Return the natural frame along a trajectory of ``Veselova``, (N, n, n): (q, n_2, …, γ)(t), carried on from the start."""
+    """Return the natural frame along a trajectory of ``Veselova``, (N, n, n): (q, n_2, …, γ)(t),
+    carried on from the start.
+    """
     problem = _veselova(trajectory)
     return _turn(trajectory.series("frame"), rotation(problem).T)
 
 
 def frames_over(trajectory: Trajectory, matrix: Any) -> Array:
-    """Return the frames E(t) = N(t) diag(1, ℜ) of the motion over the same q(t) with a given ℜ ∈ O(n−1), (N, n, n).
+    """Return the frames E(t) = N(t) diag(1, ℜ) of the motion over the same q(t) with a given ℜ ∈
+    O(n−1), (N, n, n).
 
-    Their error is that of the trajectory times at most n−1. Raises InvalidInput unless ℜ is orthogonal to 1e-9.
+    Their error is that of the trajectory times at most n−1. Raises InvalidInput unless ℜ is
+    orthogonal to 1e-9.
     """
     return _turn(natural_frames(trajectory), _orthogonal(matrix, _veselova(trajectory).n - 1))
 
 
 def linear_integrals(trajectory: Trajectory) -> Array:
-    """Return l_k = ⟨𝓜,e_1∧e_k⟩ = (p,e_k), k = 2 … n, along a trajectory, (N, n−1); Σ l_k² = (p,p) = 2h c_2⋯c_{n−1}.
+    """Return l_k = ⟨𝓜,e_1∧e_k⟩ = (p,e_k), k = 2 … n, along a trajectory, (N, n−1); Σ l_k² = (p,p) =
+    2h c_2⋯c_{n−1}.
 
-    (p,p) is an integral of the reduced flow, so n−2 of them are new: of the (n−1)(n−2)/2 numbers in ℜ those of its last row.
+    (p,p) is an integral of the reduced flow, so n−2 of them are new: of the (n−1)(n−2)/2 numbers in
+    ℜ those of its last row.
     """
-    return np.asarray(_veselova(trajectory).integrals(trajectory.arrays)["linear"], dtype=np.float64)
+    return np.asarray(
+        _veselova(trajectory).integrals(trajectory.arrays)["linear"], dtype=np.float64
+    )
 
 
 def _without_frame(problem: Veselova) -> dict[str, Any]:
@@ -61,13 +74,17 @@ def _without_frame(problem: Veselova) -> dict[str, Any]:
 
 
 def _natural(problem: Veselova) -> Veselova:
-    """Return the problem with its natural frame, which is that of the exact data to the last bit."""
+    """Return the problem with its natural frame, which is that of the exact data to
+    the last bit.
+    """
     return Veselova(**_without_frame(problem))
 
 
 def _veselova(trajectory: Trajectory) -> Veselova:
     if not isinstance(trajectory.problem, Veselova):
-        raise InvalidInput(("trajectory",), "one of system veselova", f"one of system {trajectory.problem.system}")
+        raise InvalidInput(
+            ("trajectory",), "one of system veselova", f"one of system {trajectory.problem.system}"
+        )
     return trajectory.problem
 
 
@@ -81,5 +98,9 @@ def _orthogonal(matrix: Any, size: int) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         defect = float(np.max(np.abs(array.T @ array - np.eye(size))))
     if not defect <= INPUT_TOLERANCE:
-        raise InvalidInput(("matrix",), f"an orthogonal {size} × {size} matrix to 1e-9", f"one with |ℜᵀℜ − 1| up to {defect:.3g}")
+        raise InvalidInput(
+            ("matrix",),
+            f"an orthogonal {size} × {size} matrix to 1e-9",
+            f"one with |ℜᵀℜ − 1| up to {defect:.3g}",
+        )
     return orthonormalize(array)

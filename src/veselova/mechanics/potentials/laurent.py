@@ -1,4 +1,6 @@
-"""Laurent polynomials Σ c γ_1^a γ_2^b γ_3^c in three variables, with values and gradients in numbers or symbols."""
+"""Laurent polynomials Σ c γ_1^a γ_2^b γ_3^c in three variables, with values and gradients in
+numbers or symbols.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ Powers = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class LaurentPolynomial:
-    """Σ_k c_k Π_j γ_j^{p_kj} with integer powers of either sign; no two terms share their powers, no coefficient is zero.
+    """Σ_k c_k Π_j γ_j^{p_kj} with integer powers of either sign; no two terms share their powers,
+    no coefficient is zero.
 
     powers        of each term, three integers
     coefficients  (k,)
@@ -42,7 +45,9 @@ class LaurentPolynomial:
     def quadratic(cls, form: Array) -> LaurentPolynomial:
         """Return (Sγ,γ) for a symmetric matrix S, (3, 3)."""
         units: list[Powers] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-        return cls.of((float(form[i, j]), _add(units[i], units[j])) for i in range(3) for j in range(3))
+        return cls.of(
+            (float(form[i, j]), _add(units[i], units[j])) for i in range(3) for j in range(3)
+        )
 
     def __bool__(self) -> bool:
         return bool(self.powers)
@@ -51,7 +56,9 @@ class LaurentPolynomial:
         return LaurentPolynomial.of([*self._terms, *other._terms])
 
     def __mul__(self, other: LaurentPolynomial) -> LaurentPolynomial:
-        return LaurentPolynomial.of((c * d, _add(p, r)) for c, p in self._terms for d, r in other._terms)
+        return LaurentPolynomial.of(
+            (c * d, _add(p, r)) for c, p in self._terms for d, r in other._terms
+        )
 
     def times(self, factor: float) -> LaurentPolynomial:
         """Return the polynomial multiplied by a number."""
@@ -68,7 +75,9 @@ class LaurentPolynomial:
 
     @cached_property
     def slopes(self) -> tuple[Array, Array, Array]:
-        """Return the terms of the gradient: exponents (l, 3), coefficients (l,), and which component each belongs to, (3, l)."""
+        """Return the terms of the gradient: exponents (l, 3), coefficients (l,), and which
+        component each belongs to, (3, l).
+        """
         terms = [
             (j, c * p[j], (p[0] - (j == 0), p[1] - (j == 1), p[2] - (j == 2)))
             for j in range(3)
@@ -81,7 +90,9 @@ class LaurentPolynomial:
 
     @property
     def singular_axes(self) -> tuple[int, ...]:
-        """Return the axes that occur with a negative power, so that the plane γ_j = 0 is singular."""
+        """Return the axes that occur with a negative power, so that the plane γ_j = 0
+        is singular.
+        """
         return tuple(j for j in range(3) if any(p[j] < 0 for p in self.powers))
 
     def singular_part(self, axis: int) -> LaurentPolynomial:
@@ -93,26 +104,42 @@ class LaurentPolynomial:
         return np.asarray(monomials(self.exponents, gamma) @ self.coefficients, dtype=np.float64)
 
     def magnitude(self, gamma: Array) -> Array:
-        """Return Σ|c_k| Π_j |γ_j|^{p_kj} at points (..., 3), shape (...), of which ε is the rounding of a value."""
-        return np.asarray(monomials(self.exponents, np.abs(gamma)) @ np.abs(self.coefficients), dtype=np.float64)
+        """Return Σ|c_k| Π_j |γ_j|^{p_kj} at points (..., 3), shape (...), of which ε is the
+        rounding of a value.
+        """
+        return np.asarray(
+            monomials(self.exponents, np.abs(gamma)) @ np.abs(self.coefficients), dtype=np.float64
+        )
 
     def gradient(self, gamma: Array) -> Array:
         """Return the gradients in R³ at points (..., 3), shape (..., 3)."""
         exponents, coefficients, components = self.slopes
-        return np.asarray((monomials(exponents, gamma) * coefficients) @ components.T, dtype=np.float64)
+        return np.asarray(
+            (monomials(exponents, gamma) * coefficients) @ components.T, dtype=np.float64
+        )
 
     def size(self, gamma: Array) -> float:
-        """Return Σ|c_k| Π_j |γ_j|^{min(p_kj, 0)}: how large terms become on the sphere, this near to singular planes."""
-        return float(monomials(np.minimum(self.exponents, 0), np.abs(gamma)) @ np.abs(self.coefficients))
+        """Return Σ|c_k| Π_j |γ_j|^{min(p_kj, 0)}: how large terms become on the sphere, this near
+        to singular planes.
+        """
+        return float(
+            monomials(np.minimum(self.exponents, 0), np.abs(gamma)) @ np.abs(self.coefficients)
+        )
 
 
 def monomials(exponents: Array, gamma: Any) -> Any:
-    """Return Π_j γ_j^{p_kj} for exponents (k, 3), shape (..., k); of symbols, (3,), by repeated multiplication."""
+    """Return Π_j γ_j^{p_kj} for exponents (k, 3), shape (..., k); of symbols, (3,), by repeated
+    multiplication.
+    """
     if gamma.dtype != object:
         return np.prod(gamma[..., None, :] ** exponents, axis=-1)
     products = np.empty(len(exponents), dtype=object)
     for k, powers in enumerate(exponents):
-        factors = [x if p > 0 else 1.0 / x for x, p in zip(gamma, powers, strict=True) for _ in range(abs(int(p)))]
+        factors = [
+            x if p > 0 else 1.0 / x
+            for x, p in zip(gamma, powers, strict=True)
+            for _ in range(abs(int(p)))
+        ]
         products[k] = prod(factors, start=1.0)
     return products
 

@@ -1,4 +1,6 @@
-"""Potentials V(γ) on the sphere, as data, with the companion F(γ) that completes an additional integral where one is known."""
+"""Potentials V(γ) on the sphere, as data, with the companion F(γ) that completes an additional
+integral where one is known.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +21,16 @@ __all__ = ["Potential", "duality_defect", "family"]
 
 Array = NDArray[np.float64]
 
-#: Powers and terms of a user's polynomial: far more than any system of the field has, and still quick to evaluate.
+#: Powers and terms of a user's polynomial: far more than any system of the field has, and still
+#: quick to evaluate.
 _LARGEST_POWER = 24
 _MOST_TERMS = 64
 
 #: What a potential is made of; the companion belongs to the polynomial.
 _PARTS = ("clebsch", "family", "polynomial", "companion")
 
-#: Points of the sphere, away from the planes γ_i = 0, at which identities between polynomials are looked at.
+#: Points of the sphere, away from the planes γ_i = 0, at which identities between polynomials are
+#: looked at.
 _POINTS = 24
 
 
@@ -34,11 +38,13 @@ _POINTS = 24
 class Potential:
     """A Laurent polynomial V(γ) and its companion F(γ), for one inertia tensor.
 
-    The companion makes F_2 + F an integral of the Veselova system on (Ω,γ) = 0 (duality lemma); for the Euler–Poisson
-    equations it makes f_2 + F one on (𝒥Ω,γ) = 0. None: not known. ``unconditional``: it is one for any value of these constants.
-    Data: {"clebsch": α} α(𝓘γ,γ) · {"family": [α₁ … α₅]} equation (3.5); for the Euler–Poisson equations its dual ·
-    {"polynomial": [{"coefficient": c, "powers": [a, b, c]}, …]}, powers any integers, with {"companion": […]} in the same form
-    where the user knows it (it is checked) · a sum of these, as one mapping · None for V = 0.
+    The companion makes F_2 + F an integral of the Veselova system on (Ω,γ) = 0 (duality lemma); for
+    the Euler–Poisson equations it makes f_2 + F one on (𝒥Ω,γ) = 0. None: not known.
+    ``unconditional``: it is one for any value of these constants.
+    Data: {"clebsch": α} α(𝓘γ,γ) · {"family": [α₁ … α₅]} equation (3.5); for the Euler–Poisson
+    equations its dual · {"polynomial": [{"coefficient": c, "powers": [a, b, c]}, …]}, powers any
+    integers, with {"companion": […]} in the same form where the user knows it (it is checked) · a
+    sum of these, as one mapping · None for V = 0.
     """
 
     terms: LaurentPolynomial
@@ -50,13 +56,16 @@ class Potential:
     def of(cls, given: Any, inertia: Array, inverse: Array, *, dual: bool = False) -> Potential:
         """Return the potential of given data; raises InvalidInput, located below ``potential``.
 
-        ``inertia``, ``inverse``: the tensor and its inverse, (3, 3). ``dual``: it belongs to the Euler–Poisson equations.
+        ``inertia``, ``inverse``: the tensor and its inverse, (3, 3). ``dual``: it belongs to the
+        Euler–Poisson equations.
         """
         none = LaurentPolynomial.of([])
         if given is None:
             return cls(none, none, True, None)
         if not isinstance(given, Mapping) or not given:
-            raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given))
+            raise InvalidInput(
+                ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
+            )
         for name in given:
             if name not in _PARTS:
                 raise InvalidInput(("potential",), f"no fields but {', '.join(_PARTS)}", show(name))
@@ -66,22 +75,34 @@ class Potential:
             pairs.append(family((0.0, alpha, 0.0, 0.0, 0.0), inertia, inverse))
         if "family" in given:
             alphas = _alphas(given["family"], inertia)
-            pairs.append(family(alphas, inverse, inertia)[::-1] if dual else family(alphas, inertia, inverse))
+            pairs.append(
+                family(alphas, inverse, inertia)[::-1] if dual else family(alphas, inertia, inverse)
+            )
         terms = sum((pair[0] for pair in pairs), none)
         companion: LaurentPolynomial | None = sum((pair[1] for pair in pairs), none)
         if "polynomial" in given:
             terms = terms + _polynomial(given["polynomial"], "polynomial")
             known = given.get("companion")
-            companion = None if known is None or companion is None else companion + _polynomial(known, "companion")
+            companion = (
+                None
+                if known is None or companion is None
+                else companion + _polynomial(known, "companion")
+            )
         elif "companion" in given:
-            raise InvalidInput(("potential", "companion"), "a polynomial that it belongs to", "none")
+            raise InvalidInput(
+                ("potential", "companion"), "a polynomial that it belongs to", "none"
+            )
         unconditional = False
         if companion is not None:
-            unconditional = _check_pair(terms, companion, inverse if dual else inertia, dual, "companion" in given)
+            unconditional = _check_pair(
+                terms, companion, inverse if dual else inertia, dual, "companion" in given
+            )
         return cls(terms, companion, unconditional, plain(given))
 
     def require_finite(self, gamma: Array) -> None:
-        """Raise InvalidInput unless the potential and its force are finite at a point of the sphere."""
+        """Raise InvalidInput unless the potential and its force are finite at a point of the
+        sphere.
+        """
         for axis in self.terms.singular_axes:
             if gamma[axis] == 0:
                 given = f"a negative power of gamma[{axis}], which is 0"
@@ -91,20 +112,32 @@ class Potential:
             if self.companion is not None:
                 largest = np.append(largest, np.abs(self.companion.value(gamma)))
         if not np.all(np.isfinite(largest)):
-            raise InvalidInput(("potential",), "one that is finite at the start", "a value beyond the range of a float")
+            raise InvalidInput(
+                ("potential",),
+                "one that is finite at the start",
+                "a value beyond the range of a float",
+            )
 
 
-def family(alphas: Sequence[float], inertia: Array, inverse: Array) -> tuple[LaurentPolynomial, LaurentPolynomial]:
-    """Return V(γ) of (3.5) and F(γ) with F_2 + F the additional integral; 𝓘 and 𝓘⁻¹ as (3, 3), diagonal unless α₃ = α₄ = α₅ = 0.
+def family(
+    alphas: Sequence[float], inertia: Array, inverse: Array
+) -> tuple[LaurentPolynomial, LaurentPolynomial]:
+    """Return V(γ) of (3.5) and F(γ) with F_2 + F the additional integral; 𝓘 and 𝓘⁻¹ as (3, 3),
+    diagonal unless α₃ = α₄ = α₅ = 0.
 
-    F = α₁ det𝓘 (𝓘γ,γ)(𝓘⁻¹γ,γ) − α₂ det𝓘 (𝓘⁻¹γ,γ) + α₃(I₃γ₂² + I₂γ₃²)/γ₁² + cyclic, where the paper prints I₂γ₂² + I₃γ₃².
+    F = α₁ det𝓘 (𝓘γ,γ)(𝓘⁻¹γ,γ) − α₂ det𝓘 (𝓘⁻¹γ,γ) + α₃(I₃γ₂² + I₂γ₃²)/γ₁² + cyclic, where the paper
+    prints I₂γ₂² + I₃γ₃².
     """
     quartic, quadratic, *centrifugal = alphas
     with np.errstate(over="ignore", invalid="ignore"):  # refused where the start is looked at
-        form, adjugate = LaurentPolynomial.quadratic(inertia), LaurentPolynomial.quadratic(np.linalg.det(inertia) * inverse)
-        V, F = form.times(quadratic), adjugate.times(-quadratic)
+        form = LaurentPolynomial.quadratic(inertia)
+        adjugate = LaurentPolynomial.quadratic(np.linalg.det(inertia) * inverse)
+        V = form.times(quadratic)
+        F = adjugate.times(-quadratic)
         if quartic != 0:
-            V = V + (LaurentPolynomial.quadratic(inertia @ inertia) + (form * form).times(-1.0)).times(quartic)
+            V = V + (
+                LaurentPolynomial.quadratic(inertia @ inertia) + (form * form).times(-1.0)
+            ).times(quartic)
             F = F + (form * adjugate).times(quartic)
     moments = np.diag(inertia).tolist()
     for i, alpha in enumerate(centrifugal):
@@ -114,8 +147,11 @@ def family(alphas: Sequence[float], inertia: Array, inverse: Array) -> tuple[Lau
     return V, F
 
 
-def duality_defect(V: LaurentPolynomial, F: LaurentPolynomial, inertia: Array, gamma: Array) -> Array:
-    """Return [γ×∂F/∂γ − 𝓘(γ×∂V/∂γ)]×γ at points of the sphere (..., 3): zero where V and F are companions (duality lemma).
+def duality_defect(
+    V: LaurentPolynomial, F: LaurentPolynomial, inertia: Array, gamma: Array
+) -> Array:
+    """Return [γ×∂F/∂γ − 𝓘(γ×∂V/∂γ)]×γ at points of the sphere (..., 3): zero where V and F are
+    companions (duality lemma).
 
     The paper prints 𝓘(∂V/∂γ)×γ for 𝓘(∂V/∂γ×γ).
     """
@@ -123,8 +159,12 @@ def duality_defect(V: LaurentPolynomial, F: LaurentPolynomial, inertia: Array, g
     return np.asarray(np.cross(np.cross(gamma, F.gradient(gamma)) - force, gamma), dtype=np.float64)
 
 
-def _check_pair(terms: LaurentPolynomial, companion: LaurentPolynomial, inertia: Array, dual: bool, user: bool) -> bool:
-    """Return whether the integral holds for any value of the constants; raises InvalidInput for a wrong companion of a user's."""
+def _check_pair(
+    terms: LaurentPolynomial, companion: LaurentPolynomial, inertia: Array, dual: bool, user: bool
+) -> bool:
+    """Return whether the integral holds for any value of the constants; raises InvalidInput for a
+    wrong companion of a user's.
+    """
     points = np.random.default_rng(3).uniform(0.3, 1.0, (_POINTS, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     V, F = (companion, terms) if dual else (terms, companion)
@@ -135,7 +175,9 @@ def _check_pair(terms: LaurentPolynomial, companion: LaurentPolynomial, inertia:
             defect = np.max(np.abs(duality_defect(V, F, inertia, points)))
             if not defect <= INPUT_TOLERANCE * size:
                 required = "a function F with [γ×∂F/∂γ − 𝓘(γ×∂V/∂γ)]×γ = 0 on the sphere"
-                raise InvalidInput(("potential", "companion"), required, f"one that leaves {defect:.3g}")
+                raise InvalidInput(
+                    ("potential", "companion"), required, f"one that leaves {defect:.3g}"
+                )
         # Off the constraint, F_2 + F changes at the rate (Ω,γ)(𝓘(γ×∂V/∂γ),γ).
         return bool(np.max(np.abs(np.sum(force * points, axis=1))) <= INPUT_TOLERANCE * size)
 
@@ -143,7 +185,10 @@ def _check_pair(terms: LaurentPolynomial, companion: LaurentPolynomial, inertia:
 def _alphas(given: Any, inertia: Array) -> tuple[float, ...]:
     alphas = tuple(float(x) for x in exact_vector(given, ("potential", "family"), 5))
     if any(alphas[2:]) and np.any(inertia != np.diag(np.diag(inertia))):
-        required = "alpha_3 = alpha_4 = alpha_5 = 0 unless the inertia is diagonal (γ_i are principal components)"
+        required = (
+            "alpha_3 = alpha_4 = alpha_5 = 0 unless the inertia is diagonal (γ_i are "
+            "principal components)"
+        )
         raise InvalidInput(("potential", "family"), required, "an inertia with products of inertia")
     return alphas
 
@@ -166,7 +211,11 @@ def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int
     if isinstance(powers, (str, bytes)) or not isinstance(powers, Sequence) or len(powers) != 3:
         raise InvalidInput((*path, "powers"), "a list of 3 whole numbers", show(powers))
     for j, power in enumerate(powers):
-        if isinstance(power, bool) or not isinstance(power, Integral) or abs(int(power)) > _LARGEST_POWER:
+        if (
+            isinstance(power, bool)
+            or not isinstance(power, Integral)
+            or abs(int(power)) > _LARGEST_POWER
+        ):
             required = f"a whole number from -{_LARGEST_POWER} to {_LARGEST_POWER}"
             raise InvalidInput((*path, "powers", j), required, show(power))
     a, b, c = (int(power) for power in powers)

@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 class ClosedFormStates:
     """States evaluated from a closed-form document.
 
-    times (N,) · error (N,) a bound on every component of q and the frame · series by name, first axis the times, which are
+    times (N,) · error (N,) a bound on every component of q and the frame · series by name, first
+    axis the times, which are
     attributes too: those of the system that follow from attitude and velocity
     """
 
@@ -37,15 +38,18 @@ class ClosedFormStates:
         series = self.__dict__.get("series", {})
         if name in series:
             return np.asarray(series[name])
-        raise AttributeError(f"these states have no {name!r}; they have {', '.join(series)}{did_you_mean(name, series)}")
+        raise AttributeError(
+            f"these states have no {name!r}; they have "
+            f"{', '.join(series)}{did_you_mean(name, series)}"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.
 
-    ``document`` is JSON-ready. Where it was made with more digits than a double has, its numbers are strings. ``at`` evaluates it
-    without the engine that made it.
+    ``document`` is JSON-ready. Where it was made with more digits than a double has, its numbers
+    are strings. ``at`` evaluates it without the engine that made it.
     """
 
     document: Mapping[str, Any] = field(repr=False)
@@ -58,7 +62,10 @@ class ClosedForm:
 
     def __repr__(self) -> str:
         size = len(self.document["modes"])
-        return f"ClosedForm({self.system}, genus {self.genus}, {size} modes, {len(self.to_json()) / 1000:.0f} kB)"
+        return (
+            f"ClosedForm({self.system}, genus {self.genus}, {size} modes, "
+            f"{len(self.to_json()) / 1000:.0f} kB)"
+        )
 
     @property
     def system(self) -> str:
@@ -83,7 +90,16 @@ class ClosedForm:
     @cached_property
     def arrays(self) -> Mapping[str, Array]:
         """Return the numeric fields in double precision, by name."""
-        names = ("riemann_matrix", "phases", "frequencies", "rotation", "directions", "frozen", "coefficients", "A")
+        names = (
+            "riemann_matrix",
+            "phases",
+            "frequencies",
+            "rotation",
+            "directions",
+            "frozen",
+            "coefficients",
+            "A",
+        )
         found = {name: np.array(self.document[name], dtype=np.float64) for name in names}
         modes = np.array(self.document["modes"], dtype=np.float64).reshape(-1, self.genus)
         halves = np.array(self.document["characteristics"], dtype=np.float64)
@@ -92,11 +108,12 @@ class ClosedForm:
     def at(self, times: Any) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
-        Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve`` takes. Raises
-        InvalidInput for bad times. Accuracy: ``error`` of the states; tested
-        for genus 1…4 against the engine, |t| ≤ 10⁴, and to 10¹² for documents of 30 digits.
+        Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve``
+        takes. Raises InvalidInput for bad times. Accuracy: ``error`` of the states; tested for
+        genus 1…4 against the engine, |t| ≤ 10⁴, and to 10¹² for documents of 30 digits.
         """
-        grid, error = TimeGrid.of(times), self.document["error"]
+        grid = TimeGrid.of(times)
+        error = self.document["error"]
         bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
         series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
         if grid.places is not None:
@@ -106,11 +123,15 @@ class ClosedForm:
     def to_json(self, indent: int | None = None) -> str:
         """Return the document as JSON text."""
         separators = (",", ":") if indent is None else None
-        return json.dumps(self.document, ensure_ascii=False, allow_nan=False, indent=indent, separators=separators)
+        return json.dumps(
+            self.document, ensure_ascii=False, allow_nan=False, indent=indent, separators=separators
+        )
 
     @classmethod
     def from_json(cls, text: str | bytes) -> ClosedForm:
-        """Return the closed form of a JSON text; raises InvalidInput where it is none of this format."""
+        """Return the closed form of a JSON text; raises InvalidInput where it is none of this
+        format.
+        """
         try:
             document = json.loads(text)
         except (ValueError, RecursionError) as fault:
@@ -124,10 +145,12 @@ class ClosedForm:
         return latex(self.document, self.arrays, digits)
 
     def to_sympy(self) -> Mapping[str, Any]:
-        """Return the explicit formulas as SymPy expressions, by name; raises BackendMissing without sympy.
+        """Return the explicit formulas as SymPy expressions, by name; raises BackendMissing without
+        sympy.
 
-        ``theta_k``: the theta functions as finite sums in z_1 … z_g · ``q_i``, ``normal_i_k``, ``gamma_i``: their quotients
-        along the directions that move · ``time``: t as a function of the Neumann time ``tau_1`` · ``z_s``: the phases there
+        ``theta_k``: the theta functions as finite sums in z_1 … z_g · ``q_i``, ``normal_i_k``,
+        ``gamma_i``: their quotients along the directions that move · ``time``: t as a function of
+        the Neumann time ``tau_1`` · ``z_s``: the phases there
         """
         from veselova.mechanics.results.closed_form_formulas import expressions
 

@@ -1,4 +1,6 @@
-"""The evaluator of closed-form documents: inverse time map, phases, theta quotients, attitude. It uses NumPy alone."""
+"""The evaluator of closed-form documents: inverse time map, phases, theta quotients, attitude. It
+uses NumPy alone.
+"""
 
 from __future__ import annotations
 
@@ -25,18 +27,27 @@ _MOST_STEPS = 200
 
 
 def evaluate(
-    document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array, remainders: Array | None = None
+    document: Mapping[str, Any],
+    arrays: Mapping[str, Array],
+    times: Array,
+    remainders: Array | None = None,
 ) -> dict[str, Array]:
     """Return the series of a document at times (N,), or at times + remainders, by name."""
     tau1, z = neumann_time(document, arrays, times, remainders)
-    values = np.concatenate([lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)])
+    values = np.concatenate(
+        [lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)]
+    )
     quotients = values / values[:, :1]
 
     def entries(pairs: Any) -> Array:
         places = np.array([place for place, _ in pairs])
-        return np.asarray(quotients[:, places] * np.array([float(constant) for _, constant in pairs]))
+        return np.asarray(
+            quotients[:, places] * np.array([float(constant) for _, constant in pairs])
+        )
 
-    normals = np.stack([entries(column) for column in [*document["normals"], document["gamma"]]], axis=2)
+    normals = np.stack(
+        [entries(column) for column in [*document["normals"], document["gamma"]]], axis=2
+    )
     directions = arrays["directions"]
     frame = np.empty((len(times), len(directions), len(directions)))
     frame[:, :, 0] = entries(document["q"]) @ directions.T
@@ -48,8 +59,12 @@ def evaluate(
     return _series(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
 
 
-def _series(document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array) -> dict[str, Array]:
-    """Return the series under the names of the system; ``velocity`` is that of q in the system's own time."""
+def _series(
+    document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array
+) -> dict[str, Array]:
+    """Return the series under the names of the system; ``velocity`` is that of q in the system's
+    own time.
+    """
     axes = document.get("axes")
     q = frame[:, :, 0]
     if document["problem"]["system"] == "ellipsoid-geodesic":
@@ -57,7 +72,8 @@ def _series(document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, ve
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
     if axes is not None:
         matrix = np.array(axes, dtype=np.float64)
-        frame, velocity = matrix @ frame, velocity @ matrix.T
+        frame = matrix @ frame
+        velocity = velocity @ matrix.T
         q = frame[:, :, 0]
     if document["problem"]["system"] == "neumann":
         return {"q": q, "q_prime": velocity, "frame": frame}
@@ -71,14 +87,20 @@ def _rows(count: int, block: int) -> list[slice]:
 
 
 def neumann_time(
-    document: Mapping[str, Any], arrays: Mapping[str, Array], times: Array, remainders: Array | None = None
+    document: Mapping[str, Any],
+    arrays: Mapping[str, Array],
+    times: Array,
+    remainders: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return τ₁ (N,) and the phases z modulo 2, (N, g).
 
-    With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰ + (f/F_0)t + fδ. The left
-    side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals where the document has more digits than a double.
+    With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰
+    + (f/F_0)t + fδ. The left side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals
+    where the document has more digits than a double.
     """
-    f, modes, mean = arrays["frequencies"], arrays["modes"], float(document["mean_rate"])
+    f = arrays["frequencies"]
+    modes = arrays["modes"]
+    mean = float(document["mean_rate"])
     advance = _uniform_advance(document, f / mean, times)
     if remainders is not None:
         advance += remainders[:, None] * (f / mean)
@@ -95,30 +117,40 @@ def _uniform_advance(document: Mapping[str, Any], rates: Array, times: Array) ->
         return np.asarray(np.fmod(times[:, None] * rates, 2.0))
     mean = Fraction(document["mean_rate"])
     exact = [Fraction(rate) / mean for rate in document["frequencies"]]
-    return np.array([[float(rate * Fraction(time) % 2) for rate in exact] for time in times.tolist()])
+    return np.array(
+        [[float(rate * Fraction(time) % 2) for rate in exact] for time in times.tolist()]
+    )
 
 
 def _solve_delta(arrays: Mapping[str, Array], mean: float, advance: Array) -> Array:
     """Return δ for each row of the uniform advance, by Newton's method inside a bracket."""
-    f, modes, coefficients = arrays["frequencies"], arrays["modes"], arrays["coefficients"]
+    f = arrays["frequencies"]
+    modes = arrays["modes"]
+    coefficients = arrays["coefficients"]
     pace = np.pi * (modes @ f)
     offset = 2 * np.pi * np.mod(modes @ arrays["phases"], 1.0)
     uniform = np.pi * (advance @ modes.T)
 
     def excess(delta: Array) -> tuple[Array, Array]:
-        # sin 2πm·z − sin 2πm·z⁰ = 2 cos(2πm·z⁰ + h) sin h, h = πm·(z−z⁰): nothing cancels where the advance is small.
+        # sin 2πm·z − sin 2πm·z⁰ = 2 cos(2πm·z⁰ + h) sin h, h = πm·(z−z⁰): nothing cancels where the
+        # advance is small.
         h = uniform + delta[:, None] * pace
-        cosine, sine = np.cos(offset + h), np.sin(h)
+        cosine = np.cos(offset + h)
+        sine = np.sin(h)
         value = mean * delta + (cosine * sine) @ (2 * coefficients / pace)
         slope = mean + np.cos(offset + 2 * h) @ (2 * coefficients)
         return value, slope
 
     low = np.full(len(advance), -2 * float(np.sum(np.abs(coefficients / pace))) / mean)
-    high, delta = -low, np.zeros(len(advance))
-    smallest = 4 * np.finfo(float).eps * max(float(high.max(initial=0.0)), 1.0 / float(np.max(np.abs(f))))
+    high = -low
+    delta = np.zeros(len(advance))
+    smallest = (
+        4 * np.finfo(float).eps * max(float(high.max(initial=0.0)), 1.0 / float(np.max(np.abs(f))))
+    )
     for _ in range(_MOST_STEPS):
         value, slope = excess(delta)
-        low, high = np.where(value <= 0, delta, low), np.where(value >= 0, delta, high)
+        low = np.where(value <= 0, delta, low)
+        high = np.where(value >= 0, delta, high)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = delta - value / slope
         inside = (step >= low) & (step <= high) & (slope > 0)
@@ -131,17 +163,25 @@ def _solve_delta(arrays: Mapping[str, Array], mean: float, advance: Array) -> Ar
 
 
 def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Array) -> Array:
-    """Return the theta functions of a document at phases (N, g), up to a factor that all have in common, (N, K).
+    """Return the theta functions of a document at phases (N, g), up to a factor that all have in
+    common, (N, K).
 
-    θ[ε;δ](z) = Σ_{m∈Z^g} exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ). Where T has a small eigenvalue the document names a ``basis``
-    and its ``waves`` F: Poisson summation over the other coordinates G turns their waves into Gaussians. With y = U(z+δ),
-    C = T_FG T_GG⁻¹ and S = T_FF − C T_GF, all in that basis, the sum is, but for a factor,
+    θ[ε;δ](z) = Σ_{m∈Z^g} exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ). Where T has a small eigenvalue the
+    document names a ``basis`` and its ``waves`` F: Poisson summation over the other coordinates G
+    turns their waves into Gaussians. With y = U(z+δ), C = T_FG T_GG⁻¹ and S = T_FF − C T_GF, all in
+    that basis, the sum is, but for a factor,
 
-        Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} exp(−π xᵀSx − π dᵀT_GG⁻¹d) cos 2π[x·(y_F + Cd) + k·ε_G],   d = k − y_G.
+        Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} exp(−π xᵀSx − π dᵀT_GG⁻¹d) cos 2π[x·(y_F + Cd) + k·ε_G],   d = k −
+        y_G.
     """
-    T, genus = arrays["riemann_matrix"], int(document["genus"])
-    reduction = document.get("reduction") or {"basis": np.eye(genus).tolist(), "waves": list(range(genus))}
-    U, F = np.array(reduction["basis"], dtype=np.float64), list(reduction["waves"])
+    T = arrays["riemann_matrix"]
+    genus = int(document["genus"])
+    reduction = document.get("reduction") or {
+        "basis": np.eye(genus).tolist(),
+        "waves": list(range(genus)),
+    }
+    U = np.array(reduction["basis"], dtype=np.float64)
+    F = list(reduction["waves"])
     G = [i for i in range(genus) if i not in F]
     form = U @ T @ U.T
     inverse: Array = np.asarray(np.linalg.inv(form[np.ix_(G, G)]), dtype=np.float64)
@@ -164,16 +204,22 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
 
 
 def lattice_within(form: Array, shift: Array, margin: float) -> Array:
-    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ 39, (X, d), and those within it of some point of |r_i| ≤ margin."""
+    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ 39, (X, d), and those within it of some
+    point of |r_i| ≤ margin.
+    """
     if not len(form):
         return np.zeros((1, 0))
     shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
     widths = np.sqrt(_RADIUS**2 + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
-    ranges = [np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s for w, s in zip(widths, shift, strict=True)]
+    ranges = [
+        np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s
+        for w, s in zip(widths, shift, strict=True)
+    ]
     points = np.array(list(itertools.product(*ranges)))
     # A point of the cell is at most as far as its corner of largest norm.
     corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
     margins = np.sqrt(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
     norms = np.einsum("xi,ij,xj->x", points, form, points)
-    # The largest term of a characteristic is that of its shortest vector, which is long where a cut is nearly closed.
+    # The largest term of a characteristic is that of its shortest vector, which is long where a cut
+    # is nearly closed.
     return np.asarray(points[np.sqrt(norms) <= np.sqrt(_RADIUS**2 + norms.min()) + margins])

@@ -1,4 +1,6 @@
-"""The explicit formulas of one motion, from its closed-form document: in LaTeX, and as SymPy expressions."""
+"""The explicit formulas of one motion, from its closed-form document: in LaTeX, and as SymPy
+expressions.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ _MOST_TERMS = 20_000
 
 def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int) -> str:
     """Return the formulas of a document as an ``aligned`` block, numbers to so many digits."""
-    g, names = int(document["genus"]), {"t": "t", "s": "s", "tau1": r"\tau"}
+    g = int(document["genus"])
+    names = {"t": "t", "s": "s", "tau1": r"\tau"}
     number = _Numbers(digits)
     theta = [_function(halves) for halves in document["characteristics"]]
     lines = [
@@ -33,17 +36,25 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
         rf"\qquad T = {number.matrix(document['riemann_matrix'])}"
     ]
     phases = zip(document["phases"], document["frequencies"], strict=True)
-    lines += [rf"z_{s} &= {number(z0)} {number.signed(f)}\,\tau_1" for s, (z0, f) in enumerate(phases, 1)]
+    lines += [
+        rf"z_{s} &= {number(z0)} {number.signed(f)}\,\tau_1" for s, (z0, f) in enumerate(phases, 1)
+    ]
     lines.append(_time_map(document, names[document["time"]], number))
     lines += [_quotient(f"x_{i}", pair, theta, number) for i, pair in enumerate(document["q"], 1)]
     for k, column in enumerate(document["normals"], 2):
-        lines += [_quotient(f"(n_{k})_{i}", pair, theta, number) for i, pair in enumerate(column, 1)]
-    lines += [_quotient(rf"\gamma_{i}", pair, theta, number) for i, pair in enumerate(document["gamma"], 1)]
+        lines += [
+            _quotient(f"(n_{k})_{i}", pair, theta, number) for i, pair in enumerate(column, 1)
+        ]
+    lines += [
+        _quotient(rf"\gamma_{i}", pair, theta, number)
+        for i, pair in enumerate(document["gamma"], 1)
+    ]
     lines.append(rf"q &= D x,\qquad D = {number.matrix(document['directions'])}")
     normals = "".join(f"n_{k}," for k in range(2, g + 1))
     frozen = f" + {number.matrix(document['frozen'])}" if np.any(arrays["frozen"]) else ""
     lines.append(
-        rf"(e_2,\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = {number.matrix(document['rotation'])}"
+        rf"(e_2,\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = "
+        rf"{number.matrix(document['rotation'])}"
     )
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
@@ -67,7 +78,11 @@ class _Numbers:
 
     def matrix(self, rows: Sequence[Sequence[Any]]) -> str:
         """Return a matrix in brackets."""
-        return r"\begin{pmatrix}" + r"\\".join("&".join(self(x) for x in row) for row in rows) + r"\end{pmatrix}"
+        return (
+            r"\begin{pmatrix}"
+            + r"\\".join("&".join(self(x) for x in row) for row in rows)
+            + r"\end{pmatrix}"
+        )
 
 
 def _function(halves: Sequence[Sequence[float]]) -> str:
@@ -80,18 +95,22 @@ def _quotient(name: str, pair: Sequence[Any], theta: Sequence[str], number: _Num
 
 
 def _time_map(document: Mapping[str, Any], time: str, number: _Numbers) -> str:
-    modes, coefficients = document["modes"], document["coefficients"]
+    modes = document["modes"]
+    coefficients = document["coefficients"]
     line = rf"{time} &= {number(document['mean_rate'])}\,\tau_1"
     for mode, value in list(zip(modes, coefficients, strict=True))[:_SHOWN_MODES]:
         combination = _combination(mode)
         rate = float(np.dot(mode, np.array(document["frequencies"], dtype=float)))
         sine = rf"\sin 2\pi({combination})"
-        line += rf" {number.signed(float(value) / (np.pi * rate))}\,\left[{sine}\right]_{{0}}^{{\tau_1}}"
+        factor = number.signed(float(value) / (np.pi * rate))
+        line += rf" {factor}\,\left[{sine}\right]_{{0}}^{{\tau_1}}"
     return line + (r" + \cdots" if len(modes) > _SHOWN_MODES else "")
 
 
 def _combination(mode: Sequence[int]) -> str:
-    terms = [f"{m:+d}z_{s}".replace("+1z", "+z").replace("-1z", "-z") for s, m in enumerate(mode, 1) if m]
+    terms = [
+        f"{m:+d}z_{s}".replace("+1z", "+z").replace("-1z", "-z") for s, m in enumerate(mode, 1) if m
+    ]
     return "".join(terms).lstrip("+")
 
 
@@ -102,13 +121,18 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
     except ImportError:
         raise BackendMissing("sympy", "formulas as expressions", "pip install sympy") from None
     if document.get("reduction"):
-        raise Unsolved("too-many-terms", "beside a separatrix the plain theta series cancels; evaluate the document by ``at``")
+        raise Unsolved(
+            "too-many-terms",
+            "beside a separatrix the plain theta series cancels; evaluate the document by ``at``",
+        )
     g = int(document["genus"])
     T = arrays["riemann_matrix"]
     supports = [lattice_within(T, halves[0], 0.0) for halves in arrays["characteristics"]]
     terms = sum(len(points) for points in supports) + len(document["modes"])
     if terms > _MOST_TERMS:
-        raise Unsolved("too-many-terms", f"{terms} terms, and expressions are made of at most {_MOST_TERMS}")
+        raise Unsolved(
+            "too-many-terms", f"{terms} terms, and expressions are made of at most {_MOST_TERMS}"
+        )
     z = sympy.symbols(f"z_1:{g + 1}", real=True)
     tau = sympy.Symbol("tau_1", real=True)
     found: dict[str, Any] = {}
@@ -118,7 +142,10 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
         shifted = [zs + sympy.Rational(int(2 * d), 2) for zs, d in zip(z, delta, strict=True)]
         halves = [[sympy.Rational(int(2 * x), 2) for x in point] for point in points]
         found[f"theta_{j}"] = sympy.Add(
-            *(w * sympy.cos(2 * sympy.pi * _dot(half, shifted)) for (_, w), half in zip(rows, halves, strict=True))
+            *(
+                w * sympy.cos(2 * sympy.pi * _dot(half, shifted))
+                for (_, w), half in zip(rows, halves, strict=True)
+            )
         )
     for i, (place, constant) in enumerate(document["q"], 1):
         found[f"q_{i}"] = float(constant) * found[f"theta_{place}"] / found["theta_0"]
@@ -126,7 +153,8 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
         for i, (place, constant) in enumerate(column, 1):
             name = f"gamma_{i}" if k == g + 1 else f"normal_{k}_{i}"
             found[name] = float(constant) * found[f"theta_{place}"] / found["theta_0"]
-    starts, rates = arrays["phases"].tolist(), arrays["frequencies"].tolist()
+    starts = arrays["phases"].tolist()
+    rates = arrays["frequencies"].tolist()
     line = [start + rate * tau for start, rate in zip(starts, rates, strict=True)]
     found |= {f"z_{s}": phase for s, phase in enumerate(line, 1)}
     time = float(document["mean_rate"]) * tau

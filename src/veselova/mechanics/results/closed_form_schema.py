@@ -1,4 +1,6 @@
-"""What a closed-form document must hold, as a JSON schema and as checks that say what is missing."""
+"""What a closed-form document must hold, as a JSON schema and as checks that say what
+is missing.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,10 @@ __all__ = ["FORMAT", "SCHEMA", "require_document"]
 FORMAT = "veselova.closed-form/1"
 
 _NUMBER: dict[str, Any] = {
-    "oneOf": [{"type": "number"}, {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"}]
+    "oneOf": [
+        {"type": "number"},
+        {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"},
+    ]
 }
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
@@ -34,10 +39,16 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "version": ({"type": "string"}, "the version of veselova that made the document"),
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
     "time": ({"enum": ["t", "s", "tau1"]}, "the independent variable"),
-    "digits": ({"type": "integer", "minimum": 15}, "significant digits of the numbers; above 15 they are strings"),
+    "digits": (
+        {"type": "integer", "minimum": 15},
+        "significant digits of the numbers; above 15 they are strings",
+    ),
     "genus": ({"type": "integer", "minimum": 1}, "g, the number of phases"),
     "A": (_VECTOR, "A_1 … A_n along the principal axes"),
-    "axes": ({"anyOf": [_MATRIX, {"type": "null"}]}, "the principal axes as columns, where A was a matrix"),
+    "axes": (
+        {"anyOf": [_MATRIX, {"type": "null"}]},
+        "the principal axes as columns, where A was a matrix",
+    ),
     "riemann_matrix": (_MATRIX, "T, g × g; the Riemann matrix is iT"),
     "reduction": (
         {
@@ -45,7 +56,10 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
                 {
                     "type": "object",
                     "required": ["basis", "waves"],
-                    "properties": {"basis": {"type": "array", "items": _INTEGERS}, "waves": _INTEGERS},
+                    "properties": {
+                        "basis": {"type": "array", "items": _INTEGERS},
+                        "waves": _INTEGERS,
+                    },
                 },
                 {"type": "null"},
             ]
@@ -53,12 +67,18 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
         "basis U and waves F of the theta sums, where T has a small eigenvalue",
     ),
     "characteristics": (
-        {"type": "array", "items": {"type": "array", "items": _HALVES, "minItems": 2, "maxItems": 2}},
+        {
+            "type": "array",
+            "items": {"type": "array", "items": _HALVES, "minItems": 2, "maxItems": 2},
+        },
         "[ε, δ] of each theta function; the first is the denominator",
     ),
     "q": (_PAIRS, "[index of characteristic, κ] of q along each direction that moves"),
     "q_prime": (_PAIRS, "the same of (q', n_k), k = 2 … g, and (q', γ)"),
-    "normals": ({"type": "array", "items": _PAIRS}, "the same of n_2 … n_g along the directions that move"),
+    "normals": (
+        {"type": "array", "items": _PAIRS},
+        "the same of n_2 … n_g along the directions that move",
+    ),
     "gamma": (_PAIRS, "the same of γ"),
     "phases": (_VECTOR, "z⁰ in cycles"),
     "frequencies": (_VECTOR, "f in cycles per unit of τ₁"),
@@ -72,14 +92,19 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
         {
             "type": "object",
             "required": ["characteristic", "constant", "power"],
-            "properties": {"characteristic": {"type": "integer"}, "constant": _NUMBER, "power": {"enum": [-2, 0, 1]}},
+            "properties": {
+                "characteristic": {"type": "integer"},
+                "constant": _NUMBER,
+                "power": {"enum": [-2, 0, 1]},
+            },
         },
         "d(time)/dτ₁ = constant·|θ[characteristic]/θ|^power",
     ),
     "units": ({"type": "object"}, "the units of times, lengths and phases"),
     "error": (
         {"type": "object", "required": ["at_start", "per_unit_time", "per_cycle"]},
-        "the bound at_start + per_unit_time·|t| on q and frame; per_cycle is per cycle of the fastest phase",
+        "the bound at_start + per_unit_time·|t| on q and frame; per_cycle is per cycle of "
+        "the fastest phase",
     ),
 }
 
@@ -88,27 +113,43 @@ SCHEMA: dict[str, Any] = {
     "title": "A motion in closed form",
     "type": "object",
     "required": list(_FIELDS),
-    "properties": {name: {**schema, "description": text} for name, (schema, text) in _FIELDS.items()},
+    "properties": {
+        name: {**schema, "description": text} for name, (schema, text) in _FIELDS.items()
+    },
 }
 
 
 def require_document(document: Any) -> None:
-    """Raise InvalidInput unless the value has every field of the format with numbers of the right shapes."""
+    """Raise InvalidInput unless the value has every field of the format with numbers of the right
+    shapes.
+    """
     if not isinstance(document, Mapping):
         raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
     if document.get("format") != FORMAT:
         raise InvalidInput(("document", "format"), FORMAT, show(document.get("format")))
     missing = [name for name in _FIELDS if name not in document]
     if missing:
-        raise InvalidInput(("document",), f"the fields {', '.join(missing)} too", f"only {', '.join(map(str, document))}"[:200])
+        raise InvalidInput(
+            ("document",),
+            f"the fields {', '.join(missing)} too",
+            f"only {', '.join(map(str, document))}"[:200],
+        )
     problem = document["problem"]
     if not isinstance(problem, Mapping) or not isinstance(problem.get("system"), str):
-        raise InvalidInput(("document", "problem"), "an object with the field system", show(problem))
+        raise InvalidInput(
+            ("document", "problem"), "an object with the field system", show(problem)
+        )
     g = document["genus"]
     if isinstance(g, bool) or not isinstance(g, int) or g < 1:
         raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
-    if isinstance(document["digits"], bool) or not isinstance(document["digits"], int) or document["digits"] < 15:
-        raise InvalidInput(("document", "digits"), "a whole number of at least 15", show(document["digits"]))
+    if (
+        isinstance(document["digits"], bool)
+        or not isinstance(document["digits"], int)
+        or document["digits"] < 15
+    ):
+        raise InvalidInput(
+            ("document", "digits"), "a whole number of at least 15", show(document["digits"])
+        )
     _require_shapes(document, g)
 
 
@@ -118,9 +159,17 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     count = _length(document, "modes", None)
     functions = _length(document, "characteristics", None)
     shapes: dict[str, tuple[int, ...]] = {
-        "riemann_matrix": (g, g), "phases": (g,), "frequencies": (g,), "rotation": (g, n - 1), "directions": (n, g + 1),
-        "frozen": (n, n - 1), "A": (n,), "coefficients": (count,), "characteristics": (functions, 2, g), "modes": (count, g),
-    }  # fmt: skip
+        "riemann_matrix": (g, g),
+        "phases": (g,),
+        "frequencies": (g,),
+        "rotation": (g, n - 1),
+        "directions": (n, g + 1),
+        "frozen": (n, n - 1),
+        "A": (n,),
+        "coefficients": (count,),
+        "characteristics": (functions, 2, g),
+        "modes": (count, g),
+    }
     for name, shape in shapes.items():
         _require_numbers((name,), document[name], shape)
     _require_numbers(("mean_rate",), document["mean_rate"], ())
@@ -128,7 +177,11 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         _require_numbers(("axes",), document["axes"], (n, n))
     least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
     if not least > 0:
-        raise InvalidInput(("document", "riemann_matrix"), "a positive definite matrix", f"least eigenvalue {least:.3g}")
+        raise InvalidInput(
+            ("document", "riemann_matrix"),
+            "a positive definite matrix",
+            f"least eigenvalue {least:.3g}",
+        )
     if document["reduction"] is not None:
         _require_reduction(document["reduction"], g)
     for name, length in (("q", g + 1), ("q_prime", g), ("gamma", g + 1)):
@@ -136,45 +189,81 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     if _length(document, "normals", g - 1):
         for k, column in enumerate(document["normals"]):
             _require_pairs(("normals", k), column, g + 1, functions)
-    for name, keys in (("rate", ("characteristic", "constant", "power")), ("error", ("at_start", "per_unit_time"))):
+    for name, keys in (
+        ("rate", ("characteristic", "constant", "power")),
+        ("error", ("at_start", "per_unit_time")),
+    ):
         for key in keys:
             inner = document[name]
-            _require_numbers((name, key), inner.get(key) if isinstance(inner, Mapping) else None, ())
+            _require_numbers(
+                (name, key), inner.get(key) if isinstance(inner, Mapping) else None, ()
+            )
     place = document["rate"]["characteristic"]
     if not isinstance(place, int) or not 0 <= place < functions:
-        raise InvalidInput(("document", "rate", "characteristic"), f"an index below {functions}", show(place))
+        raise InvalidInput(
+            ("document", "rate", "characteristic"), f"an index below {functions}", show(place)
+        )
 
 
 def _require_reduction(reduction: Any, g: int) -> None:
-    """Raise InvalidInput unless the basis is a matrix of whole numbers of determinant ±1 and the waves are some of its rows."""
+    """Raise InvalidInput unless the basis is a matrix of whole numbers of determinant ±1 and the
+    waves are some of its rows.
+    """
     basis = reduction.get("basis") if isinstance(reduction, Mapping) else None
     _require_numbers(("reduction", "basis"), basis, (g, g))
     matrix = np.array(basis, dtype=float)
     if np.any(matrix != np.rint(matrix)) or abs(abs(np.linalg.det(matrix)) - 1) > 1e-6:
-        raise InvalidInput(("document", "reduction", "basis"), "whole numbers with determinant 1 or −1", show(basis))
+        raise InvalidInput(
+            ("document", "reduction", "basis"),
+            "whole numbers with determinant 1 or −1",
+            show(basis),
+        )
     waves = reduction.get("waves")
-    if not isinstance(waves, list) or not all(isinstance(i, int) and 0 <= i < g for i in waves) or len(set(waves)) < len(waves):
-        raise InvalidInput(("document", "reduction", "waves"), f"different whole numbers from 0 to {g - 1}", show(waves))
+    if (
+        not isinstance(waves, list)
+        or not all(isinstance(i, int) and 0 <= i < g for i in waves)
+        or len(set(waves)) < len(waves)
+    ):
+        raise InvalidInput(
+            ("document", "reduction", "waves"),
+            f"different whole numbers from 0 to {g - 1}",
+            show(waves),
+        )
 
 
 def _length(document: Mapping[str, Any], name: str, wanted: int | None) -> int:
     value = document[name]
     if not isinstance(value, list) or (wanted is not None and len(value) != wanted):
-        raise InvalidInput(("document", name), "a list" + (f" of length {wanted}" if wanted is not None else ""), show(value))
+        raise InvalidInput(
+            ("document", name),
+            "a list" + (f" of length {wanted}" if wanted is not None else ""),
+            show(value),
+        )
     return len(value)
 
 
 def _require_pairs(path: tuple[str | int, ...], value: Any, length: int, functions: int) -> None:
     if not isinstance(value, list) or len(value) != length:
-        raise InvalidInput(("document", *path), f"a list of {length} pairs [index, constant]", show(value))
+        raise InvalidInput(
+            ("document", *path), f"a list of {length} pairs [index, constant]", show(value)
+        )
     for i, pair in enumerate(value):
-        if not isinstance(pair, list) or len(pair) != 2 or not isinstance(pair[0], int) or not 0 <= pair[0] < functions:
-            raise InvalidInput(("document", *path, i), f"a pair [index below {functions}, constant]", show(pair))
+        if (
+            not isinstance(pair, list)
+            or len(pair) != 2
+            or not isinstance(pair[0], int)
+            or not 0 <= pair[0] < functions
+        ):
+            raise InvalidInput(
+                ("document", *path, i), f"a pair [index below {functions}, constant]", show(pair)
+            )
         _require_numbers((*path, i, 1), pair[1], ())
 
 
 def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, ...]) -> None:
-    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or strings of them."""
+    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or
+    strings of them.
+    """
     if shape:
         if not isinstance(value, list) or len(value) != shape[0]:
             raise InvalidInput(("document", *path), f"a list of length {shape[0]}", show(value))
@@ -182,7 +271,11 @@ def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, 
             _require_numbers((*path, i), item, shape[1:])
         return
     try:
-        number = float(value) if isinstance(value, (int, float, str)) and not isinstance(value, bool) else float("nan")
+        number = (
+            float(value)
+            if isinstance(value, (int, float, str)) and not isinstance(value, bool)
+            else float("nan")
+        )
     except (ValueError, OverflowError):
         number = float("nan")
     if not abs(number) < float("inf"):

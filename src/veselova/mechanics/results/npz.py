@@ -16,9 +16,11 @@ from veselova.mechanics.results.table import row_blocks
 __all__ = ["decimal_arrays", "read_decimals", "write_archive"]
 
 #: Suffixes of the decimals of a series, and of their radii.
-_DECIMAL, _RADIUS = "decimal", "radius"
+_DECIMAL = "decimal"
+_RADIUS = "radius"
 
-#: Level of compression: the mantissas of a motion are noise to it, and more costs seconds and saves nothing.
+#: Level of compression: the mantissas of a motion are noise to it, and more costs seconds and saves
+#: nothing.
 _LEVEL = 1
 
 
@@ -31,8 +33,14 @@ def write_archive(stream: BinaryIO, arrays: Iterable[tuple[str, NDArray[Any]]]) 
 
 
 def _write_array(member: Any, array: NDArray[Any]) -> None:
-    """Write an array in NumPy's own format, a block at a time: numpy.lib.format would copy what is not contiguous."""
-    header = {"descr": np.lib.format.dtype_to_descr(array.dtype), "fortran_order": False, "shape": array.shape}
+    """Write an array in NumPy's own format, a block at a time: numpy.lib.format would copy what is
+    not contiguous.
+    """
+    header = {
+        "descr": np.lib.format.dtype_to_descr(array.dtype),
+        "fortran_order": False,
+        "shape": array.shape,
+    }
     np.lib.format.write_array_header_1_0(member, header)
     if array.ndim == 0:
         member.write(array.tobytes())
@@ -42,16 +50,24 @@ def _write_array(member: Any, array: NDArray[Any]) -> None:
 
 
 def decimal_arrays(name: str, decimals: Decimals) -> Mapping[str, NDArray[Any]]:
-    """Return the decimals of a series and their radii, as texts by the names that an archive has for them."""
-    midpoints, radii = decimals.midpoints[name], decimals.radii[name]
+    """Return the decimals of a series and their radii, as texts by the names that an archive has
+    for them.
+    """
+    midpoints = decimals.midpoints[name]
+    radii = decimals.radii[name]
     return {f"{name}_{_DECIMAL}": midpoints.astype(str), f"{name}_{_RADIUS}": radii.astype(str)}
 
 
-def read_decimals(problem: Problem, archive: Mapping[str, Any], digits: int, certified: bool) -> Decimals | None:
-    """Return the decimals of an open archive, None where it has doubles alone. Raises KeyError where some are missing."""
+def read_decimals(
+    problem: Problem, archive: Mapping[str, Any], digits: int, certified: bool
+) -> Decimals | None:
+    """Return the decimals of an open archive, None where it has doubles alone. Raises KeyError
+    where some are missing.
+    """
     if f"{next(iter(problem.outputs))}_{_DECIMAL}" not in archive:
         return None
     midpoints, radii = (
-        {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs} for kind in (_DECIMAL, _RADIUS)
+        {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs}
+        for kind in (_DECIMAL, _RADIUS)
     )
     return Decimals(digits, certified, midpoints, radii, problem.bounded)

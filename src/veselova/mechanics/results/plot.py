@@ -1,4 +1,6 @@
-"""Pictures of a motion. The one place that knows matplotlib, imported when a picture is asked for."""
+"""Pictures of a motion. The one place that knows matplotlib, imported when a picture
+is asked for.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ __all__ = ["Portrayable", "picture"]
 
 Array = NDArray[np.float64]
 
-#: One colour per body axis or coordinate, told apart in print and by colour-blind readers (Okabe and Ito).
+#: One colour per body axis or coordinate, told apart in print and by colour-blind readers (Okabe
+#: and Ito).
 _COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"]
 
 #: Differences of zero are drawn at the bottom of the logarithmic axis.
@@ -57,16 +60,18 @@ def picture(
 ) -> Figure:
     """Return the picture of a motion.
 
-    First the series that the problem calls its portrait: a curve on the sphere with the frame axes at a few times where it has
-    three components, else the components. Then the spheroconic coordinates, or where there are none the drift of the integrals.
-    For a comparison: the ``differences`` of each output, the ``errors`` of each engine and the conditioning ``floor``, (N,) each,
-    on a logarithmic axis.
+    First the series that the problem calls its portrait: a curve on the sphere with the frame axes
+    at a few times where it has three components, else the components. Then the spheroconic
+    coordinates, or where there are none the drift of the integrals.
+    For a comparison: the ``differences`` of each output, the ``errors`` of each engine and the
+    conditioning ``floor``, (N,) each, on a logarithmic axis.
     """
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    rows, problem = 2 if differences is None else 3, motion.problem
+    rows = 2 if differences is None else 3
+    problem = motion.problem
     figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
     portrait = motion.series(problem.portrait).reshape(motion.times.size, -1)
     if portrait.shape[1] == 3:
@@ -75,10 +80,18 @@ def picture(
         axes = [figure.add_subplot(grid[row]) for row in range(1, rows)]
     else:
         axes = list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
-        _draw_lines(axes[0], motion.times, portrait, problem.portrait, f"components of {problem.portrait}")
+        _draw_lines(
+            axes[0], motion.times, portrait, problem.portrait, f"components of {problem.portrait}"
+        )
         axes = axes[1:]
     if "spheroconic" in problem.outputs:
-        _draw_lines(axes[0], motion.times, motion.series("spheroconic"), r"\lambda", "spheroconic coordinates")
+        _draw_lines(
+            axes[0],
+            motion.times,
+            motion.series("spheroconic"),
+            r"\lambda",
+            "spheroconic coordinates",
+        )
     else:
         _draw_drift(axes[0], motion)
     if differences is not None:
@@ -90,27 +103,45 @@ def picture(
 
 def _draw_drift(axes: Axes, motion: Portrayable) -> None:
     for i, (name, values) in enumerate(motion.integrals.items()):
-        change = np.max(np.abs(values - values[:1]).reshape(values.shape[0], -1), axis=1, initial=0.0)
-        axes.semilogy(motion.times, np.maximum(change, _LEAST_DRAWN), color=_COLOURS[i % len(_COLOURS)], linewidth=1, label=name)
+        change = np.max(
+            np.abs(values - values[:1]).reshape(values.shape[0], -1), axis=1, initial=0.0
+        )
+        axes.semilogy(
+            motion.times,
+            np.maximum(change, _LEAST_DRAWN),
+            color=_COLOURS[i % len(_COLOURS)],
+            linewidth=1,
+            label=name,
+        )
     axes.set_ylabel("change of the integrals")
     axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)
 
 
 def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) -> None:
     for i in range(values.shape[1]):
-        axes.plot(times, values[:, i], color=_COLOURS[i % len(_COLOURS)], linewidth=1.1, label=f"${symbol}_{{{i + 1}}}$")
+        axes.plot(
+            times,
+            values[:, i],
+            color=_COLOURS[i % len(_COLOURS)],
+            linewidth=1.1,
+            label=f"${symbol}_{{{i + 1}}}$",
+        )
     axes.set_ylabel(label)
     axes.legend(loc="upper right", ncols=min(8, values.shape[1]), fontsize="small", framealpha=0.9)
 
 
 def _draw_sphere(axes: Any, motion: Portrayable) -> None:
-    """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six times, standing on the curve."""
+    """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six
+    times, standing on the curve.
+    """
     latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
     name = motion.problem.portrait
     curve = motion.series(name).reshape(-1, 3)
     radii = motion.problem.semiaxes
     a, b, c = np.full(3, np.max(np.linalg.norm(curve, axis=1))) if radii is None else radii
-    x, y, z = np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)
+    x = np.sin(latitude) * np.cos(longitude)
+    y = np.sin(latitude) * np.sin(longitude)
+    z = np.cos(latitude)
     axes.plot_wireframe(a * x, b * y, c * z, color="0.85", linewidth=0.4)
     axes.plot(*curve.T, color=_COLOURS[0], linewidth=1.2)
     title = f"{name}({motion.problem.time})"
@@ -135,9 +166,13 @@ def _draw_difference(
     floor: Array | None,
 ) -> None:
     for (name, values), colour in zip(differences.items(), _COLOURS, strict=False):
-        axes.semilogy(times, np.maximum(values, _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|")
+        axes.semilogy(
+            times, np.maximum(values, _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|"
+        )
     for (name, values), style in zip(errors.items(), ("--", ":"), strict=False):
-        axes.semilogy(times, values, color="0.4", linestyle=style, linewidth=1, label=f"error, {name}")
+        axes.semilogy(
+            times, values, color="0.4", linestyle=style, linewidth=1, label=f"error, {name}"
+        )
     if floor is not None:
         axes.semilogy(times, floor, color="0.7", linewidth=1, label="conditioning floor")
     axes.set_ylabel("difference of engines")

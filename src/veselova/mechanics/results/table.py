@@ -1,4 +1,6 @@
-"""The flat table of a trajectory, one row per time, and the files that hold it: CSV, Parquet, Arrow."""
+"""The flat table of a trajectory, one row per time, and the files that hold it: CSV, Parquet,
+Arrow.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +24,25 @@ Columns: TypeAlias = Mapping[str, NDArray[Any]]
 Target: TypeAlias = "str | Path | BinaryIO"
 
 #: Numbers that are turned into text, and into rows of a binary table, at a time.
-_TEXT_BLOCK, _BINARY_BLOCK = 1 << 19, 1 << 22
+_TEXT_BLOCK = 1 << 19
+_BINARY_BLOCK = 1 << 22
 
 
 def row_blocks(rows: int, width: int, numbers: int = _TEXT_BLOCK) -> Iterator[slice]:
-    """Return slices that cut a table of so many rows and columns into blocks of about so many numbers."""
+    """Return slices that cut a table of so many rows and columns into blocks of about so many
+    numbers.
+    """
     step = max(1, numbers // max(width, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
 
 def flat_columns(name: str, values: NDArray[Any]) -> Columns:
-    """Return the components of a series (first axis the times) as columns named like ``frame_1_2``, from 1."""
+    """Return the components of a series (first axis the times) as columns named like ``frame_1_2``,
+    from 1.
+    """
     return {
-        "_".join([name, *(str(i + 1) for i in index)]): values[(slice(None), *index)] for index in np.ndindex(values.shape[1:])
+        "_".join([name, *(str(i + 1) for i in index)]): values[(slice(None), *index)]
+        for index in np.ndindex(values.shape[1:])
     }
 
 
@@ -50,7 +58,9 @@ def open_target(target: Target) -> Iterator[BinaryIO]:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length, doubles or decimals, and the provenance that goes with them. Written block by block."""
+    """Columns of one length, doubles or decimals, and the provenance that goes with them. Written
+    block by block.
+    """
 
     columns: Columns
     provenance: Mapping[str, Any]
@@ -58,28 +68,40 @@ class Table:
     def _blocks(self, numbers: int) -> Iterator[dict[str, NDArray[Any]]]:
         rows = len(next(iter(self.columns.values())))
         for block in row_blocks(rows, len(self.columns), numbers):
-            yield {name: np.ascontiguousarray(values[block]) for name, values in self.columns.items()}
+            yield {
+                name: np.ascontiguousarray(values[block]) for name, values in self.columns.items()
+            }
 
     def to_csv(self, target: Target) -> None:
-        """Write comma-separated values under one line of names: the shortest text of every double, all digits of decimals."""
+        """Write comma-separated values under one line of names: the shortest text of every double,
+        all digits of decimals.
+        """
         with open_target(target) as stream:
             stream.write((",".join(self.columns) + "\n").encode())
             for block in self._blocks(_TEXT_BLOCK):
                 stream.write(_lines(np.column_stack(list(block.values()))))
 
     def to_parquet(self, target: Target) -> None:
-        """Write Parquet, the provenance as JSON in the schema's metadata; raises BackendMissing without pyarrow."""
+        """Write Parquet, the provenance as JSON in the schema's metadata; raises BackendMissing
+        without pyarrow.
+        """
         try:
             from pyarrow import parquet
         except ImportError:
             raise _pyarrow_missing("Parquet") from None
-        # Without dictionaries, which no two numbers of a motion share; a table is a row group, written at once.
-        with open_target(target) as stream, parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer:
+        # Without dictionaries, which no two numbers of a motion share; a table is a row group,
+        # written at once.
+        with (
+            open_target(target) as stream,
+            parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer,
+        ):
             for table in self._tables():
                 writer.write_table(table)
 
     def to_arrow(self, target: Target) -> None:
-        """Write an Arrow IPC stream, the provenance as JSON in the schema's metadata; raises BackendMissing without pyarrow."""
+        """Write an Arrow IPC stream, the provenance as JSON in the schema's metadata; raises
+        BackendMissing without pyarrow.
+        """
         try:
             from pyarrow import ipc
         except ImportError:

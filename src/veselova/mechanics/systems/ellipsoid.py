@@ -1,4 +1,6 @@
-"""Geodesics on the ellipsoid Q(0): Σ X_i²/A_i = 1, whose unit normals move as Neumann's point (Theorem Kno)."""
+"""Geodesics on the ellipsoid Q(0): Σ X_i²/A_i = 1, whose unit normals move as Neumann's point
+(Theorem Kno).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from numpy.typing import NDArray
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_vector, given_arguments, read_only, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_vector,
+    given_arguments,
+    read_only,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.geodesic_flow import GeodesicFlow
@@ -37,9 +45,10 @@ class EllipsoidGeodesic(TorusProblem):
     X      the point at s = 0, (n,)
     X_dot  the unit tangent dX/ds there, (n,)
 
-    X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9; with ``normalize=True`` X is scaled onto the
-    ellipsoid and X_dot projected and scaled first. The frame is [q, n_2 … n_{n−1}, γ]: the normal of the ellipsoid, those of
-    the confocal quadrics that the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself, with
+    X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9; with
+    ``normalize=True`` X is scaled onto the ellipsoid and X_dot projected and scaled first. The
+    frame is [q, n_2 … n_{n−1}, γ]: the normal of the ellipsoid, those of the confocal quadrics that
+    the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself, with
     determinant 1 for n > 2.
     Raises InvalidInput, which names the field, what was required and what was given.
     """
@@ -69,7 +78,8 @@ class EllipsoidGeodesic(TorusProblem):
         diagonal = positive_numbers(A)
         require_moderate(diagonal, "A")
         n = len(diagonal)
-        exact_X, exact_V = exact_vector(X, ("X",), n), exact_vector(X_dot, ("X_dot",), n)
+        exact_X = exact_vector(X, ("X",), n)
+        exact_V = exact_vector(X_dot, ("X_dot",), n)
         for name, vector in (("X", exact_X), ("X_dot", exact_V)):
             if not any(vector):
                 raise InvalidInput((name,), "a vector other than zero", "the zero vector")
@@ -78,19 +88,36 @@ class EllipsoidGeodesic(TorusProblem):
         # q ∝ A⁻¹X, and dq ∝ A⁻¹V up to a multiple of q, for V tangent to the ellipsoid.
         q = tuple(a / b for a, b in zip(exact_X, diagonal, strict=True))
         tangent = ExactState(diagonal, q, exact_V, None).tangent
-        exact = ExactState(diagonal, q, tuple(a / b for a, b in zip(tangent, diagonal, strict=True)), None)
+        exact = ExactState(
+            diagonal, q, tuple(a / b for a, b in zip(tangent, diagonal, strict=True)), None
+        )
         if not any(tangent):
-            raise InvalidInput(("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal")
+            raise InvalidInput(
+                ("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal"
+            )
         A_float = to_float(diagonal)
-        normal, velocity = unit(to_float(over_largest(q))), to_float(over_largest(exact.tangent))
-        frame = orthonormalize(refine(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent))
-        if frame[:, -1] @ velocity < 0:  # n = 2, where γ has no partner whose sign makes the determinant positive
+        normal = unit(to_float(over_largest(q)))
+        velocity = to_float(over_largest(exact.tangent))
+        frame = orthonormalize(
+            refine(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent)
+        )
+        # n = 2, where γ has no partner whose sign makes the determinant positive
+        if frame[:, -1] @ velocity < 0:
             frame[:, -1] = -frame[:, -1]
-        self._set(A=A_float, X=position(A_float, normal), X_dot=frame[:, -1], near_frame=frame, exact=exact)
+        self._set(
+            A=A_float,
+            X=position(A_float, normal),
+            X_dot=frame[:, -1],
+            near_frame=frame,
+            exact=exact,
+        )
         self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     def __repr__(self) -> str:
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "X", "X_dot"))
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
+            for name in ("A", "X", "X_dot")
+        )
         return f"EllipsoidGeodesic({', '.join(parts)})".replace("\n", "")
 
     @property
@@ -115,7 +142,9 @@ class EllipsoidGeodesic(TorusProblem):
 
     @cached_property
     def quadrics(self) -> Array:
-        """Return α_2 ≥ … ≥ α_{n−1}: the quadrics Σ x_i²/(A_i−α) = 1 that all tangents touch besides the ellipsoid itself."""
+        """Return α_2 ≥ … ≥ α_{n−1}: the quadrics Σ x_i²/(A_i−α) = 1 that all tangents touch besides
+        the ellipsoid itself.
+        """
         return read_only(1 / self._constants(self.frame[None])[0])
 
     @property
@@ -134,25 +163,36 @@ class EllipsoidGeodesic(TorusProblem):
         return {"frame": self.frame[None], "tau1": np.zeros(1)}
 
     def flow(self, formulation: str = "geodesic") -> Flow:
-        """Return the geodesic equation in ℝⁿ, or ``gauss``: Neumann's equation for the normal with dτ₁/ds; in units of √max A."""
+        """Return the geodesic equation in ℝⁿ, or ``gauss``: Neumann's equation for the normal with
+        dτ₁/ds; in units of √max A.
+        """
         length = float(np.sqrt(np.max(self.A)))
-        A, q = self.A / length**2, self.frame[:, 0]
+        A = self.A / length**2
+        q = self.frame[:, 0]
         if formulation == "geodesic":
-            initial = np.concatenate([position(A, q), self.X_dot, self.frame[:, 1:-1].ravel(), [0.0]])
+            initial = np.concatenate(
+                [position(A, q), self.X_dot, self.frame[:, 1:-1].ravel(), [0.0]]
+            )
             return GeodesicFlow(1 / A, length, initial)
         velocity = integrals.neumann_velocity(A, q, normal_velocity(A, q, self.X_dot))
         parameters = np.concatenate([1 / A, A, [np.sqrt(_joachimsthal(A, q, self.X_dot))]])
         return GaussFlow(parameters, length, np.concatenate([velocity, self.frame.ravel(), [0.0]]))
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return X = Aq/√(q,Aq), equation (Gauss), or its tangent γ, the last column of the frame."""
+        """Return X = Aq/√(q,Aq), equation (Gauss), or its tangent γ, the last column
+        of the frame.
+        """
         frame = series["frame"]
         return np.asarray(frame[..., -1]) if name == "X_dot" else position(self.A, frame[..., 0])
 
-    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
         """Return X or its tangent, with radii."""
         if name == "X":
-            return derive_position_pair(self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits)
+            return derive_position_pair(
+                self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits
+            )
         return midpoints["frame"][:, :, -1], radii["frame"][:, :, -1]
 
     def complete(self, series: Series) -> Series:
@@ -164,13 +204,18 @@ class EllipsoidGeodesic(TorusProblem):
         q = series["frame"][..., 0]
         root = np.sqrt(np.sum(self.A * q * q, axis=-1))
         X = position(self.A, q)
-        spread = (np.max(self.A) + np.max(np.abs(X), axis=-1) * np.sum(self.A * np.abs(q), axis=-1) / root) / root
+        spread = (
+            np.max(self.A) + np.max(np.abs(X), axis=-1) * np.sum(self.A * np.abs(q), axis=-1) / root
+        ) / root
         return np.asarray(error * np.maximum(1.0, spread))
 
     def integrals(self, series: Series) -> dict[str, Array]:
-        """Return ``joachimsthal`` J, ``constants`` c_k = 1/α_k, k = 2…n−1, and ``neumann`` F_1…F_n of the normal."""
+        """Return ``joachimsthal`` J, ``constants`` c_k = 1/α_k, k = 2…n−1, and ``neumann`` F_1…F_n
+        of the normal.
+        """
         frame = series["frame"]
-        q, V = frame[..., 0], frame[..., -1]
+        q = frame[..., 0]
+        V = frame[..., -1]
         return {
             "joachimsthal": _joachimsthal(self.A, q, V),
             "constants": self._constants(frame),
@@ -178,12 +223,15 @@ class EllipsoidGeodesic(TorusProblem):
         }
 
     def _constants(self, frame: Array) -> Array:
-        q, V = frame[..., 0], frame[..., -1]
+        q = frame[..., 0]
+        V = frame[..., -1]
         return integrals.constants_of_motion(self.A, q, normal_velocity(self.A, q, V))
 
     @property
     def spheroconic(self) -> Array:
-        """Return the spheroconic coordinates of the normal at s = 0, the inverses of the ellipsoidal ones of X."""
+        """Return the spheroconic coordinates of the normal at s = 0, the inverses of the
+        ellipsoidal ones of X.
+        """
         return to_spheroconic(self.A, self.frame[:, 0])
 
 
@@ -193,7 +241,9 @@ def position(A: Array, q: Array) -> Array:
 
 
 def normal_velocity(A: Array, q: Array, V: Array) -> Array:
-    """Return dq/ds = √(q,Aq) pr A⁻¹V, pr the projection along q: |A⁻¹X| = 1/√(q,Aq) on the ellipsoid, shape (..., n)."""
+    """Return dq/ds = √(q,Aq) pr A⁻¹V, pr the projection along q: |A⁻¹X| = 1/√(q,Aq) on the
+    ellipsoid, shape (..., n).
+    """
     step = V / A
     step = step - np.sum(q * step, axis=-1)[..., None] * q
     return np.asarray(np.sqrt(np.sum(A * q * q, axis=-1))[..., None] * step, dtype=np.float64)
@@ -204,17 +254,26 @@ def _joachimsthal(A: Array, q: Array, V: Array) -> Array:
 
 
 def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:
-    """Raise InvalidInput unless X lies on the ellipsoid and V is a unit tangent, each to the tolerance."""
+    """Raise InvalidInput unless X lies on the ellipsoid and V is a unit tangent, each to the
+    tolerance.
+    """
     with np.errstate(over="ignore"):
         scaled = X / semiaxes
-        value, length = float(scaled @ scaled), float(np.linalg.norm(V))
+        value = float(scaled @ scaled)
+        length = float(np.linalg.norm(V))
     if not abs(value - 1) <= 2 * INPUT_TOLERANCE:
-        raise InvalidInput(("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}")
+        raise InvalidInput(
+            ("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}"
+        )
     if not abs(length - 1) <= INPUT_TOLERANCE:
-        raise InvalidInput(("X_dot",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
+        raise InvalidInput(
+            ("X_dot",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
+        )
     normal = scaled / semiaxes
     slope = float(normal @ V) / float(np.linalg.norm(normal))
     if not abs(slope) <= INPUT_TOLERANCE:
         raise InvalidInput(
-            ("X_dot",), "a tangent of the ellipsoid to 1e-9 (or normalize=True)", f"cosine {slope:.3g} with its normal"
+            ("X_dot",),
+            "a tangent of the ellipsoid to 1e-9 (or normalize=True)",
+            f"cosine {slope:.3g} with its normal",
         )

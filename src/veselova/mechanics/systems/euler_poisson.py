@@ -1,4 +1,6 @@
-"""The Euler–Poisson equations of a free rigid body in a potential 𝒱(γ), and their duality with the Veselova system."""
+"""The Euler–Poisson equations of a free rigid body in a potential 𝒱(γ), and their duality with the
+Veselova system.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +24,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class EulerPoisson(RigidBody):
-    """A free rigid body in an axisymmetric potential, equations (3.4): 𝒥Ω̇ = 𝒥Ω×Ω + γ×∂𝒱/∂γ, ė_i = e_i×Ω, e_1 = γ.
+    """A free rigid body in an axisymmetric potential, equations (3.4): 𝒥Ω̇ = 𝒥Ω×Ω + γ×∂𝒱/∂γ, ė_i =
+    e_i×Ω, e_1 = γ.
 
     inertia    𝒥: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix
-    gamma      the unit vector e_1 at t = 0, seen from the body, (3,) · Omega  the angular velocity in the body, (3,)
-    potential  𝒱(γ) as data (see ``Potential``): {"clebsch": α} α(𝒥γ,γ), {"family": [α₁ … α₅]} the F(γ) of (3.5) for
-               𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
-    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ and γ̇
+    gamma      the unit vector e_1 at t = 0, seen from the body, (3,) · Omega  the angular velocity
+        in the body, (3,)
+    potential  𝒱(γ) as data (see ``Potential``): {"clebsch": α} α(𝒥γ,γ), {"family": [α₁ … α₅]} the
+               F(γ) of (3.5) for 𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
+    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ
+        and γ̇
 
-    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made orthonormal.
-    Raises InvalidInput, which names the field.
-    Outputs: Omega, gamma, frame, momentum 𝒥Ω. Formulations: ``velocity``, (3.4); ``momentum``, the momentum in space.
+    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made
+    orthonormal. Raises InvalidInput, which names the field.
+    Outputs: Omega, gamma, frame, momentum 𝒥Ω. Formulations: ``velocity``, (3.4); ``momentum``, the
+    momentum in space.
     """
 
     system: ClassVar[str] = "euler-poisson"
@@ -58,11 +64,14 @@ class EulerPoisson(RigidBody):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``gamma_norm`` i_1 = (γ,γ); ``i2`` (𝒥Ω,γ); ``energy`` f_1 = ½(𝒥Ω,Ω) + 𝒱; ``f2`` ½(𝒥Ω,𝒥Ω) + V(γ) where the potential has
-        the companion V of the duality lemma and i_2 = 0 or V asks for none; ``space_momentum`` Eᵀ𝒥Ω where 𝒱 = 0.
+        ``gamma_norm`` i_1 = (γ,γ); ``i2`` (𝒥Ω,γ); ``energy`` f_1 = ½(𝒥Ω,Ω) + 𝒱; ``f2`` ½(𝒥Ω,𝒥Ω) +
+        V(γ) where the potential has the companion V of the duality lemma and i_2 = 0 or V asks for
+        none; ``space_momentum`` Eᵀ𝒥Ω where 𝒱 = 0.
         """
-        Omega, frame = series["Omega"], series["frame"]
-        gamma, potential = frame[..., 0], self.potential
+        Omega = series["Omega"]
+        frame = series["frame"]
+        gamma = frame[..., 0]
+        potential = self.potential
         M = Omega @ self.inertia
         found = {
             "gamma_norm": np.sum(gamma * gamma, axis=-1),
@@ -77,22 +86,35 @@ class EulerPoisson(RigidBody):
 
 
 def dual(problem: RigidBody) -> RigidBody:
-    """Return the dual of a Veselova system, which is an Euler–Poisson one, or the other way round (duality lemma).
+    """Return the dual of a Veselova system, which is an Euler–Poisson one, or the other way round
+    (duality lemma).
 
-    Its inertia is 𝒥 = 𝓘⁻¹, and potential and companion are exchanged: 𝒱 = F, and V completes the integral. It starts with
-    the same γ, γ̇ and frame, and zero linear constant: Ω = γ̇×γ + sγ. The dual of the dual is the first.
-    Raises Unsolved: ``no-companion`` where no F(γ) is known, ``off-constraint`` where (Ω,γ) ≠ 0, or (𝒥Ω,γ) ≠ 0.
+    Its inertia is 𝒥 = 𝓘⁻¹, and potential and companion are exchanged: 𝒱 = F, and V completes the
+    integral. It starts with the same γ, γ̇ and frame, and zero linear constant: Ω = γ̇×γ + sγ. The
+    dual of the dual is the first.
+    Raises Unsolved: ``no-companion`` where no F(γ) is known, ``off-constraint`` where (Ω,γ) ≠ 0, or
+    (𝒥Ω,γ) ≠ 0.
     """
     if problem.potential.companion is None:
-        raise Unsolved("no-companion", 'the potential has no known companion F(γ); give it as "companion" beside "polynomial"')
+        raise Unsolved(
+            "no-companion",
+            'the potential has no known companion F(γ); give it as "companion" beside "polynomial"',
+        )
     if problem.linear != 0:
-        raise Unsolved("off-constraint", f"duality holds on {problem._linear_name} = 0, here {problem.linear:.6g}")
+        raise Unsolved(
+            "off-constraint",
+            f"duality holds on {problem._linear_name} = 0, here {problem.linear:.6g}",
+        )
     gamma = problem.gamma
     Omega = problem.Omega - (problem.Omega @ gamma) * gamma
     free = isinstance(problem, VeselovaSO3)
     if free:
-        Omega = Omega - ((Omega @ problem.inverse @ gamma) / (gamma @ problem.inverse @ gamma)) * gamma
-    inertia: Any = [1 / moment for moment in problem.moments] if problem.axes is None else problem.inverse
+        Omega = (
+            Omega - ((Omega @ problem.inverse @ gamma) / (gamma @ problem.inverse @ gamma)) * gamma
+        )
+    inertia: Any = (
+        [1 / moment for moment in problem.moments] if problem.axes is None else problem.inverse
+    )
     start = (inertia, gamma, Omega, _dual_data(problem), problem.frame)
     return EulerPoisson(*start, normalize=True) if free else VeselovaSO3(*start, normalize=True)
 

@@ -1,4 +1,6 @@
-"""LR systems: a left-invariant metric, a right-invariant distribution and any constants of constraints, on a compact group."""
+"""LR systems: a left-invariant metric, a right-invariant distribution and any constants of
+constraints, on a compact group.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,13 @@ from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import plain, require_truth_value, whole_number
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.flows.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, jacobi_integral, multipliers_of
+from veselova.mechanics.flows.lr_flow import (
+    LRFlow,
+    MomentumFlow,
+    MultiplierFlow,
+    jacobi_integral,
+    multipliers_of,
+)
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.geometry.stiefel import trace_integrals
 from veselova.mechanics.groups.distribution import Distribution
@@ -25,26 +33,33 @@ __all__ = ["LRSystem"]
 
 Array = NDArray[np.float64]
 
-#: A constraint whose constant is below this part of |ω|, in roundings, has the constant zero: what ω = q∧q̇ in doubles leaves.
+#: A constraint whose constant is below this part of |ω|, in roundings, has the constant zero: what
+#: ω = q∧q̇ in doubles leaves.
 _ROUNDINGS = 64
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class LRSystem(Problem):
-    """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s; equations (EPS) or (mom_eq).
+    """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s;
+    equations (EPS) or (mom_eq).
 
-    On SO(n), with D_r of (4.1), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on`` takes any compact group and any 𝔥):
+    On SO(n), with D_r of (4.1), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on`` takes any
+    compact group and any 𝔥):
 
     n, rank    the dimension, 2 ≤ n ≤ 64, and r from 1 to n−1
-    inertia    {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive definite, in the basis E_i∧E_j,
-               i < j, lexicographic
-    g          the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A reflected frame is taken too
+    inertia    {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive
+               definite, in the basis E_i∧E_j, i < j, lexicographic
+    g          the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A
+        reflected frame is taken too
     omega      the angular velocity ω = g⁻¹ġ in the body at t = 0, (n, n), skew
-    potential  None, or v as a list of monomials {"coefficient": c, "powers": [[i, j, p], …]}: c Π g_ij^p, i and j from 1
-    homogeneous  True: ω must satisfy the constraints with c = 0 to 1e-9, and is projected; False: c is what ω gives
+    potential  None, or v as a list of monomials {"coefficient": c, "powers": [[i, j, p], …]}: c Π
+        g_ij^p, i and j from 1
+    homogeneous  True: ω must satisfy the constraints with c = 0 to 1e-9, and is projected; False: c
+        is what ω gives
 
-    Attributes: ``g`` on the group, ``omega`` (D,) in coordinates, ``constraint`` (m,) the c_s, ``distribution``, ``inertia``.
-    Raises InvalidInput, which names the field, what was required and what was given.
+    Attributes: ``g`` on the group, ``omega`` (D,) in coordinates, ``constraint`` (m,) the c_s,
+    ``distribution``, ``inertia``. Raises InvalidInput, which names the field, what was required and
+    what was given.
     """
 
     n: int
@@ -83,11 +98,16 @@ class LRSystem(Problem):
         size = whole_number(n, ("n",), 2, LARGEST)
         r = whole_number(rank, ("rank",), 1, size - 1)
         if omega is None or not hasattr(omega, "__len__") or len(omega) != size:
-            raise InvalidInput(("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", show(omega))
+            raise InvalidInput(
+                ("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", show(omega)
+            )
         operator = Inertia.of(inertia, size)
         self._become(Distribution.of_rank(size, r), operator, g, omega, potential, homogeneous)
         given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
-        given |= {"potential": self.potential.given if self.potential else None, "homogeneous": homogeneous}
+        given |= {
+            "potential": self.potential.given if self.potential else None,
+            "homogeneous": homogeneous,
+        }
         self._set(n=size, rank=r, given=plain(given))
 
     @classmethod
@@ -104,17 +124,33 @@ class LRSystem(Problem):
     ) -> LRSystem:
         """Return an LR system on any compact group.
 
-        inertia  symmetric positive definite, (D, D), on coordinates in ``group.basis`` · h  matrices that span 𝔥, any subspace
-        g, omega  matrices of the group and of its algebra, as the group's basis was given; entries of v are those of the real g
+        inertia  symmetric positive definite, (D, D), on coordinates in ``group.basis`` · h
+            matrices that span 𝔥, any subspace
+        g, omega  matrices of the group and of its algebra, as the group's basis was given; entries
+            of v are those of the real g
         """
         if not isinstance(group, MatrixGroup):
-            raise InvalidInput(("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", show(group))
+            raise InvalidInput(
+                ("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", show(group)
+            )
         if omega is None:
             raise InvalidInput(("omega",), "a matrix of the Lie algebra", "nothing")
         system = cls.__new__(cls)
         distribution = Distribution.orthogonal_to(group, h)
-        system._become(distribution, Inertia.of_matrix(inertia, group.dimension), g, omega, potential, homogeneous)
-        arrays = {"basis": group.basis, "inertia": system.inertia.matrix, "g": system.g, "omega": group.element(system.omega)}
+        system._become(
+            distribution,
+            Inertia.of_matrix(inertia, group.dimension),
+            g,
+            omega,
+            potential,
+            homogeneous,
+        )
+        arrays = {
+            "basis": group.basis,
+            "inertia": system.inertia.matrix,
+            "g": system.g,
+            "omega": group.element(system.omega),
+        }
         arrays["h"] = group.element(distribution.space[distribution.rank :])
         given = {name: array.tolist() for name, array in arrays.items()}
         given["potential"] = system.potential.given if system.potential else None
@@ -122,26 +158,52 @@ class LRSystem(Problem):
         return system
 
     def as_request(self) -> dict[str, Any]:
-        """Return the problem as a request states it; raises InvalidInput for one made by ``on``: requests know SO(n) alone."""
+        """Return the problem as a request states it; raises InvalidInput for one made by ``on``:
+        requests know SO(n) alone.
+        """
         if self.rank is None:
-            raise InvalidInput(("problem",), "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent", repr(self))
+            raise InvalidInput(
+                ("problem",),
+                "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent",
+                repr(self),
+            )
         return super().as_request()
 
-    def _become(self, distribution: Distribution, inertia: Inertia, g: Any, omega: Any, potential: Any, homogeneous: Any) -> None:
+    def _become(
+        self,
+        distribution: Distribution,
+        inertia: Inertia,
+        g: Any,
+        omega: Any,
+        potential: Any,
+        homogeneous: Any,
+    ) -> None:
         require_truth_value(homogeneous, "homogeneous")
         group = distribution.group
         start = np.eye(group.size) if g is None else group.validate(g)
         velocity = group.algebra_element(omega, ("omega",))
         along, across = distribution.components(start, velocity)
-        size, off = float(np.max(np.abs(velocity))), float(np.max(np.abs(across), initial=0.0))
+        size = float(np.max(np.abs(velocity)))
+        off = float(np.max(np.abs(across), initial=0.0))
         if homogeneous and off > INPUT_TOLERANCE * size:
             given = f"one that is off them by {off:.3g}"
-            raise InvalidInput(("omega",), "an angular velocity that satisfies the constraints to 1e-9 of its size", given)
+            raise InvalidInput(
+                ("omega",),
+                "an angular velocity that satisfies the constraints to 1e-9 of its size",
+                given,
+            )
         if homogeneous or off <= _ROUNDINGS * np.finfo(float).eps * size:
             across = np.zeros_like(across)
             velocity = distribution.body(start, along, across)
         v = None if potential is None else GroupPotential.of(potential, group.size)
-        self._set(g=start, omega=velocity, constraint=across, distribution=distribution, inertia=inertia, potential=v)
+        self._set(
+            g=start,
+            omega=velocity,
+            constraint=across,
+            distribution=distribution,
+            inertia=inertia,
+            potential=v,
+        )
         self._require_finite()
 
     def _require_finite(self) -> None:
@@ -150,12 +212,20 @@ class LRSystem(Problem):
             slope = self.potential.strength(self.g) if self.potential else 0.0
             if not np.isfinite(value) or not np.isfinite(slope):
                 raise InvalidInput(
-                    ("potential",), "a potential that is finite at the start, with its slope", f"the value {value}"
+                    ("potential",),
+                    "a potential that is finite at the start, with its slope",
+                    f"the value {value}",
                 )
             kinetic = float(self.inertia(self.omega) @ self.omega) / 2
             turning = self.turning
-            if not np.isfinite(kinetic) or (kinetic == 0 and np.any(self.omega)) or not np.isfinite(turning * turning):
-                raise InvalidInput(("omega",), "a kinetic energy within the range of a float", f"one of {kinetic}")
+            if (
+                not np.isfinite(kinetic)
+                or (kinetic == 0 and np.any(self.omega))
+                or not np.isfinite(turning * turning)
+            ):
+                raise InvalidInput(
+                    ("omega",), "a kinetic energy within the range of a float", f"one of {kinetic}"
+                )
 
     def __repr__(self) -> str:
         kind = (
@@ -168,15 +238,27 @@ class LRSystem(Problem):
     @property
     def title(self) -> str:
         """Return the system, its size and its energy."""
-        size = f"n = {self.n}, rank {self.rank}" if self.rank else f"dim G = {self.distribution.group.dimension}"
+        size = (
+            f"n = {self.n}, rank {self.rank}"
+            if self.rank
+            else f"dim G = {self.distribution.group.dimension}"
+        )
         return f"{self.system}, {size}, energy {float(self._jacobi(self.g, self.omega)):.12g}"
 
     @cached_property
     def turning(self) -> float:
-        """Return the largest of |ω| at the start, √(2·kinetic energy/moment) and √(slope of v/moment), for a mean moment."""
+        """Return the largest of |ω| at the start, √(2·kinetic energy/moment) and √(slope of
+        v/moment), for a mean moment.
+        """
         moment = np.ldexp(1.0, self.inertia.exponent)
-        rates = [float(np.linalg.norm(self.omega)), float(np.sqrt(self.omega @ self.inertia(self.omega) / moment))]
-        return max(*rates, float(np.sqrt(self.potential.strength(self.g) / moment)) if self.potential else 0.0)
+        rates = [
+            float(np.linalg.norm(self.omega)),
+            float(np.sqrt(self.omega @ self.inertia(self.omega) / moment)),
+        ]
+        return max(
+            *rates,
+            float(np.sqrt(self.potential.strength(self.g) / moment)) if self.potential else 0.0,
+        )
 
     @property
     def moves(self) -> bool:
@@ -189,46 +271,73 @@ class LRSystem(Problem):
     @property
     def start(self) -> Series:
         """Return the series at t = 0."""
-        return {"omega": self.distribution.group.element(self.omega)[None], "frame": np.ascontiguousarray(self.g.T)[None]}
+        return {
+            "omega": self.distribution.group.element(self.omega)[None],
+            "frame": np.ascontiguousarray(self.g.T)[None],
+        }
 
     def flow(self, formulation: str = "momentum") -> LRFlow:
-        """Return the momentum equation on the group, or Euler–Poincaré with multipliers, in units of this problem."""
-        unit, k = 1 / self.turning, self.inertia.exponent
-        inertia, velocity = self.inertia.rescale(), self.omega * unit
+        """Return the momentum equation on the group, or Euler–Poincaré with multipliers, in units
+        of this problem.
+        """
+        unit = 1 / self.turning
+        k = self.inertia.exponent
+        inertia = self.inertia.rescale()
+        velocity = self.omega * unit
         along = self.distribution.components(self.g, inertia(velocity))[0]
         across = self.constraint * unit
         potential = self.potential.scale(unit * unit * 2.0**-k) if self.potential else None
         kind = MomentumFlow if formulation == "momentum" else MultiplierFlow
-        return kind(self.distribution, inertia, potential, unit, self.g, along, across, self._invariant[1])
+        return kind(
+            self.distribution, inertia, potential, unit, self.g, along, across, self._invariant[1]
+        )
 
     def _split(self, series: Series) -> tuple[Array, Array]:
         """Return g and the coordinates of ω along series."""
-        return np.swapaxes(series["frame"], -1, -2), self.distribution.group.coordinates(series["omega"])
+        return np.swapaxes(series["frame"], -1, -2), self.distribution.group.coordinates(
+            series["omega"]
+        )
 
     def derive(self, name: str, series: Series) -> Array:
         """Return 𝓜 of (mom) as matrices (N, n, n), or the multipliers λ_s of (EPS), (N, m)."""
         g, omega = self._split(series)
         group = self.distribution.group
         if name == "momentum":
-            return np.asarray(group.element(self.distribution.momentum(self.inertia, g, omega)), dtype=np.float64)
+            return np.asarray(
+                group.element(self.distribution.momentum(self.inertia, g, omega)), dtype=np.float64
+            )
         force = group.bracket(self.inertia(omega), omega)
         if self.potential:
             force = force - self.potential.gradient(group, g)
         parts = self.distribution.parts(g, force)
-        return np.concatenate([multipliers_of(self.inertia.inverse, self.distribution.in_body(h)[1], f)[0] for h, f in parts])
+        return np.concatenate(
+            [
+                multipliers_of(self.inertia.inverse, self.distribution.in_body(h)[1], f)[0]
+                for h, f in parts
+            ]
+        )
 
     def _jacobi(self, g: Array, omega: Array) -> Array:
-        return jacobi_integral(self.distribution, self.inertia, self.constraint, self.potential, g, omega)
+        return jacobi_integral(
+            self.distribution, self.inertia, self.constraint, self.potential, g, omega
+        )
 
     @cached_property
     def _invariant(self) -> tuple[Array, bool]:
-        """Return the directions of 𝔡 (rows) along which v is constant, and whether it is along Σ c_s h_s."""
+        """Return the directions of 𝔡 (rows) along which v is constant, and whether it is along Σ
+        c_s h_s.
+        """
         d = self.distribution.rank
         if self.potential is None:
             return np.eye(d), True
-        group, space = self.distribution.group, self.distribution.space
+        group = self.distribution.group
+        space = self.distribution.space
         moving = not np.any(self.constraint)
-        across = space[d:].T @ (self.constraint / np.max(np.abs(self.constraint))) if not moving else np.zeros(group.dimension)
+        across = (
+            space[d:].T @ (self.constraint / np.max(np.abs(self.constraint)))
+            if not moving
+            else np.zeros(group.dimension)
+        )
         return self.potential.invariant_directions(group, space[:d]), moving or len(
             self.potential.invariant_directions(group, across[None])
         ) == 1
@@ -241,12 +350,13 @@ class LRSystem(Problem):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along series, by name, first axis the times.
 
-        ``energy``      the Jacobi–Painlevé integral ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v, which is the energy where all c_s = 0;
-                        left out where v changes along the constants of the constraints: it is no integral then
+        ``energy``      the Jacobi–Painlevé integral ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v, which is the
+                        energy where all c_s = 0; left out where v changes along the constants of
+                        the constraints: it is no integral then
         ``constraint``  c_s = ⟨ω, ℱ_s⟩, on SO(n) the w_pq of (4.1a), in units of ``turning``
         ``momentum``    the 𝔡-part of g𝓘ωg⁻¹, along the directions in which v does not change
-        ``traces``      SO(n) without potential: the coefficients of λ^{k−j} in tr(𝓜/s + λΓ)^k, k = 2 … n, j = 2, 4 … k;
-                        s is the largest component of 𝓜 at t = 0
+        ``traces``      SO(n) without potential: the coefficients of λ^{k−j} in tr(𝓜/s + λΓ)^k, k =
+                        2 … n, j = 2, 4 … k; s is the largest component of 𝓜 at t = 0
         ``group``       the largest entry of what is wrong with the frame
         """
         g, omega = self._split(series)
@@ -265,5 +375,7 @@ class LRSystem(Problem):
         """Return the coefficients of tr(𝓜/s + λΓ)^k."""
         start = self.distribution.momentum(self.inertia, self.g, self.omega)
         size = float(np.max(np.abs(start))) or 1.0
-        M = self.distribution.group.element(self.distribution.momentum(self.inertia, g, omega) / size)
+        M = self.distribution.group.element(
+            self.distribution.momentum(self.inertia, g, omega) / size
+        )
         return trace_integrals(np.swapaxes(g[..., : self.rank, :], -1, -2), M)

@@ -1,4 +1,6 @@
-"""The Neumann system on Sⁿ⁻¹: a point on the unit sphere in the potential U = ½(A⁻¹q,q), for any value of F_0."""
+"""The Neumann system on Sⁿ⁻¹: a point on the unit sphere in the potential U = ½(A⁻¹q,q), for any
+value of F_0.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,19 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import given_arguments, read_only, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    given_arguments,
+    read_only,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
-from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues, norm, uhlenbeck_integrals
+from veselova.mechanics.geometry.integrals_of_motion import (
+    moser_eigenvalues,
+    norm,
+    uhlenbeck_integrals,
+)
 from veselova.mechanics.geometry.natural_frame import moser_frame, refine
 from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
@@ -29,16 +40,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class NeumannSystem(TorusProblem):
-    """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q, equation (4.7), in time τ₁.
+    """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q,
+    equation (4.7), in time τ₁.
 
     A        n positive numbers
     q        the unit vector at τ₁ = 0, (n,)
     q_prime  its velocity dq/dτ₁, tangent to the sphere, (n,)
 
-    q must have unit length and q_prime be tangent to 1e-9; with ``normalize=True`` q is scaled and q_prime projected first.
-    On F_0 = 0, equation (4.8), the motion is that of a Veselova problem (Theorem LR→Nn); here F_0 may have any value. The
-    frame's other columns are the eigenvectors n_2 … n_{n−1}, n_1 of A⁻¹ − q'q'ᵀ on q⊥ with eigenvalues c_2 … c_{n−1}, c_1.
-    Raises InvalidInput, which names the field, what was required and what was given.
+    q must have unit length and q_prime be tangent to 1e-9; with ``normalize=True`` q is scaled and
+    q_prime projected first. On F_0 = 0, equation (4.8), the motion is that of a Veselova problem
+    (Theorem LR→Nn); here F_0 may have any value. The frame's other columns are the eigenvectors n_2
+    … n_{n−1}, n_1 of A⁻¹ − q'q'ᵀ on q⊥ with eigenvalues c_2 … c_{n−1}, c_1. Raises InvalidInput,
+    which names the field, what was required and what was given.
     """
 
     A: Array
@@ -65,13 +78,21 @@ class NeumannSystem(TorusProblem):
         require_truth_value(normalize, "normalize")
         diagonal = positive_numbers(A)
         exact, position = point_on_sphere(diagonal, q, q_prime, normalize, "q_prime")
-        self._set(A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact)
+        self._set(
+            A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact
+        )
         _require_representable(self.A, self.q_prime)
         near_frame = moser_frame(self.A, self.q, self.q_prime)
-        self._set(near_frame=near_frame, given=given_arguments(A=A, q=q, q_prime=q_prime, normalize=normalize))
+        self._set(
+            near_frame=near_frame,
+            given=given_arguments(A=A, q=q, q_prime=q_prime, normalize=normalize),
+        )
 
     def __repr__(self) -> str:
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_prime"))
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
+            for name in ("A", "q", "q_prime")
+        )
         return f"NeumannSystem({', '.join(parts)})".replace("\n", "")
 
     @property
@@ -82,7 +103,9 @@ class NeumannSystem(TorusProblem):
     @cached_property
     def frame(self) -> Array:
         """Return the frame at τ₁ = 0, (n, n), to the last bit."""
-        return read_only(refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent, Fraction(1)))
+        return read_only(
+            refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent, Fraction(1))
+        )
 
     @property
     def energy(self) -> float:
@@ -104,33 +127,48 @@ class NeumannSystem(TorusProblem):
     def start(self) -> Series:
         """Return the series at τ₁ = 0."""
         spheroconic = to_spheroconic(self.A, self.q[None])
-        return {"q_prime": self.q_prime[None], "frame": self.frame[None], "spheroconic": spheroconic}
+        return {
+            "q_prime": self.q_prime[None],
+            "frame": self.frame[None],
+            "spheroconic": spheroconic,
+        }
 
     def flow(self, formulation: str = "neumann") -> NeumannFlow:
         """Return the field (4.7) in units of this problem."""
         time_unit = 1 / self.turning
-        return NeumannFlow(time_unit**2 / self.A, time_unit, np.concatenate([time_unit * self.q_prime, self.frame.ravel()]))
+        return NeumannFlow(
+            time_unit**2 / self.A,
+            time_unit,
+            np.concatenate([time_unit * self.q_prime, self.frame.ravel()]),
+        )
 
     def derive(self, name: str, series: Series) -> Array:
         """Return q, the first column of the frame."""
         return np.asarray(series["frame"][..., 0])
 
     def complete(self, series: Series) -> Series:
-        """Return the engine's series under the names of this system, with the spheroconic coordinates."""
+        """Return the engine's series under the names of this system, with the spheroconic
+        coordinates.
+        """
         spheroconic = series.get("spheroconic")
         if spheroconic is None:
             spheroconic = to_spheroconic(self.A, series["frame"][:, :, 0])
         return {"q_prime": series["q_dot"], "frame": series["frame"], "spheroconic": spheroconic}
 
     def _energy(self, q: Array, v: Array) -> Array:
-        return np.asarray((np.sum(v * v, axis=-1) + np.sum(q * q / self.A, axis=-1)) / 2, dtype=np.float64)
+        return np.asarray(
+            (np.sum(v * v, axis=-1) + np.sum(q * q / self.A, axis=-1)) / 2, dtype=np.float64
+        )
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``energy`` ½(q',q') + ½(A⁻¹q,q); ``F0`` (4.8); ``neumann`` F_1…F_n; ``constants`` c_1…c_{n−1}; ``q_norm`` (q,q).
+        ``energy`` ½(q',q') + ½(A⁻¹q,q); ``F0`` (4.8); ``neumann`` F_1…F_n; ``constants``
+        c_1…c_{n−1}; ``q_norm`` (q,q).
         """
-        q, v, A = series["frame"][..., 0], series["q_prime"], self.A
+        q = series["frame"][..., 0]
+        v = series["q_prime"]
+        A = self.A
         qAq, qAv, vAv = (np.sum(a * A * b, axis=-1) for a, b in ((q, q), (q, v), (v, v)))
         return {
             "energy": self._energy(q, v),
@@ -142,11 +180,18 @@ class NeumannSystem(TorusProblem):
 
 
 def _require_representable(A: Array, q_prime: Array) -> None:
-    """Raise InvalidInput where squares of the frequencies or of the velocity leave the range of a float."""
+    """Raise InvalidInput where squares of the frequencies or of the velocity leave the range of a
+    float.
+    """
     with np.errstate(over="ignore", under="ignore"):
-        ranges = {"A": np.concatenate([A * A, 1 / A / A]), "q_prime": np.array([norm(q_prime) ** 2])}
+        ranges = {
+            "A": np.concatenate([A * A, 1 / A / A]),
+            "q_prime": np.array([norm(q_prime) ** 2]),
+        }
     for name, squares in ranges.items():
         if not np.all(np.isfinite(squares)) or (name == "A" and not np.all(squares > 0)):
             raise InvalidInput(
-                (name,), "squares within the range of a float", f"entries up to {np.max(np.abs(locals()[name])):.3g}"
+                (name,),
+                "squares within the range of a float",
+                f"entries up to {np.max(np.abs(locals()[name])):.3g}",
             )

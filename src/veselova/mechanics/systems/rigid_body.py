@@ -1,4 +1,6 @@
-"""What the Veselova system on T SO(3) and the Euler–Poisson equations share: a rigid body, its state, and a potential V(γ)."""
+"""What the Veselova system on T SO(3) and the Euler–Poisson equations share: a rigid body, its
+state, and a potential V(γ).
+"""
 
 from __future__ import annotations
 
@@ -11,10 +13,20 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.principal_inertia import principal_inertia, require_moderate, symmetric_matrix
+from veselova.mechanics.bodies.principal_inertia import (
+    principal_inertia,
+    require_moderate,
+    symmetric_matrix,
+)
 from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_vector, given_arguments, is_matrix, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_vector,
+    given_arguments,
+    is_matrix,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
 from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
@@ -33,12 +45,16 @@ _ROUNDING = 16 * np.finfo(float).eps
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class RigidBody(Problem):
-    """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 = γ, e_2, e_3, in body axes.
+    """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 =
+    γ, e_2, e_3, in body axes.
 
-    moments, wide_axes  principal moments (3,), exact where given so, and the principal axes where a matrix was given
-    inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0 · potential  V(γ)
+    moments, wide_axes  principal moments (3,), exact where given so, and the principal axes where a
+        matrix was given
+    inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0
+        · potential  V(γ)
     linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
-    exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the frame None for the natural one
+    exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the
+        frame None for the natural one
     """
 
     moments: tuple[Fraction, ...]
@@ -61,24 +77,32 @@ class RigidBody(Problem):
     portrait: ClassVar[str] = "gamma"
 
     def __init__(
-        self, inertia: Any, gamma: Any, Omega: Any, potential: Any = None, frame: Any = None, *, normalize: bool = False
+        self,
+        inertia: Any,
+        gamma: Any,
+        Omega: Any,
+        potential: Any = None,
+        frame: Any = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         require_truth_value(normalize, "normalize")
         moments, axes, tensor, inverse = _inertia(inertia)
-        exact_gamma, exact_Omega = exact_vector(gamma, ("gamma",), 3), exact_vector(Omega, ("Omega",), 3)
-        direction, velocity = _direction(exact_gamma, normalize), to_float(exact_Omega)
+        exact_gamma = exact_vector(gamma, ("gamma",), 3)
+        exact_Omega = exact_vector(Omega, ("Omega",), 3)
+        direction = _direction(exact_gamma, normalize)
+        velocity = to_float(exact_Omega)
         exact_frame = None if frame is None else given_frame(frame, exact_gamma, normalize, "gamma")
         V = Potential.of(potential, tensor, inverse, dual=not self.constrained)
         V.require_finite(direction)
         across = direction if self.constrained else tensor @ direction
         with np.errstate(over="ignore", invalid="ignore"):  # refused below
-            linear, size = float(velocity @ across), float(np.linalg.norm(velocity) * np.linalg.norm(across))
+            linear = float(velocity @ across)
+            size = float(np.linalg.norm(velocity) * np.linalg.norm(across))
             if abs(linear) <= _ROUNDING * size:
-                velocity, linear = velocity - (linear / (direction @ across)) * direction, 0.0
-            squares = np.array([velocity @ velocity, velocity @ tensor @ velocity, np.sum((tensor @ velocity) ** 2)])
-        if not np.all(np.isfinite(squares)) or (np.any(velocity) and not np.all(squares)):
-            required = "an angular velocity whose energy and squared momentum are within the range of a float"
-            raise InvalidInput(("Omega",), required, f"squares of {', '.join(f'{x:.3g}' for x in squares)}")
+                velocity = velocity - (linear / (direction @ across)) * direction
+                linear = 0.0
+        _require_finite_squares(velocity, tensor)
         principal = axes.rounded.T if axes is not None else np.eye(3)
         if exact_frame is None:
             rate = principal @ np.cross(direction, velocity)
@@ -86,10 +110,24 @@ class RigidBody(Problem):
             start = principal.T @ start
         else:
             start = admissible_frame(to_float(exact_frame), direction)
-        self._set(moments=moments, wide_axes=axes, inertia=tensor, inverse=inverse, potential=V, linear=linear)
+        self._set(
+            moments=moments,
+            wide_axes=axes,
+            inertia=tensor,
+            inverse=inverse,
+            potential=V,
+            linear=linear,
+        )
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
-        given = given_arguments(inertia=inertia, gamma=gamma, Omega=Omega, frame=frame, normalize=normalize, potential=V.given)
+        given = given_arguments(
+            inertia=inertia,
+            gamma=gamma,
+            Omega=Omega,
+            frame=frame,
+            normalize=normalize,
+            potential=V.given,
+        )
         self._set(given=given)
 
     @property
@@ -99,12 +137,18 @@ class RigidBody(Problem):
 
     def to_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
         """Return γ, of any length, and Ω along the principal axes, as given."""
-        given, axes = (self.exact_gamma, self.exact_Omega), self.wide_axes
+        given = (self.exact_gamma, self.exact_Omega)
+        axes = self.wide_axes
         return given if axes is None else (axes.to_axes(given[0]), axes.to_axes(given[1]))
 
     def __repr__(self) -> str:
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6)}" for name in ("inertia", "gamma", "Omega"))
-        potential = "" if self.potential.given is None else f", potential={dict(self.potential.given)}"
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6)}"
+            for name in ("inertia", "gamma", "Omega")
+        )
+        potential = (
+            "" if self.potential.given is None else f", potential={dict(self.potential.given)}"
+        )
         return f"{type(self).__name__}({', '.join(parts)}{potential})".replace("\n", "")
 
     @property
@@ -122,12 +166,18 @@ class RigidBody(Problem):
     def turning(self) -> float:
         """Return |Ω| plus the rate √(2|V|/I) to which the potential can bring the body."""
         lightest = min(float(moment) for moment in self.moments)
-        return float(np.linalg.norm(self.Omega) + np.sqrt(2 * self.potential.terms.size(self.gamma) / lightest))
+        return float(
+            np.linalg.norm(self.Omega)
+            + np.sqrt(2 * self.potential.terms.size(self.gamma) / lightest)
+        )
 
     @property
     def moves(self) -> bool:
         """Return whether anything moves: Ω or the torque γ×∂V/∂γ."""
-        return bool(np.any(self.Omega) or np.any(np.cross(self.gamma, self.potential.terms.gradient(self.gamma))))
+        return bool(
+            np.any(self.Omega)
+            or np.any(np.cross(self.gamma, self.potential.terms.gradient(self.gamma)))
+        )
 
     @property
     def start(self) -> Series:
@@ -135,7 +185,9 @@ class RigidBody(Problem):
         return {"Omega": self.Omega[None], "frame": self.frame[None]}
 
     def flow(self, formulation: str = "multiplier") -> RigidBodyFlow:
-        """Return the field in units of this problem; ``momentum`` is the formulation by the momentum in space."""
+        """Return the field in units of this problem; ``momentum`` is the formulation by the
+        momentum in space.
+        """
         _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
         rate = self.turning
         return RigidBodyFlow(
@@ -157,12 +209,16 @@ class RigidBody(Problem):
 
 
 def _inertia(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]:
-    """Return the principal moments, the principal axes where a matrix is given, the tensor and its inverse."""
+    """Return the principal moments, the principal axes where a matrix is given, the tensor and its
+    inverse.
+    """
     form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
     moments, axes = principal_inertia(given, "inertia")
     require_moderate(moments, "inertia")
     if len(moments) != 3:
-        raise InvalidInput(("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}")
+        raise InvalidInput(
+            ("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}"
+        )
     values = to_float(moments)
     if axes is None:
         return moments, None, np.diag(values), np.diag(1 / values)
@@ -171,7 +227,9 @@ def _inertia(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None, Array, 
 
 
 def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fraction, ...], ...]:
-    """Return the inverse of a symmetric 3 × 3 matrix, exactly: vector products of its rows over the determinant."""
+    """Return the inverse of a symmetric 3 × 3 matrix, exactly: vector products of its rows over the
+    determinant.
+    """
     cofactors = [exact_cross(tensor[i - 2], tensor[i - 1]) for i in range(3)]
     determinant = sum((x * y for x, y in zip(tensor[0], cofactors[0], strict=True)), Fraction())
     return tuple(tuple(x / determinant for x in row) for row in cofactors)
@@ -184,5 +242,18 @@ def _direction(exact: tuple[Fraction, ...], normalize: bool) -> Array:
     gamma = to_float(over_largest(exact) if normalize else exact)
     length = float(np.linalg.norm(gamma / np.max(np.abs(gamma))) * np.max(np.abs(gamma)))
     if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
-        raise InvalidInput(("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}")
+        raise InvalidInput(
+            ("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
+        )
     return unit(gamma)
+
+
+def _require_finite_squares(velocity: Array, tensor: Array) -> None:
+    """Raise InvalidInput unless energy and squared momentum are floats, zero at rest alone."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        momentum = tensor @ velocity
+        squares = np.array([velocity @ velocity, velocity @ momentum, np.sum(momentum**2)])
+    if not np.all(np.isfinite(squares)) or (np.any(velocity) and not np.all(squares)):
+        required = "an angular velocity whose energy and squared momentum are floats"
+        given = f"squares of {', '.join(f'{x:.3g}' for x in squares)}"
+        raise InvalidInput(("Omega",), required, given)

@@ -1,4 +1,6 @@
-"""The reduced rank-one Veselova system in n dimensions, in the separable potentials of which (3.5) is the case n = 3."""
+"""The reduced rank-one Veselova system in n dimensions, in the separable potentials of which (3.5)
+is the case n = 3.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +14,31 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, exact_vector, given_arguments, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    exact_vector,
+    given_arguments,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.separable_flow import SeparableFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
-from veselova.mechanics.potentials.separable import SeparablePotential, family_polynomial, separation_constants
+from veselova.mechanics.potentials.separable import (
+    SeparablePotential,
+    family_polynomial,
+    separation_constants,
+)
 
 __all__ = ["SeparableVeselova"]
 
 Array = NDArray[np.float64]
 
 #: Larger numbers leave the range of a float when they are multiplied.
-_LARGEST, _WIDEST = Fraction(10**100), Fraction(10**20)
+_LARGEST = Fraction(10**100)
+_WIDEST = Fraction(10**20)
 
 #: The parts of a potential.
 _PARTS = ("quartic", "quadratic", "centrifugal")
@@ -33,17 +46,21 @@ _PARTS = ("quartic", "quadratic", "centrifugal")
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class SeparableVeselova(Problem):
-    """The point q = e_1 of an n-dimensional body with inertia (4.5) under (44), n ≥ 2, in a separable potential
+    """The point q = e_1 of an n-dimensional body with inertia (4.5) under (44), n ≥ 2, in a
+    separable potential
 
-    V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5) where n = 3 and A = 𝓘⁻¹.
+    V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5) where n = 3 and A =
+    𝓘⁻¹.
 
     A          n distinct positive numbers
     q, q_dot   the unit vector e_1 at t = 0 and its velocity, tangent to the sphere, (n,)
-    potential  {"quartic": α₁, "quadratic": α₂, "centrifugal": [β_1 … β_n]}, what is left out being zero
+    potential  {"quartic": α₁, "quadratic": α₂, "centrifugal": [β_1 … β_n]}, what is left out being
+        zero
 
-    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first. In time τ
-    the motion separates in spheroconic coordinates, for any n (docs/separable.md). The rest of the frame is left out: with a
-    potential it is no algebraic function of the motion of q. Raises InvalidInput.
+    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and
+    q_dot projected first. In time τ the motion separates in spheroconic coordinates, for any n
+    (docs/separable.md). The rest of the frame is left out: with a potential it is no algebraic
+    function of the motion of q. Raises InvalidInput.
     """
 
     A: Array
@@ -54,14 +71,23 @@ class SeparableVeselova(Problem):
     given: Mapping[str, Any]
 
     system: ClassVar[str] = "separable"
-    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {"q": ("axis",), "q_dot": ("axis",), "spheroconic": ("coordinate",)}
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "q": ("axis",),
+        "q_dot": ("axis",),
+        "spheroconic": ("coordinate",),
+    }
     derived: ClassVar[tuple[str, ...]] = ("spheroconic",)
     bounded: ClassVar[tuple[str, ...]] = ("q",)
     portrait: ClassVar[str] = "q"
-    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"analytic": ("angles",), "numeric": ("dop853", "taylor")}
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "analytic": ("angles",),
+        "numeric": ("dop853", "taylor"),
+    }
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
-    def __init__(self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False) -> None:
+    def __init__(
+        self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False
+    ) -> None:
         require_truth_value(normalize, "normalize")
         diagonal = positive_numbers(A)
         require_moderate(diagonal, "A", _WIDEST)
@@ -73,19 +99,37 @@ class SeparableVeselova(Problem):
         parts = _potential(potential, n)
         for i, beta in enumerate(parts[2]):
             if beta and not exact.q[i]:
-                raise InvalidInput(("potential", "centrifugal", i), "zero where q_i = 0 at the start", show(beta))
-        self._set(A=to_float(diagonal), q=unit(position), q_dot=to_float(exact.tangent), exact=exact, potential=parts)
+                raise InvalidInput(
+                    ("potential", "centrifugal", i), "zero where q_i = 0 at the start", show(beta)
+                )
+        self._set(
+            A=to_float(diagonal),
+            q=unit(position),
+            q_dot=to_float(exact.tangent),
+            exact=exact,
+            potential=parts,
+        )
         for name, values in {"potential": (*parts[:2], *parts[2]), "q_dot": exact.tangent}.items():
             largest = max(abs(x) for x in values)
             if largest > _LARGEST:
-                raise InvalidInput((name,), f"numbers up to {float(_LARGEST):.0e}", f"{float(largest):.3g}")
+                raise InvalidInput(
+                    (name,), f"numbers up to {float(_LARGEST):.0e}", f"{float(largest):.3g}"
+                )
         if not np.isfinite(self.energy):
-            raise InvalidInput(("potential",), "one that is finite at the start", f"an energy of {self.energy}")
-        self._set(given=given_arguments(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential))
+            raise InvalidInput(
+                ("potential",), "one that is finite at the start", f"an energy of {self.energy}"
+            )
+        self._set(
+            given=given_arguments(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential)
+        )
 
     def __repr__(self) -> str:
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
-        return f"SeparableVeselova({', '.join(parts)}, potential={self.given.get('potential')})".replace("\n", "")
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
+            for name in ("A", "q", "q_dot")
+        )
+        text = f"SeparableVeselova({', '.join(parts)}, potential={self.given.get('potential')})"
+        return text.replace("\n", "")
 
     @property
     def n(self) -> int:
@@ -99,7 +143,9 @@ class SeparableVeselova(Problem):
 
     @property
     def polynomial(self) -> tuple[Fraction, ...]:
-        """Return the coefficients of v(λ), lowest first: V = Σ v(λ_k)/Π_{s≠k}(λ_k−λ_s), the β_i apart."""
+        """Return the coefficients of v(λ), lowest first: V = Σ v(λ_k)/Π_{s≠k}(λ_k−λ_s), the β_i
+        apart.
+        """
         return family_polynomial([1 / a for a in self.exact.A], *self.potential[:2])
 
     @property
@@ -125,7 +171,8 @@ class SeparableVeselova(Problem):
     def _size(self) -> float:
         """Return how large the parts of the potential are at the start."""
         quartic, quadratic, betas = self.potential
-        I, q2 = 1 / self.A, self.q * self.q
+        I = 1 / self.A
+        q2 = self.q * self.q
         walls = sum(abs(float(b)) / x for b, x in zip(betas, q2, strict=True) if b)
         return float(abs(float(quartic)) * (I * I @ q2) + abs(float(quadratic)) * (I @ q2) + walls)
 
@@ -146,19 +193,27 @@ class SeparableVeselova(Problem):
         """Return the reduced flow with this potential, in units of this problem."""
         quartic, quadratic, betas = self.potential
         turning = max(self.turning, float(np.finfo(float).tiny))  # its reciprocal is a float
-        return SeparableFlow.of(self.A, self.q, self.q_dot, (float(quartic), float(quadratic), to_float(betas)), turning)
+        return SeparableFlow.of(
+            self.A, self.q, self.q_dot, (float(quartic), float(quadratic), to_float(betas)), turning
+        )
 
     def derive(self, name: str, series: Series) -> Array:
         """Return the spheroconic coordinates."""
         return to_spheroconic(self.A, series["q"])
 
     def integrals(self, series: Series) -> dict[str, Array]:
-        """Return ``energy`` h = T + V, ``constants`` f_0 … f_{n−3} of the separation (docs/separable.md), ``q_norm`` (q,q)."""
+        """Return ``energy`` h = T + V, ``constants`` f_0 … f_{n−3} of the separation
+        (docs/separable.md), ``q_norm`` (q,q).
+        """
         potential = self.separable_potential
         rows = zip(series["q"], series["q_dot"], strict=True)
         found = np.array([separation_constants(self.A, q, v, potential) for q, v in rows])
         q = series["q"]
-        return {"energy": found[:, -1], "constants": found[:, :-1], "q_norm": np.sum(q * q, axis=-1)}
+        return {
+            "energy": found[:, -1],
+            "constants": found[:, :-1],
+            "q_norm": np.sum(q * q, axis=-1),
+        }
 
 
 def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, ...]]:
@@ -166,7 +221,15 @@ def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, 
     if given is None:
         return Fraction(0), Fraction(0), (Fraction(0),) * n
     if not isinstance(given, Mapping) or not given or set(given) - set(_PARTS):
-        raise InvalidInput(("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given))
-    quartic, quadratic = (exact_number(given.get(name, 0), ("potential", name)) for name in _PARTS[:2])
-    betas = exact_vector(given["centrifugal"], ("potential", "centrifugal"), n) if "centrifugal" in given else (Fraction(0),) * n
+        raise InvalidInput(
+            ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
+        )
+    quartic, quadratic = (
+        exact_number(given.get(name, 0), ("potential", name)) for name in _PARTS[:2]
+    )
+    betas = (
+        exact_vector(given["centrifugal"], ("potential", "centrifugal"), n)
+        if "centrifugal" in given
+        else (Fraction(0),) * n
+    )
     return quartic, quadratic, betas

@@ -1,4 +1,6 @@
-"""The reduced LR flow on T*V(r,n): an n-dimensional body under the constraints (4.1), seen through its first r vectors."""
+"""The reduced LR flow on T*V(r,n): an n-dimensional body under the constraints (4.1), seen through
+its first r vectors.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_matrix, given_arguments, is_matrix, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_matrix,
+    given_arguments,
+    is_matrix,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.flow import FLOATS, Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.cotangent_flow import CotangentFlow, MomentumFlow
@@ -36,17 +44,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class StiefelFlow(Problem):
-    """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P), for any inertia and every rank 1 ≤ r ≤ n.
+    """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P), for any inertia and every
+    rank 1 ≤ r ≤ n.
 
-    inertia  {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …}, symmetric and positive
-             definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order
+    inertia  {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …},
+             symmetric and positive definite, on the coefficients of E_i∧E_j, i < j, in
+             lexicographic order
     X        (e_1 … e_r) at t = 0, (n, r), orthonormal columns
     P        the momentum ∂L/∂Ẋ, equation (dotX->P), (n, r), with XᵀP + PᵀX = 0, (condX); or
     X_dot    the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X)
 
-    The constraints must hold to 1e-9; with ``normalize=True`` X becomes the nearest orthonormal matrix and P or X_dot is
-    projected first. What is off by less is projected too. Raises InvalidInput, which names the field, what was required and
-    what was given. Tested for n = 2…6 and every rank.
+    The constraints must hold to 1e-9; with ``normalize=True`` X becomes the nearest orthonormal
+    matrix and P or X_dot is projected first. What is off by less is projected too. Raises
+    InvalidInput, which names the field, what was required and what was given. Tested for n = 2…6
+    and every rank.
     """
 
     X: Array
@@ -65,13 +76,16 @@ class StiefelFlow(Problem):
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
 
-    def __init__(self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False) -> None:
+    def __init__(
+        self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False
+    ) -> None:
         require_truth_value(normalize, "normalize")
         if (P is None) == (X_dot is None):
             raise InvalidInput(("P",), "either P or X_dot", "neither" if P is None else "both")
         if not is_matrix(X) or len(X) < 2:
             raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", show(X))
-        n, r = len(X), len(X[0])
+        n = len(X)
+        r = len(X[0])
         if not 1 <= r <= n:
             raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
         operator = body_inertia(inertia, n)
@@ -80,12 +94,25 @@ class StiefelFlow(Problem):
         tangent = _tangent(columns, to_float(exact_matrix(values, (name,), n, r)), name, normalize)
         momentum = tangent if X_dot is None else _momentum(operator, columns, tangent)
         self._set(inertia=operator, X=columns, P=momentum)
-        if not (np.isfinite(self.energy) and np.all(np.isfinite(self.omega)) and bool(np.any(momentum)) == (self.energy > 0)):
-            raise InvalidInput((name,), "an energy and angular velocity within the range of a float", f"energy {self.energy}")
-        self._set(given=given_arguments(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize))
+        if not (
+            np.isfinite(self.energy)
+            and np.all(np.isfinite(self.omega))
+            and bool(np.any(momentum)) == (self.energy > 0)
+        ):
+            raise InvalidInput(
+                (name,),
+                "an energy and angular velocity within the range of a float",
+                f"energy {self.energy}",
+            )
+        self._set(
+            given=given_arguments(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize)
+        )
 
     def __repr__(self) -> str:
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("X", "P"))
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
+            for name in ("X", "P")
+        )
         return f"StiefelFlow({', '.join(parts)})".replace("\n", "")
 
     @property
@@ -129,7 +156,9 @@ class StiefelFlow(Problem):
         return {"X": self.X[None], "P": self.P[None]}
 
     def flow(self, formulation: str = "reduced") -> Flow:
-        """Return the field (dot_P), or for ``momentum`` (4.1c) with (4.2a), in units of this problem; the body must move."""
+        """Return the field (dot_P), or for ``momentum`` (4.1c) with (4.2a), in units of this
+        problem; the body must move.
+        """
         reduced = CotangentFlow.of(self.inertia, self.X, self.omega)
         return reduced if formulation == "reduced" else MomentumFlow(reduced)
 
@@ -156,16 +185,21 @@ class StiefelFlow(Problem):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``energy`` ½⟨𝓘ω,ω⟩; ``X_X`` XᵀX; ``X_P`` XᵀP/|P|, which is skew; ``P_P`` PᵀP; ``traces`` the coefficients of
-        tr(𝓜+λΓ)^k, k ≤ n, see ``trace_integrals``; ``invariants`` the singular values of 𝓜, its Ad-invariants.
+        ``energy`` ½⟨𝓘ω,ω⟩; ``X_X`` XᵀX; ``X_P`` XᵀP/|P|, which is skew; ``P_P`` PᵀP; ``traces`` the
+        coefficients of tr(𝓜+λΓ)^k, k ≤ n, see ``trace_integrals``; ``invariants`` the singular
+        values of 𝓜, its Ad-invariants.
         """
-        X, P = series["X"], series["P"]
-        momentum, transposed = momentum_map(X, P), np.swapaxes(X, -1, -2)
+        X = series["X"]
+        P = series["P"]
+        momentum = momentum_map(X, P)
+        transposed = np.swapaxes(X, -1, -2)
         size = norm(P.reshape(P.shape[0], -1))[:, None, None]
         return {
             "energy": self._energy(X, P),
             "X_X": transposed @ X,
-            "X_P": np.divide(transposed @ P, size, out=np.zeros((len(X), self.rank, self.rank)), where=size > 0),
+            "X_P": np.divide(
+                transposed @ P, size, out=np.zeros((len(X), self.rank, self.rank)), where=size > 0
+            ),
             "P_P": np.swapaxes(P, -1, -2) @ P,
             "traces": trace_integrals(X, momentum),
             "invariants": ad_invariants(momentum),
@@ -173,22 +207,34 @@ class StiefelFlow(Problem):
 
 
 def _orthonormal(X: Array, normalize: bool) -> Array:
-    """Return the columns made exactly orthonormal; raises InvalidInput where they are not, or not independent."""
+    """Return the columns made exactly orthonormal; raises InvalidInput where they are not, or not
+    independent.
+    """
     largest = float(np.max(np.abs(X))) or 1.0
     if normalize:
         values = np.linalg.svd(X / largest, compute_uv=False)
         if values[-1] <= X.shape[0] * np.finfo(float).eps * values[0]:
-            raise InvalidInput(("X",), "linearly independent columns", f"a smallest singular value of {values[-1] * largest:.3g}")
+            raise InvalidInput(
+                ("X",),
+                "linearly independent columns",
+                f"a smallest singular value of {values[-1] * largest:.3g}",
+            )
         return nearest_orthonormal(X / largest)
     with np.errstate(over="ignore", invalid="ignore"):
         defect = float(np.max(np.abs(X.T @ X - np.eye(X.shape[1]))))
     if not defect <= INPUT_TOLERANCE:
-        raise InvalidInput(("X",), "orthonormal columns to 1e-9 (or normalize=True)", f"|XᵀX − 1| up to {defect:.3g}")
+        raise InvalidInput(
+            ("X",),
+            "orthonormal columns to 1e-9 (or normalize=True)",
+            f"|XᵀX − 1| up to {defect:.3g}",
+        )
     return nearest_orthonormal(X)
 
 
 def _tangent(X: Array, values: Array, name: str, normalize: bool) -> Array:
-    """Return the part of values that meets (cond_X), (condX); raises InvalidInput where it is not all."""
+    """Return the part of values that meets (cond_X), (condX); raises InvalidInput where it is not
+    all.
+    """
     largest = float(np.max(np.abs(values))) or 1.0
     scaled = values / largest
     along = X.T @ scaled

@@ -1,4 +1,6 @@
-"""Problems whose motion is linear on the real torus of a hyperelliptic curve: what the closed form needs to know of them."""
+"""Problems whose motion is linear on the real torus of a hyperelliptic curve: what the closed form
+needs to know of them.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,16 @@ Array = NDArray[np.float64]
 
 
 class TorusProblem(Problem):
-    """A point q on Sⁿ⁻¹ that is Neumann's in τ₁, with the frame [q, n_2 … n_{n−1}, γ] or a rotated one.
+    """A point q on Sⁿ⁻¹ that is Neumann's in τ₁, with the frame [q, n_2 … n_{n−1}, γ] or a rotated
+    one.
 
     Subclasses differ in their time.
-    A (n,) along principal axes · frame (n, n) at the start, along them · near_frame: the same in double precision, at less cost;
-    a natural one is turned by ε/(distance of its constants) · exact: the data as rationals · axes (n, n): the principal axes as
-    columns, None where they are the body's. The series of an engine are ``tau1``, ``frame``, ``spheroconic``
-    and ``q_dot``, the velocity in the problem's own ``time``: t, s or tau1; ``completed`` makes the problem's series of them.
+    A (n,) along principal axes · frame (n, n) at the start, along them · near_frame: the same in
+    double precision, at less cost; a natural one is turned by ε/(distance of its constants) ·
+    exact: the data as rationals · axes (n, n): the principal axes as columns, None where they are
+    the body's. The series of an engine are ``tau1``, ``frame``, ``spheroconic`` and ``q_dot``, the
+    velocity in the problem's own ``time``: t, s or tau1; ``completed`` makes the problem's series
+    of them.
     """
 
     A: Array
@@ -35,7 +40,10 @@ class TorusProblem(Problem):
     axes: Array | None = None
 
     has_tori: ClassVar[bool] = True
-    engines: ClassVar = {"analytic": ("theta", "products", "nufft", "angles"), "numeric": ("dop853", "taylor")}
+    engines: ClassVar = {
+        "analytic": ("theta", "products", "nufft", "angles"),
+        "numeric": ("dop853", "taylor"),
+    }
 
     @property
     @abstractmethod
@@ -47,7 +55,9 @@ class TorusProblem(Problem):
     def energy(self) -> float:
         """Return the energy that the motion conserves."""
 
-    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
         """Return q, the first column of the frame, with its radii."""
         if name != "q":
             raise KeyError(name)
@@ -75,7 +85,9 @@ class _OnTorus(Protocol):
 
 
 def on_torus(problem: Problem) -> TorusProblem:
-    """Return the problem on whose torus a motion runs. Raises InvalidInput for a system without tori."""
+    """Return the problem on whose torus a motion runs. Raises InvalidInput for a system without
+    tori.
+    """
     if not isinstance(problem, _OnTorus):
         systems = "veselova, veselova-so3, neumann, ellipsoid-geodesic"
         raise InvalidInput(("problem",), f"a system with a torus: {systems}", problem.system)

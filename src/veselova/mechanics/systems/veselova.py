@@ -15,13 +15,25 @@ from numpy.typing import NDArray
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, given_arguments, read_only, require_truth_value, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    given_arguments,
+    read_only,
+    require_truth_value,
+    to_float,
+)
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
 from veselova.mechanics.geometry.natural_frame import moser_frame, refine
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest, point_on_sphere, unit
+from veselova.mechanics.geometry.sphere import (
+    INPUT_TOLERANCE,
+    ExactState,
+    over_largest,
+    point_on_sphere,
+    unit,
+)
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -33,18 +45,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova(TorusProblem):
-    """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the constraint (44), n ≥ 2.
+    """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
+    constraint (44), n ≥ 2.
 
-    A        n positive numbers, or a symmetric positive definite n × n matrix, which is diagonalised: the body axes then
-             stay the given ones, and A, q, q_dot, frame below are in the principal axes (``axes`` maps back)
+    A        n positive numbers, or a symmetric positive definite n × n matrix, which is
+             diagonalised: the body axes then stay the given ones, and A, q, q_dot, frame below are
+             in the principal axes (``axes`` maps back)
     q        the unit vector e_1 at t = 0, seen from the body, (n,)
     q_dot    its velocity, tangent to the sphere, (n,); zero is a body at rest
-    frame    the frame [e_1 … e_n] at t = 0, (n, n), columns e_i, e_1 = q; None for the natural frame (Theorem recon0)
+    frame    the frame [e_1 … e_n] at t = 0, (n, n), columns e_i, e_1 = q; None for the natural
+        frame (Theorem recon0)
 
-    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and q_dot projected first,
-    and the frame made orthonormal with e_1 = q, its determinant keeping its sign (``given_frame``).
-    Every number may be given as a string ("0.7", "7/10") and is then taken exactly. What is off the manifold by less than
-    the tolerance is projected onto it. Raises InvalidInput, which names the field, what was required and what was given.
+    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and
+    q_dot projected first, and the frame made orthonormal with e_1 = q, its determinant keeping its
+    sign (``given_frame``). Every number may be given as a string ("0.7", "7/10") and is then taken
+    exactly. What is off the manifold by less than the tolerance is projected onto it. Raises
+    InvalidInput, which names the field, what was required and what was given.
     """
 
     A: Array
@@ -69,7 +85,9 @@ class Veselova(TorusProblem):
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
-    def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False) -> None:
+    def __init__(
+        self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False
+    ) -> None:
         require_truth_value(normalize, "normalize")
         diagonal, axes = principal_inertia(A)
         exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
@@ -79,46 +97,66 @@ class Veselova(TorusProblem):
             exact = replace(exact, q=axes.to_axes(exact.q), q_dot=axes.to_axes(exact.tangent))
             position = to_float(over_largest(exact.q))
         exact = replace(exact, frame=exact_frame)
-        position, velocity = unit(position), _round(exact.tangent)
+        position = unit(position)
+        velocity = _round(exact.tangent)
         A_float = to_float(diagonal)
         found = integrals.StateIntegrals(A_float, position, velocity)
         _require_representable_energy(float(found.scaled_energy), velocity)
         if exact_frame is None:
             near_frame = moser_frame(found.A, position, found.q_prime)
         else:
-            along = to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
+            along = (
+                to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
+            )
             near_frame = admissible_frame(along, position)
         given = given_arguments(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
-        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given)
+        self._set(
+            A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given
+        )
         self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
     def from_neumann(cls, system: NeumannSystem, energy: Any, frame: Any = None) -> Veselova:
-        """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system (Theorem LR→Nn).
+        """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
+        (Theorem LR→Nn).
 
-        q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation (4.8), to 1e-9 of (Aq,q).
+        q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation
+        (4.8), to 1e-9 of (Aq,q).
         """
         h = float(exact_number(energy, ("energy",)))
         if h <= 0:
             raise InvalidInput(("energy",), "a number greater than 0", show(energy))
-        A, q, v = system.A, system.q, system.q_prime
+        A = system.A
+        q = system.q
+        v = system.q_prime
         F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
         if abs(F0) > INPUT_TOLERANCE:
-            raise InvalidInput(("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}")
+            raise InvalidInput(
+                ("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}"
+            )
         return cls(A, q, v * np.sqrt(h / integrals.energy(A, q, v)), frame, normalize=True)
 
     def neumann(self) -> NeumannSystem:
-        """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the principal axes; F_0 = 0.
+        """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the
+        principal axes; F_0 = 0.
 
-        q' = q̇ √((Aq,q)/(2h det A)); ``from_neumann`` is the way back. Raises InvalidInput for a body at rest.
+        q' = q̇ √((Aq,q)/(2h det A)); ``from_neumann`` is the way back. Raises InvalidInput for a
+        body at rest.
         """
         if not self.moves:
-            raise InvalidInput(("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector")
-        return NeumannSystem(self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True)
+            raise InvalidInput(
+                ("q_dot",), "a body that moves (at rest τ₁ stands still)", "the zero vector"
+            )
+        return NeumannSystem(
+            self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True
+        )
 
     def __repr__(self) -> str:
         # Vectors along the principal axes, to the digits that recognise them.
-        parts = (f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}" for name in ("A", "q", "q_dot"))
+        parts = (
+            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
+            for name in ("A", "q", "q_dot")
+        )
         return f"Veselova({', '.join(parts)})".replace("\n", "")
 
     @cached_property
@@ -128,19 +166,25 @@ class Veselova(TorusProblem):
 
     @cached_property
     def frame(self) -> Array:
-        """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the last bit."""
+        """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the
+        last bit.
+        """
         if not self.exact.natural:
             return self.near_frame
         return read_only(refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
 
     @cached_property
     def energy(self) -> float:
-        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the range of a float."""
+        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the
+        range of a float.
+        """
         return float(integrals.energy(self.A, self.q, self.q_dot))
 
     @cached_property
     def constants(self) -> Array:
-        """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of the invariant polynomial N(λ), shape (n−2,)."""
+        """Return c_2 ≤ … ≤ c_{n−1}, the nonzero roots of the invariant polynomial N(λ), shape
+        (n−2,).
+        """
         return read_only(integrals.constants_of_motion(self.A, self.q, self.q_dot))
 
     @cached_property
@@ -151,11 +195,15 @@ class Veselova(TorusProblem):
     @property
     def title(self) -> str:
         """Return the system and its dimension."""
-        return f"{self.system}, n = {self.n}" + (f", energy {self.energy:.12g}" if self.has_units else "")
+        return f"{self.system}, n = {self.n}" + (
+            f", energy {self.energy:.12g}" if self.has_units else ""
+        )
 
     @cached_property
     def has_units(self) -> bool:
-        """Return whether h and p are floats: they scale like A^(2−n), and the motion does not depend on the scale of A."""
+        """Return whether h and p are floats: they scale like A^(2−n), and the motion does not
+        depend on the scale of A.
+        """
         return integrals.StateIntegrals(self.A, self.q, self.q_dot).has_units
 
     @property
@@ -170,7 +218,9 @@ class Veselova(TorusProblem):
         return self.complete({**series, "spheroconic": self.spheroconic[None]})
 
     def flow(self, formulation: str = "reduced") -> ReducedFlow:
-        """Return the reduced flow (extended) with the frame, in units of this problem; the body must move."""
+        """Return the reduced flow (extended) with the frame, in units of this problem; the body
+        must move.
+        """
         return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
 
     @property
@@ -179,8 +229,11 @@ class Veselova(TorusProblem):
         return frozenset({"q_p"})
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the body, equation (44.3)."""
-        q, q_dot = series["frame"][..., 0], series["q_dot"]
+        """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the
+        body, equation (44.3).
+        """
+        q = series["frame"][..., 0]
+        q_dot = series["q_dot"]
         if name == "q":
             return np.asarray(q)
         if name == "spheroconic":
@@ -188,26 +241,34 @@ class Veselova(TorusProblem):
         product = q[..., :, None] * q_dot[..., None, :]
         return np.asarray(product - np.swapaxes(product, -1, -2))
 
-    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
         """Return q or ω with its radii."""
         if name == "omega":
             return derive_velocity_pair(midpoints, radii, digits)
         return super().derive_decimals(name, midpoints, radii, digits)
 
     def complete(self, series: Series) -> Series:
-        """Return series along the principal axes of A in the body axes; spheroconic coordinates only where they were found."""
+        """Return series along the principal axes of A in the body axes; spheroconic coordinates
+        only where they were found.
+        """
         rotated = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
         return {**series, **rotated}
 
     def integrals(self, series: Series) -> dict[str, Array]:
-        """Return the integrals of motion along states in the body axes, by name, first axis the times.
+        """Return the integrals of motion along states in the body axes, by name, first axis the
+        times.
 
-        ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n; ``constants`` c_2…c_{n−1}.
+        ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n;
+        ``constants`` c_2…c_{n−1}.
         ``energy`` and ``linear`` are left out where det A takes h or p out of the range of a float.
         """
-        q_dot, frame = series["q_dot"], series["frame"]
+        q_dot = series["q_dot"]
+        frame = series["frame"]
         if self.axes is not None:
-            q_dot, frame = q_dot @ self.axes, self.axes.T @ frame
+            q_dot = q_dot @ self.axes
+            frame = self.axes.T @ frame
         q = frame[..., 0]
         found = integrals.StateIntegrals(self.A, q, q_dot)
         p = found.scaled_momentum
@@ -223,10 +284,14 @@ class Veselova(TorusProblem):
         }
 
     def to_body_axes(self, vectors: Array) -> Array:
-        """Return components along the given body axes of vectors (..., n) or column matrices (..., n, k) in principal axes."""
+        """Return components along the given body axes of vectors (..., n) or column matrices (...,
+        n, k) in principal axes.
+        """
         if self.axes is None:
             return vectors
-        return np.asarray(vectors @ self.axes.T if vectors.ndim < 3 else self.axes @ vectors, dtype=np.float64)
+        return np.asarray(
+            vectors @ self.axes.T if vectors.ndim < 3 else self.axes @ vectors, dtype=np.float64
+        )
 
 
 def _round(tangent: tuple[Fraction, ...]) -> Array:
@@ -234,9 +299,13 @@ def _round(tangent: tuple[Fraction, ...]) -> Array:
         return to_float(tangent)
     except OverflowError:
         given = f"{len(tangent)} entries beyond it"
-        raise InvalidInput(("q_dot",), "a tangential part within the range of a float", given) from None
+        raise InvalidInput(
+            ("q_dot",), "a tangential part within the range of a float", given
+        ) from None
 
 
 def _require_representable_energy(energy: float, q_dot: Array) -> None:
     if not math.isfinite(energy) or (energy == 0 and q_dot.any()):
-        raise InvalidInput(("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}")
+        raise InvalidInput(
+            ("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}"
+        )

@@ -17,7 +17,13 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_vector, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import momentum
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, inverse_length, over_largest, unit
+from veselova.mechanics.geometry.sphere import (
+    INPUT_TOLERANCE,
+    exact_cross,
+    inverse_length,
+    over_largest,
+    unit,
+)
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -28,29 +34,36 @@ __all__ = ["VeselovaSO3", "multiplier"]
 Array = NDArray[np.float64]
 
 
-#: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles, and beyond all digits that can be
-#: asked for. Each costs: exact rationals of 4096 bits make a solution in doubles half as long again.
-_DOUBLE_BITS, _ALL_BITS = 320, 4096
+#: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles, and
+#: beyond all digits that can be asked for. Each costs: exact rationals of 4096 bits make a solution
+#: in doubles half as long again.
+_DOUBLE_BITS = 320
+_ALL_BITS = 4096
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class VeselovaSO3(RigidBody):
-    """A rigid body under (Ω,γ) = const, equations (3.1) with (la): 𝓘Ω̇ = 𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i = e_i×Ω, e_1 = γ.
+    """A rigid body under (Ω,γ) = const, equations (3.1) with (la): 𝓘Ω̇ = 𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i =
+    e_i×Ω, e_1 = γ.
 
-    inertia    3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no triangle inequality is asked for
+    inertia    3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no
+        triangle inequality is asked for
     gamma      the unit vector e_1 at t = 0, seen from the body, (3,)
     Omega      the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it
-    potential  V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of (3.5), {"polynomial": […]}; None for 0
-    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ and γ̇
+    potential  V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of (3.5),
+        {"polynomial": […]}; None for 0
+    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ
+        and γ̇
 
-    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made orthonormal.
-    Raises InvalidInput, which names the field.
-    Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations: ``multiplier``, (3.1) with
-    (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after (4.2a).
+    γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made
+    orthonormal. Raises InvalidInput, which names the field.
+    Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations:
+    ``multiplier``, (3.1) with (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after
+    (4.2a).
 
-    Where (Ω,γ) = 0 engine ``analytic`` has the motion, and is the default: without a potential by theta functions, that of the
-    rank-one problem; with one of (3.5) (``clebsch``, ``family``) by quadratures, method ``angles``. ``without_closed_form`` is
-    the reason for every other problem.
+    Where (Ω,γ) = 0 engine ``analytic`` has the motion, and is the default: without a potential by
+    theta functions, that of the rank-one problem; with one of (3.5) (``clebsch``, ``family``) by
+    quadratures, method ``angles``. ``without_closed_form`` is the reason for every other problem.
     """
 
     system: ClassVar[str] = "veselova-so3"
@@ -68,7 +81,14 @@ class VeselovaSO3(RigidBody):
     constrained: ClassVar[bool] = True
 
     def __init__(
-        self, inertia: Any, gamma: Any, Omega: Any, potential: Any = None, frame: Any = None, *, normalize: bool = False
+        self,
+        inertia: Any,
+        gamma: Any,
+        Omega: Any,
+        potential: Any = None,
+        frame: Any = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
         if frame is None and self.has_torus:  # one start for both engines, and all digits of it
@@ -81,16 +101,22 @@ class VeselovaSO3(RigidBody):
         if self.linear != 0:
             return f"the closed form has (Ω,γ) = 0, here {self.linear:.6g}; integrate numerically"
         if self.potential.terms and set(self.potential.given or ()) - {"clebsch", "family"}:
-            return "the closed form has the potentials (3.5), no polynomial of a user's; integrate numerically"
+            return (
+                "the closed form has the potentials (3.5), no polynomial of a user's; integrate "
+                "numerically"
+            )
         return None
 
     @property
     def default_engine(self) -> str:
         """Return ``analytic`` where the motion has a closed form, else ``numeric``.
 
-        ``numeric`` too where V is −∞ in a plane: before a collision times are answered by integration alone.
+        ``numeric`` too where V is −∞ in a plane: before a collision times are answered by
+        integration alone.
         """
-        family = exact_vector((self.potential.given or {}).get("family", [0] * 5), ("potential", "family"), 5)
+        family = exact_vector(
+            (self.potential.given or {}).get("family", [0] * 5), ("potential", "family"), 5
+        )
         return "numeric" if self.without_closed_form or min(family[2:]) < 0 else "analytic"
 
     @property
@@ -99,7 +125,9 @@ class VeselovaSO3(RigidBody):
         return not self.potential.terms and self.linear == 0
 
     def on_torus(self) -> Veselova:
-        """Return ``rank_one()``, the same object every time; an irrational |γ| to the digits that doubles need."""
+        """Return ``rank_one()``, the same object every time; an irrational |γ| to the digits that
+        doubles need.
+        """
         return self._near_rank_one
 
     @cached_property
@@ -121,28 +149,42 @@ class VeselovaSO3(RigidBody):
             return multiplier(self, series["Omega"], series["frame"][..., 0])
         return super().derive(name, series)
 
-    def derive_decimals(self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int) -> Pair:
-        """Return gamma, momentum or multiplier with their radii, where V = 0 and (Ω,γ) = 0 and the moments are exact."""
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
+        """Return gamma, momentum or multiplier with their radii, where V = 0 and (Ω,γ) = 0 and the
+        moments are exact.
+        """
         if name == "gamma":
             return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
         balls = DecimalBalls(digits)
-        Omega, frame = (balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame"))
-        gamma, moments = frame[:, :, 0], balls.of(self.moments)
-        M, across = Omega * moments, gamma / moments
+        Omega, frame = (
+            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
+        )
+        gamma = frame[:, :, 0]
+        moments = balls.of(self.moments)
+        M = Omega * moments
+        across = gamma / moments
         if name == "momentum":
             return balls.pair(M - np.sum(M * gamma, axis=1)[:, None] * gamma)
-        return balls.pair(-np.sum(cross(M, Omega) * across, axis=1) / np.sum(gamma * across, axis=1))
+        return balls.pair(
+            -np.sum(cross(M, Omega) * across, axis=1) / np.sum(gamma * across, axis=1)
+        )
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); ``energy`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V, the Jacobi–Painlevé integral (ints),
-        F_1 + V where (Ω,γ) = 0; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and (3.5), where the potential has a companion F and
-        (Ω,γ) = 0 or F asks for none; ``space_momentum`` Eᵀ𝔪 where V = 0.
+        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); ``energy`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V, the
+        Jacobi–Painlevé integral (ints), F_1 + V where (Ω,γ) = 0; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and
+        (3.5), where the potential has a companion F and (Ω,γ) = 0 or F asks for none;
+        ``space_momentum`` Eᵀ𝔪 where V = 0.
         """
-        Omega, frame = series["Omega"], series["frame"]
-        gamma, potential = frame[..., 0], self.potential
-        M, m = Omega @ self.inertia, momentum(self.inertia, Omega, gamma, constrained=True)
+        Omega = series["Omega"]
+        frame = series["frame"]
+        gamma = frame[..., 0]
+        potential = self.potential
+        M = Omega @ self.inertia
+        m = momentum(self.inertia, Omega, gamma, constrained=True)
         along = np.sum(Omega * gamma, axis=-1)
         kinetic = np.sum(Omega * M, axis=-1) / 2 - along * np.sum(M * gamma, axis=-1)
         found = {
@@ -157,7 +199,8 @@ class VeselovaSO3(RigidBody):
         return found
 
     def rank_one(self) -> Veselova:
-        """Return the same motion as the rank-one problem with A = 𝓘⁻¹, q = γ, q̇ = γ×Ω, exact where the data are.
+        """Return the same motion as the rank-one problem with A = 𝓘⁻¹, q = γ, q̇ = γ×Ω, exact where
+        the data are.
 
         Raises Unsolved (``not-rank-one``) unless V = 0 and (Ω,γ) = 0 to 1e-9 of |Ω|.
         """
@@ -166,35 +209,56 @@ class VeselovaSO3(RigidBody):
     def _rank_one(self, bits: int) -> Veselova:
         self._require_geodesic()
         exact = self.wide_axes is None
-        A: Any = [1 / moment for moment in self.moments] if exact else exact_inverse(symmetric_matrix(self.given["inertia"]))
-        gamma, length = self.exact_gamma, inverse_length(self.exact_gamma, bits)
+        A: Any = (
+            [1 / moment for moment in self.moments]
+            if exact
+            else exact_inverse(symmetric_matrix(self.given["inertia"]))
+        )
+        gamma = self.exact_gamma
+        length = inverse_length(self.exact_gamma, bits)
         velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
         return Veselova(A, gamma, velocity, self.exact_frame, normalize=True)
 
     def neumann(self) -> NeumannSystem:
-        """Return the Neumann system that γ is in time τ₁, dτ₁ = √(2h det𝓘⁻¹/(𝓘⁻¹γ,γ)) dt (Theorem LR→N3), in principal axes.
+        """Return the Neumann system that γ is in time τ₁, dτ₁ = √(2h det𝓘⁻¹/(𝓘⁻¹γ,γ)) dt (Theorem
+        LR→N3), in principal axes.
 
-        Raises Unsolved (``not-rank-one``) unless V = 0 and (Ω,γ) = 0 to 1e-9 of |Ω|, or at rest, where τ₁ stands still.
+        Raises Unsolved (``not-rank-one``) unless V = 0 and (Ω,γ) = 0 to 1e-9 of |Ω|, or at rest,
+        where τ₁ stands still.
         """
         self._require_geodesic()
         if not np.any(self.Omega):
             raise Unsolved("not-rank-one", "a body at rest has no Neumann time: dτ₁/dt = 0")
         exact_gamma, exact_Omega = self.to_axes()
-        gamma, Omega = unit(to_float(over_largest(exact_gamma))), to_float(exact_Omega)
+        gamma = unit(to_float(over_largest(exact_gamma)))
+        Omega = to_float(exact_Omega)
         moments = to_float(self.moments)
         rate = np.sqrt(Omega @ (moments * Omega) / np.prod(moments) / (gamma @ (gamma / moments)))
-        return NeumannSystem([1 / moment for moment in self.moments], gamma, np.cross(gamma, Omega) / rate, normalize=True)
+        return NeumannSystem(
+            [1 / moment for moment in self.moments],
+            gamma,
+            np.cross(gamma, Omega) / rate,
+            normalize=True,
+        )
 
     def _require_geodesic(self) -> None:
         if self.potential.terms:
-            raise Unsolved("not-rank-one", "the rank-one problem and Theorem LR→N3 have no potential; integrate numerically")
+            raise Unsolved(
+                "not-rank-one",
+                "the rank-one problem and Theorem LR→N3 have no potential; integrate numerically",
+            )
         if abs(self.linear) > INPUT_TOLERANCE * np.linalg.norm(self.Omega):
-            reason = f"the rank-one problem and Theorem LR→N3 have (Ω,γ) = 0, here {self.linear:.6g}; integrate numerically"
+            reason = (
+                "the rank-one problem and Theorem LR→N3 have (Ω,γ) = 0, here "
+                f"{self.linear:.6g}; integrate numerically"
+            )
             raise Unsolved("not-rank-one", reason)
 
 
 def multiplier(problem: VeselovaSO3, Omega: Array, gamma: Array) -> Array:
     """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la), shape (...)."""
-    force = np.cross(Omega @ problem.inertia, Omega) + np.cross(gamma, problem.potential.terms.gradient(gamma))
+    force = np.cross(Omega @ problem.inertia, Omega) + np.cross(
+        gamma, problem.potential.terms.gradient(gamma)
+    )
     across = gamma @ problem.inverse
     return np.asarray(-np.sum(force * across, axis=-1) / np.sum(gamma * across, axis=-1))

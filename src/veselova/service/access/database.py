@@ -1,8 +1,9 @@
 """The database of the service: its tables, its migrations, and the one way to connect to it.
 
-SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The tables are made and changed by the migrations
-in ``veselova.migrations`` alone; what is written here must say the same, and a test compares the two. ``engine.connect()`` reads;
-whatever writes does so in ``writing(engine)``.
+SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The tables are made
+and changed by the migrations in ``veselova.migrations`` alone; what is written here must say the
+same, and a test compares the two. ``engine.connect()`` reads; whatever writes does so in
+``writing(engine)``.
 """
 
 from __future__ import annotations
@@ -24,7 +25,13 @@ from alembic.script.revision import RevisionError
 from alembic.util import CommandError
 
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.sqlite_file import begin_immediately, damage_of, empty_log, open_sqlite, sqlite_path
+from veselova.service.access.sqlite_file import (
+    begin_immediately,
+    damage_of,
+    empty_log,
+    open_sqlite,
+    sqlite_path,
+)
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 
@@ -45,8 +52,9 @@ __all__ = [
 
 metadata = sa.MetaData()
 
-#: One row for each sweep of an owner. ``id`` is the hash of the canonical request and its owner, so that the same request is the
-#: same job. ``owner`` is that of the key which asked, empty where none is shown; ``bytes`` what its results may take, or took.
+#: One row for each sweep of an owner. ``id`` is the hash of the canonical request and its owner, so
+#: that the same request is the same job. ``owner`` is that of the key which asked, empty where none
+#: is shown; ``bytes`` what its results may take, or took.
 jobs = sa.Table(
     "jobs",
     metadata,
@@ -66,13 +74,16 @@ jobs = sa.Table(
 chunks = sa.Table(
     "chunks",
     metadata,
-    sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column(
+        "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True
+    ),
     sa.Column("position", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("rows", sa.Integer, nullable=False),
     sa.Column("sha256", sa.String(64), nullable=False),
 )
 
-#: What a client said with ``Idempotency-Key``, and the job that it got. A row is written before its job is.
+#: What a client said with ``Idempotency-Key``, and the job that it got. A row is written before its
+#: job is.
 idempotency_keys = sa.Table(
     "idempotency_keys",
     metadata,
@@ -87,7 +98,8 @@ idempotency_keys = sa.Table(
     sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
 )
 
-#: Keys that clients show; only the hash of a key is known here. Keys of one ``owner`` see the same jobs and answers.
+#: Keys that clients show; only the hash of a key is known here. Keys of one ``owner`` see the same
+#: jobs and answers.
 api_keys = sa.Table(
     "api_keys",
     metadata,
@@ -101,22 +113,33 @@ api_keys = sa.Table(
     sa.Column("expires_at", sa.DateTime(timezone=True)),
 )
 
-#: Alembic keeps the migration that runs in a module of its own, so two must not run in one process at once.
+#: Alembic keeps the migration that runs in a module of its own, so two must not run in one process
+#: at once.
 _MIGRATING = threading.Lock()
 
 #: Failures of a statement or its values. The database is there: asking again changes nothing.
-_NO_OUTAGE = (sa.exc.DataError, sa.exc.IntegrityError, sa.exc.ProgrammingError, sa.exc.NotSupportedError)
+_NO_OUTAGE = (
+    sa.exc.DataError,
+    sa.exc.IntegrityError,
+    sa.exc.ProgrammingError,
+    sa.exc.NotSupportedError,
+)
 
 
 def connect(settings: Settings) -> sa.Engine:
     """Return an engine on the database of the settings, its tables brought up to date.
 
-    Raises InvalidInput for an address that cannot be read or a folder that others may write, Refused (``database-damaged``,
-    ``database-newer``), OSError or sqlalchemy.exc.SQLAlchemyError where it cannot be opened.
+    Raises InvalidInput for an address that cannot be read or a folder that others may write,
+    Refused (``database-damaged``, ``database-newer``), OSError or sqlalchemy.exc.SQLAlchemyError
+    where it cannot be opened.
     """
     url = database_url(settings)
     path = sqlite_path(url)
-    engine = open_sqlite(url, path) if url.get_backend_name() == "sqlite" else sa.create_engine(url, pool_pre_ping=True)
+    engine = (
+        open_sqlite(url, path)
+        if url.get_backend_name() == "sqlite"
+        else sa.create_engine(url, pool_pre_ping=True)
+    )
     try:
         with _MIGRATING:
             _bring_up_to_date(engine, path)
@@ -137,7 +160,10 @@ def _bring_up_to_date(engine: sa.Engine, path: Path | None) -> None:
             lacking = sorted(metadata.tables.keys() - set(sa.inspect(engine).get_table_names()))
             damage = f"it lacks the tables {', '.join(lacking)}" if lacking else ""
     except (CommandError, RevisionError) as error:
-        detail = f"The database was made by a later version of veselova, which has to be started instead ({error})."
+        detail = (
+            "The database was made by a later version of veselova, which has to be started "
+            f"instead ({error})."
+        )
         raise Refused("database-newer", detail) from None
     except sa.exc.OperationalError:
         raise
@@ -153,9 +179,12 @@ def _what_to_do(damage: str, path: Path | None) -> str:
     if path is None:
         return f"The database is damaged: {damage}. Restore it from a copy."
     return (
-        f"The database {path} is damaged: {damage}. Stop every veselova that uses it and move {path.name}, {path.name}-wal and "
-        f"{path.name}-shm together into another folder; then put a copy of it in their place, or start without one. "
-        f"`sqlite3 {path.name} .recover` in that folder prints what can be read, the keys among it. Where the log alone is "
+        f"The database {path} is damaged: {damage}. Stop every veselova that uses it and "
+        f"move {path.name}, {path.name}-wal and "
+        f"{path.name}-shm together into another folder; then put a copy of it in their "
+        "place, or start without one. "
+        f"`sqlite3 {path.name} .recover` in that folder prints what can be read, the keys "
+        "among it. Where the log alone is "
         "damaged, the database without it is as it was before what the log has."
     )
 
@@ -164,19 +193,25 @@ def _what_to_do(damage: str, path: Path | None) -> str:
 def writing(engine: sa.Engine, lock: str = "") -> Iterator[sa.Connection]:
     """Give a connection whose transaction writes, and commits at the end of the block.
 
-    On SQLite it holds the one lock for writing from its first statement on, so nothing that it read can change before it writes.
-    On PostgreSQL ``lock`` names what two such transactions may not do at once.
+    On SQLite it holds the one lock for writing from its first statement on, so nothing that it read
+    can change before it writes. On PostgreSQL ``lock`` names what two such transactions may not do
+    at once.
     """
     with engine.connect() as plain:
         connection = begin_immediately(plain)
         with connection.begin():
             if lock and connection.dialect.name == "postgresql":
-                connection.execute(sa.text("SELECT pg_advisory_xact_lock(hashtext(:name))"), {"name": f"veselova {lock}"})
+                connection.execute(
+                    sa.text("SELECT pg_advisory_xact_lock(hashtext(:name))"),
+                    {"name": f"veselova {lock}"},
+                )
             yield connection
 
 
 def database_url(settings: Settings) -> sa.URL:
-    """Return the address of the database. Raises InvalidInput for one that cannot be read, or another kind of database."""
+    """Return the address of the database. Raises InvalidInput for one that cannot be read, or
+    another kind of database.
+    """
     stated = settings.database_url.get_secret_value()
     try:
         url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")
@@ -184,14 +219,17 @@ def database_url(settings: Settings) -> sa.URL:
         url = sa.URL.create("unreadable")
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise InvalidInput(
-            ("VESELOVA_DATABASE_URL",), "an address sqlite:///PATH or postgresql://USER@HOST/NAME", url.render_as_string()
+            ("VESELOVA_DATABASE_URL",),
+            "an address sqlite:///PATH or postgresql://USER@HOST/NAME",
+            url.render_as_string(),
         )
     # A bare postgresql:// would mean psycopg2, which is not what the extra installs.
     return url.set(drivername="postgresql+psycopg") if url.drivername == "postgresql" else url
 
 
 def _migrate(connection: sa.Connection) -> bool:
-    """Run the migrations that the database has not seen, all or none of them, and return whether there were any.
+    """Run the migrations that the database has not seen, all or none of them, and return whether
+    there were any.
 
     Of two servers that start together the second waits for the first, and finds nothing to do.
     """
@@ -206,10 +244,14 @@ def _migrate(connection: sa.Connection) -> bool:
 
     def steps(current: Any, _: Any) -> list[Any]:
         pending.extend(reversed(list(script.iterate_revisions("head", current or "base"))))
-        return [MigrationStep.upgrade_from_script(script.revision_map, revision) for revision in pending]
+        return [
+            MigrationStep.upgrade_from_script(script.revision_map, revision) for revision in pending
+        ]
 
     with EnvironmentContext(config, script, fn=steps) as environment:
-        environment.configure(connection=connection, target_metadata=metadata, transactional_ddl=True)
+        environment.configure(
+            connection=connection, target_metadata=metadata, transactional_ddl=True
+        )
         environment.run_migrations()
     return bool(pending)
 
@@ -221,15 +263,23 @@ def in_utc(moment: datetime) -> datetime:
 
 def reason_of(error: Exception) -> str:
     """Return what the disk or the database says, without statements, addresses or paths."""
-    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(".")
+    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(
+        "."
+    )
 
 
 def is_outage(error: Exception) -> bool:
-    """Return whether a failure says that the disk or the database does not answer at present, so that asking again may help."""
-    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(error, _NO_OUTAGE)
+    """Return whether a failure says that the disk or the database does not answer at present, so
+    that asking again may help.
+    """
+    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(
+        error, _NO_OUTAGE
+    )
 
 
 def schema_differences(engine: sa.Engine) -> list[Any]:
-    """Return what the tables in the database have that those of this module have not, and the other way round."""
+    """Return what the tables in the database have that those of this module have not, and the other
+    way round.
+    """
     with engine.connect() as connection:
         return list(compare_metadata(MigrationContext.configure(connection), metadata))

@@ -1,7 +1,7 @@
 """API keys: made once, shown once, known afterwards by their hash alone.
 
-A key reads ``vsl_<id>_<secret>``. The id is public and finds the row; the secret has 256 random bits, so that one round of
-SHA-256 keeps it: what cannot be guessed needs no slow hash.
+A key reads ``vsl_<id>_<secret>``. The id is public and finds the row; the secret has 256 random
+bits, so that one round of SHA-256 keeps it: what cannot be guessed needs no slow hash.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ _FORM = re.compile(r"vsl_([0-9a-f]{12})_([A-Za-z0-9_-]{43})")
 _ID = re.compile(r"[0-9a-f]{12}")
 _LONGEST_NAME = 100
 
-#: Compared with where there is no such key, so that an answer takes as long whether or not the id exists.
+#: Compared with where there is no such key, so that an answer takes as long whether or not the id
+#: exists.
 _NO_DIGEST = "0" * 64
 
 
@@ -37,7 +38,8 @@ _NO_DIGEST = "0" * 64
 class Key:
     """What is known of a key: everything but the key.
 
-    ``scope`` is what it allows; ``owner`` has the jobs and answers that it makes, which other keys of this owner see.
+    ``scope`` is what it allows; ``owner`` has the jobs and answers that it makes, which other keys
+    of this owner see.
     """
 
     id: str
@@ -62,17 +64,26 @@ class Key:
         """Return the key as JSON."""
         names = ("id", "name", "scope", "owner", "state", "created_at", "expires_at", "revoked_at")
         values = ((name, getattr(self, name)) for name in names)
-        return {name: value.isoformat() if isinstance(value, datetime) else value for name, value in values}
+        return {
+            name: value.isoformat() if isinstance(value, datetime) else value
+            for name, value in values
+        }
 
 
 class Keys:
-    """The keys in a database. Every method may block; raises Refused ``database-unavailable`` where the database fails."""
+    """The keys in a database. Every method may block; raises Refused ``database-unavailable`` where
+    the database fails.
+    """
 
     def __init__(self, database: sa.Engine) -> None:
         self._database = database
 
     def create(
-        self, name: str, scope: str = SOLVE, expires_at: datetime | None = None, same_as: str | None = None
+        self,
+        name: str,
+        scope: str = SOLVE,
+        expires_at: datetime | None = None,
+        same_as: str | None = None,
     ) -> tuple[Key, str]:
         """Return a new key and its text, which is kept nowhere.
 
@@ -88,16 +99,23 @@ class Keys:
         text = f"vsl_{key.id}_{secrets.token_urlsafe(32)}"
         row = {"id": key.id, "name": name, "sha256": _digest(text), "created_at": key.created_at}
         with self._writing() as connection:
-            connection.execute(sa.insert(api_keys).values(**row, scope=scope, owner=owner, expires_at=expires_at))
+            connection.execute(
+                sa.insert(api_keys).values(**row, scope=scope, owner=owner, expires_at=expires_at)
+            )
         return key, text
 
     def list(self) -> list[Key]:
         """Return all keys, the oldest first, revoked ones too."""
         with self._reading() as connection:
-            return [_key(row) for row in connection.execute(sa.select(api_keys).order_by(api_keys.c.created_at))]
+            return [
+                _key(row)
+                for row in connection.execute(sa.select(api_keys).order_by(api_keys.c.created_at))
+            ]
 
     def revoke(self, key_id: str) -> Key:
-        """Return the key of this id, which nobody can use from now on; raises InvalidInput where there is none."""
+        """Return the key of this id, which nobody can use from now on; raises InvalidInput where
+        there is none.
+        """
         self._existing(key_id, "ID")
         at = datetime.now(UTC)
         with self._writing() as connection:
@@ -109,18 +127,24 @@ class Keys:
         row = None
         if _ID.fullmatch(key_id):
             with self._reading() as connection:
-                row = connection.execute(sa.select(api_keys).where(api_keys.c.id == key_id)).one_or_none()
+                row = connection.execute(
+                    sa.select(api_keys).where(api_keys.c.id == key_id)
+                ).one_or_none()
         if row is None:
             raise InvalidInput((field,), "the id of a key (veselova keys list)", show(key_id))
         return _key(row)
 
     def holder(self, text: str) -> Key | None:
-        """Return the key that a client showed, expired or not; None where it is not one of these, or revoked."""
+        """Return the key that a client showed, expired or not; None where it is not one of these,
+        or revoked.
+        """
         form = _FORM.fullmatch(text)
         if form is None:
             return None
         with self._reading() as connection:
-            row = connection.execute(sa.select(api_keys).where(api_keys.c.id == form[1])).one_or_none()
+            row = connection.execute(
+                sa.select(api_keys).where(api_keys.c.id == form[1])
+            ).one_or_none()
         same = hmac.compare_digest(_digest(text), _NO_DIGEST if row is None else row.sha256)
         return _key(row) if row is not None and same and row.revoked_at is None else None
 
@@ -157,7 +181,8 @@ def _named_outages() -> Iterator[None]:
 def open_keys(settings: Settings) -> Keys:
     """Return the keys of the service's database.
 
-    Raises Refused: ``database-unavailable`` where it cannot be opened, ``database-damaged``, ``database-newer``.
+    Raises Refused: ``database-unavailable`` where it cannot be opened, ``database-damaged``,
+    ``database-newer``.
     """
     with _named_outages():
         return Keys(connect(settings))
@@ -165,7 +190,9 @@ def open_keys(settings: Settings) -> Keys:
 
 def _unavailable(error: Exception) -> Refused:
     return Refused(
-        "database-unavailable", f"The keys cannot be read: the database does not answer ({type(error).__name__}).", retry_after=5
+        "database-unavailable",
+        f"The keys cannot be read: the database does not answer ({type(error).__name__}).",
+        retry_after=5,
     )
 
 
@@ -174,5 +201,7 @@ def _digest(text: str) -> str:
 
 
 def _key(row: sa.Row[tuple[object, ...]]) -> Key:
-    created, revoked, expires = (moment and in_utc(moment) for moment in (row.created_at, row.revoked_at, row.expires_at))
+    created, revoked, expires = (
+        moment and in_utc(moment) for moment in (row.created_at, row.revoked_at, row.expires_at)
+    )
     return Key(row.id, row.name, created, revoked, row.scope, row.owner, expires)

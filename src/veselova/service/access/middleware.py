@@ -1,4 +1,6 @@
-"""Who may ask, and how often: API keys and rate limits, in an ASGI middleware around the application."""
+"""Who may ask, and how often: API keys and rate limits, in an ASGI middleware around the
+application.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ _PUBLIC = frozenset({"/docs", "/openapi.json"})
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _ADMINISTRATIVE = frozenset({"/metrics"})
 
-#: Anything else is no method of HTTP; what is counted by method must not be counted by a client's inventions.
+#: Anything else is no method of HTTP; what is counted by method must not be counted by a client's
+#: inventions.
 _METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
 #: Limit of one caller where ``auto`` says that there is one.
@@ -40,7 +43,8 @@ _RATE_BEYOND_LOOPBACK = "600/minute"
 class Policy:
     """Who may ask how often. No keys: everyone; no rate: as often as they like.
 
-    Keys are counted apart from addresses, so that a flood from many addresses takes no room from those who have a key.
+    Keys are counted apart from addresses, so that a flood from many addresses takes no room from
+    those who have a key.
     """
 
     keys: Keys | None
@@ -50,12 +54,16 @@ class Policy:
 
     @staticmethod
     def requires_keys(settings: Settings, loopback: bool) -> bool:
-        """Return whether clients must show a key, where the server does or does not bind to loopback."""
+        """Return whether clients must show a key, where the server does or does not bind to
+        loopback.
+        """
         return settings.keys == "required" or (settings.keys == "auto" and not loopback)
 
     @staticmethod
     def of(settings: Settings, loopback: bool, keys: Keys | None) -> Policy:
-        """Return the policy that the settings state; ``keys`` are those of the database, None where none are asked for."""
+        """Return the policy that the settings state; ``keys`` are those of the database, None where
+        none are asked for.
+        """
         stated = settings.rate_limit
         if stated == "auto":
             stated = "none" if loopback else _RATE_BEYOND_LOOPBACK
@@ -63,7 +71,9 @@ class Policy:
 
 
 class Access:
-    """The middleware that holds a policy. What it refuses never reaches the application; ``refused`` is told the code."""
+    """The middleware that holds a policy. What it refuses never reaches the application;
+    ``refused`` is told the code.
+    """
 
     def __init__(self, app: ASGIApp, policy: Policy, refused: Callable[[str], None]) -> None:
         self._app = app
@@ -94,7 +104,9 @@ class Access:
         await self._app(scope, receive, send_with_limits if headers else send)
 
     async def _admit(self, scope: Scope, headers: dict[str, str]) -> None:
-        """Raise Refused unless the request may go on; headers of the answer, refusal or not, are put into ``headers``."""
+        """Raise Refused unless the request may go on; headers of the answer, refusal or not, are
+        put into ``headers``.
+        """
         if scope["method"] not in _METHODS:
             raise Refused("unknown-method", "The method is not one of HTTP's.")
         address = network_of((scope.get("client") or (None,))[0])
@@ -105,15 +117,21 @@ class Access:
             if self._policy.keys is None or scope["path"] in _PUBLIC:
                 return
             headers["WWW-Authenticate"] = 'Bearer realm="veselova"'
-            raise Refused("unauthorized", "Authorization: required an API key, as Bearer vsl_…; given none.")
+            raise Refused(
+                "unauthorized", "Authorization: required an API key, as Bearer vsl_…; given none."
+            )
         key = await self._holder(self._policy.keys, credentials, address, headers)
         note(key=key.id)
         await _spend(self._policy.by_key, key.id, "key", headers)
         _require_scope(key, _scope_of(scope), headers)
         put_caller(scope, Caller(key.owner, key.owner, key.scope))
 
-    async def _holder(self, keys: Keys, credentials: list[str], address: str, headers: dict[str, str]) -> Key:
-        """Return the key that was shown; an address that showed too many wrong ones is not looked at."""
+    async def _holder(
+        self, keys: Keys, credentials: list[str], address: str, headers: dict[str, str]
+    ) -> Key:
+        """Return the key that was shown; an address that showed too many wrong ones is not looked
+        at.
+        """
         failures = self._policy.failures
         if failures is not None:
             _require(await failures.look(address), "wrong keys from this address", headers)
@@ -123,17 +141,24 @@ class Access:
             key = await anyio.to_thread.run_sync(keys.holder, text.strip())
         if key is not None and key.expired:
             headers["WWW-Authenticate"] = 'Bearer realm="veselova", error="invalid_token"'
-            raise Refused("unauthorized", "The API key has expired; whoever runs the server can make another.")
+            raise Refused(
+                "unauthorized", "The API key has expired; whoever runs the server can make another."
+            )
         if key is not None:
             return key
         if failures is not None:
             await failures.spend(address)
         headers["WWW-Authenticate"] = 'Bearer realm="veselova", error="invalid_token"'
-        raise Refused("unauthorized", "Authorization: required an API key of this server, as Bearer vsl_…; given another.")
+        raise Refused(
+            "unauthorized",
+            "Authorization: required an API key of this server, as Bearer vsl_…; given another.",
+        )
 
 
 def _scope_of(scope: Scope) -> str:
-    """Return the scope that a request needs; it is found before anything is looked for, so a refusal tells of nothing."""
+    """Return the scope that a request needs; it is found before anything is looked for, so a
+    refusal tells of nothing.
+    """
     if scope["path"] in _ADMINISTRATIVE:
         return ADMIN
     return READ if scope["method"] in _READING else SOLVE
@@ -141,8 +166,13 @@ def _scope_of(scope: Scope) -> str:
 
 def _require_scope(key: Key, needed: str, headers: dict[str, str]) -> None:
     if not Caller(scope=key.scope).may(needed):
-        headers["WWW-Authenticate"] = f'Bearer realm="veselova", error="insufficient_scope", scope="{needed}"'
-        raise Refused("insufficient-scope", f"The API key: required scope {needed}; given one of scope {key.scope}.")
+        headers["WWW-Authenticate"] = (
+            f'Bearer realm="veselova", error="insufficient_scope", scope="{needed}"'
+        )
+        raise Refused(
+            "insufficient-scope",
+            f"The API key: required scope {needed}; given one of scope {key.scope}.",
+        )
 
 
 async def _spend(rate: RateLimit | None, caller: str, kind: str, headers: dict[str, str]) -> None:
@@ -156,4 +186,7 @@ def _require(allowance: Allowance, of: str, headers: dict[str, str]) -> None:
     if not allowance.granted:
         headers["Retry-After"] = str(allowance.reset_s)
         required = f"at most {allowance.quota} in {allowance.window_s} s"
-        raise Refused("rate-limited", f"Too many {of}: required {required}; try again in {allowance.reset_s} s.")
+        raise Refused(
+            "rate-limited",
+            f"Too many {of}: required {required}; try again in {allowance.reset_s} s.",
+        )

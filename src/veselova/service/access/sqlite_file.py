@@ -1,4 +1,6 @@
-"""A database of SQLite: its file, which this account alone may read, its connections, and how damage is found."""
+"""A database of SQLite: its file, which this account alone may read, its connections, and how
+damage is found.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,10 @@ _BUSY_S = 10
 #: Seconds between two looks at what another process may be in the midst of writing.
 _AGAIN_S = 0.05
 
-#: Free pages are given back to the disk when they are this part of the file, and so many bytes at least.
-_FREE_PART, _FREE_BYTES = 0.25, 1_000_000
+#: Free pages are given back to the disk when they are this part of the file, and so many bytes at
+#: least.
+_FREE_PART = 0.25
+_FREE_BYTES = 1_000_000
 
 #: The option of a connection whose transactions take the lock for writing at their beginning.
 _IMMEDIATE = "sqlite_immediate"
@@ -32,7 +36,11 @@ _IMMEDIATE = "sqlite_immediate"
 def sqlite_path(url: sa.URL) -> Path | None:
     """Return the file of a database of SQLite, None for one in memory or of another kind."""
     name = url.database or ""
-    in_file = url.get_backend_name() == "sqlite" and name not in ("", ":memory:") and not name.startswith("file:")
+    in_file = (
+        url.get_backend_name() == "sqlite"
+        and name not in ("", ":memory:")
+        and not name.startswith("file:")
+    )
     return Path(name) if in_file else None
 
 
@@ -43,7 +51,8 @@ def open_sqlite(url: sa.URL, path: Path | None) -> sa.Engine:
     """
     if path is not None:
         own_folder(path.parent)
-        with suppress(FileExistsError):  # to open it beside SQLite would give up the locks of this process
+        # to open it beside SQLite would give up the locks of this process
+        with suppress(FileExistsError):
             os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600))
         for suffix in ("", "-wal", "-shm"):  # SQLite gives the latter two the mode of the first
             restrict_file(path.with_name(path.name + suffix))
@@ -54,14 +63,18 @@ def open_sqlite(url: sa.URL, path: Path | None) -> sa.Engine:
 
 
 def begin_immediately(connection: sa.Connection) -> sa.Connection:
-    """Return a connection whose transactions hold the lock for writing from their beginning; on SQLite alone."""
+    """Return a connection whose transactions hold the lock for writing from their beginning; on
+    SQLite alone.
+    """
     return connection.execution_options(**{_IMMEDIATE: True})
 
 
 def _prepare(connection: sqlite3.Connection, _: Any) -> None:
-    """Set a connection up: writers do not block readers, and what was committed survives the death of the machine.
+    """Set a connection up: writers do not block readers, and what was committed survives the death
+    of the machine.
 
-    Transactions are begun here and not by Python's module, which would leave statements that change tables outside of them.
+    Transactions are begun here and not by Python's module, which would leave statements that change
+    tables outside of them.
     """
     connection.isolation_level = None
     for pragma in (f"busy_timeout = {_BUSY_S * 1000}", "synchronous = FULL", "foreign_keys = ON"):
@@ -70,7 +83,9 @@ def _prepare(connection: sqlite3.Connection, _: Any) -> None:
     while True:
         try:
             connection.execute("PRAGMA journal_mode = WAL")
-        except sqlite3.OperationalError as error:  # of two that ask for it at once SQLite does not let one wait
+        except (
+            sqlite3.OperationalError
+        ) as error:  # of two that ask for it at once SQLite does not let one wait
             if "locked" not in str(error) or time.monotonic() > deadline:
                 raise
             time.sleep(_AGAIN_S)
@@ -85,7 +100,9 @@ def _begin(connection: sa.Connection) -> None:
 
 
 def damage_of(engine: sa.Engine, path: Path) -> str:
-    """Return what is damaged about a database, nothing where it is whole. Raises sqlalchemy.exc.DatabaseError."""
+    """Return what is damaged about a database, nothing where it is whole. Raises
+    sqlalchemy.exc.DatabaseError.
+    """
     log = path.with_name(path.name + "-wal")
     if wal_is_damaged(log):
         time.sleep(_AGAIN_S)  # another process may have been writing it
@@ -103,12 +120,16 @@ def empty_log(engine: sa.Engine) -> None:
 
 
 def vacuum(engine: sa.Engine) -> None:
-    """Give the room of what was deleted back to the disk, where it is much. PostgreSQL does that by itself."""
+    """Give the room of what was deleted back to the disk, where it is much. PostgreSQL does that by
+    itself.
+    """
     if engine.dialect.name != "sqlite":
         return
     with engine.connect() as connection:
         names = ("freelist_count", "page_count", "page_size")
-        free, pages, size = (connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in names)
+        free, pages, size = (
+            connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in names
+        )
         if free * size >= _FREE_BYTES and free >= _FREE_PART * pages:
             connection.exec_driver_sql("VACUUM")
             connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")

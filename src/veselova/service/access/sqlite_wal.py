@@ -1,8 +1,9 @@
 """The write-ahead log of SQLite, read before SQLite does.
 
-SQLite takes a log up to the first frame whose checksum is wrong, and says nothing of what follows. That is right for the end of a
-log, which a machine lost in the middle of writing. It is wrong for a log that was damaged afterwards: keys and jobs would be gone
-without a word. The format is described at sqlite.org/fileformat2.html#walformat.
+SQLite takes a log up to the first frame whose checksum is wrong, and says nothing of what follows.
+That is right for the end of a log, which a machine lost in the middle of writing. It is wrong for a
+log that was damaged afterwards: keys and jobs would be gone without a word. The format is described
+at sqlite.org/fileformat2.html#walformat.
 """
 
 from __future__ import annotations
@@ -12,19 +13,22 @@ from pathlib import Path
 
 __all__ = ["wal_is_damaged"]
 
-_HEADER, _FRAME = struct.Struct(">8I"), struct.Struct(">6I")
+_HEADER = struct.Struct(">8I")
+_FRAME = struct.Struct(">6I")
 
 #: The first number of a log, by the byte order of the words that its checksums are made of.
 _MAGIC = {0x377F0682: "<", 0x377F0683: ">"}
 
-#: Bytes of a log that are read: SQLite moves its content into the database whenever it has four megabytes.
+#: Bytes of a log that are read: SQLite moves its content into the database whenever it has four
+#: megabytes.
 _MOST = 64_000_000
 
 _MODULUS = 0xFFFFFFFF
 
 
 def wal_is_damaged(path: Path) -> bool:
-    """Return whether a log was damaged after it was written: its header, or a transaction that another one follows.
+    """Return whether a log was damaged after it was written: its header, or a transaction that
+    another one follows.
 
     An incomplete last transaction is no damage; whether a complete one was there, nothing tells.
     """
@@ -42,14 +46,21 @@ def wal_is_damaged(path: Path) -> bool:
     return _has_lost_a_transaction(content, page, order, tuple(salts), (first, second))
 
 
-def _has_lost_a_transaction(content: bytes, page: int, order: str, salts: tuple[int, ...], checksum: tuple[int, int]) -> bool:
-    """Return whether a whole frame follows the end of a transaction that follows a frame which is not whole."""
+def _has_lost_a_transaction(
+    content: bytes, page: int, order: str, salts: tuple[int, ...], checksum: tuple[int, int]
+) -> bool:
+    """Return whether a whole frame follows the end of a transaction that follows a frame which is
+    not whole.
+    """
     broken = ended = False
     for start in range(_HEADER.size, len(content) - _FRAME.size - page + 1, _FRAME.size + page):
         _, pages, *of_frame, first, second = _FRAME.unpack_from(content, start)
         stated = (first, second)
-        body = content[start : start + 8] + content[start + _FRAME.size : start + _FRAME.size + page]
-        # A checksum continues that of the frame before, which is read from it: a frame can be judged behind a broken one.
+        body = (
+            content[start : start + 8] + content[start + _FRAME.size : start + _FRAME.size + page]
+        )
+        # A checksum continues that of the frame before, which is read from it: a frame can be
+        # judged behind a broken one.
         current = tuple(of_frame) == salts  # frames of the log before have other salts
         whole = current and _checksum(body, order, checksum) == stated
         if whole and ended:

@@ -1,4 +1,6 @@
-"""The cache of answers: a folder of bounded size, shared by several servers. It may fail, and then there is none."""
+"""The cache of answers: a folder of bounded size, shared by several servers. It may fail, and then
+there is none.
+"""
 
 from __future__ import annotations
 
@@ -15,23 +17,31 @@ __all__ = ["Cache"]
 
 _LOG = logging.getLogger("veselova.service")
 
-#: What is left after entries had to go, as a part of what may be; and what may be added before the folder is searched again,
-#: which takes time in proportion to the entries. Servers that share it may exceed its size by as much each.
-_KEPT, _UNSEEN = 0.9, 0.1
+#: What is left after entries had to go, as a part of what may be; and what may be added before the
+#: folder is searched again, which takes time in proportion to the entries. Servers that share it
+#: may exceed its size by as much each.
+_KEPT = 0.9
+_UNSEEN = 0.1
 
-#: The end of the name of an entry, and of one on its way into the cache; the nanoseconds after which it will not arrive any more.
-_WHOLE, _PART, _ARRIVAL_NS = ".kept", ".part", 600 * 10**9
+#: The end of the name of an entry, and of one on its way into the cache; the nanoseconds after
+#: which it will not arrive any more.
+_WHOLE = ".kept"
+_PART = ".part"
+_ARRIVAL_NS = 600 * 10**9
 
 
 class Cache:
-    """Files by name. An entry appears whole or not at all (it is renamed into place), and the least recently used go first.
+    """Files by name. An entry appears whole or not at all (it is renamed into place), and the least
+    recently used go first.
 
-    ``size`` is what the entries may take together, in bytes; 0 is no cache. A folder that cannot be read or written, and a disk
-    that is full, are reported once, and leave every question unanswered until they work again.
+    ``size`` is what the entries may take together, in bytes; 0 is no cache. A folder that cannot be
+    read or written, and a disk that is full, are reported once, and leave every question unanswered
+    until they work again.
     """
 
     def __init__(self, folder: Path, size: int) -> None:
-        self._folder, self._size = folder, size
+        self._folder = folder
+        self._size = size
         self._failing = False
         self._room = 0
 
@@ -53,10 +63,16 @@ class Cache:
         """Return where an entry is, or is to be, kept; None where nothing is kept."""
         if not self._size:
             return None
-        return Entry(f"{self._folder}/{name}{_WHOLE}", f"{self._folder}/.{uuid.uuid4().hex}{_PART}", self._size)
+        return Entry(
+            f"{self._folder}/{name}{_WHOLE}",
+            f"{self._folder}/.{uuid.uuid4().hex}{_PART}",
+            self._size,
+        )
 
     def write(self, contents: Mapping[str, bytes]) -> dict[str, int]:
-        """Write entries until one fails, and return the bytes of those that are written, by name."""
+        """Write entries until one fails, and return the bytes of those that are
+        written, by name.
+        """
         written: dict[str, int] = {}
         try:
             for name, content in contents.items():
@@ -67,13 +83,17 @@ class Cache:
         return written
 
     def is_full(self, size: int) -> bool:
-        """Count an entry of so many bytes, which was written; return whether room has to be made."""
+        """Count an entry of so many bytes, which was written; return whether room has
+        to be made.
+        """
         self._failing = False
         self._room -= size
         return self._room < 0
 
     def make_room(self) -> None:
-        """Remove the entries used longest ago where all together are too large, and see how many bytes may be added."""
+        """Remove the entries used longest ago where all together are too large, and see how many
+        bytes may be added.
+        """
         try:
             self._room = self._evict()
         except OSError as error:
@@ -92,7 +112,8 @@ class Cache:
         return self._folder / f"{name}{_WHOLE}"
 
     def _evict(self) -> int:
-        """Remove entries until the others fit, and return how many bytes may be added before the next search.
+        """Remove entries until the others fit, and return how many bytes may be added before the
+        next search.
 
         The newest stays: it fits by itself. What another server removes meanwhile is gone as well.
         """

@@ -1,4 +1,6 @@
-"""An entry of the cache: a trajectory and the request that it answers, in one file with a checksum, as it is in memory."""
+"""An entry of the cache: a trajectory and the request that it answers, in one file with a checksum,
+as it is in memory.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,9 @@ import orjson
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import VeselovaError
+from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.request_models import TrajectoryRequest
 
 __all__ = ["DamagedEntry", "Entry", "pack", "read_entry", "unpack"]
@@ -39,14 +42,18 @@ class DamagedEntry(VeselovaError):
 
 @dataclass(frozen=True)
 class Entry:
-    """Where an entry is kept: its file, the part that is written first, and the bytes that it may have at most."""
+    """Where an entry is kept: its file, the part that is written first, and the bytes that it may
+    have at most.
+    """
 
     path: str
     part: str
     most: int
 
     def write(self, request: Mapping[str, Any], trajectory: Trajectory) -> int:
-        """Keep a trajectory, whole or not at all, and return its bytes, 0 for one that is too large; raises OSError."""
+        """Keep a trajectory, whole or not at all, and return its bytes, 0 for one that is too
+        large; raises OSError.
+        """
         arrays = _arrays(trajectory)
         if _bytes(arrays) > self.most:
             return 0
@@ -93,16 +100,22 @@ def _bytes(arrays: Arrays) -> int:
 
 
 def _arrays(trajectory: Trajectory) -> Arrays:
-    """Return what a trajectory is made of: what follows from it is computed again where it is asked for."""
+    """Return what a trajectory is made of: what follows from it is computed again where it is asked
+    for.
+    """
     problem = trajectory.problem
     if trajectory.decimals is not None:
         return dict(trajectory.named_arrays(problem.outputs))
-    series = {name: values for name, values in trajectory.arrays.items() if name not in problem.derived}
+    series = {
+        name: values for name, values in trajectory.arrays.items() if name not in problem.derived
+    }
     remainders = {} if trajectory.remainders is None else {"remainders": trajectory.remainders}
     return {"times": trajectory.times, **remainders, "error": trajectory.error, **series}
 
 
-def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> None:
+def _write(
+    stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays
+) -> None:
     """Write the parts of an entry, and a checksum of all."""
     checksum = 0
     for part in _parts(request, trajectory, arrays):
@@ -112,9 +125,11 @@ def _write(stream: BinaryIO, request: Mapping[str, Any], trajectory: Trajectory,
 
 
 def _parts(request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -> Iterator[bytes]:
-    """Yield a line of JSON (request, provenance, names and shapes of the arrays), then the arrays, large ones block by block.
+    """Yield a line of JSON (request, provenance, names and shapes of the arrays), then the arrays,
+    large ones block by block.
 
-    NumPy's own archive has a header and a checksum for each array, which take four times as long to write for small ones.
+    NumPy's own archive has a header and a checksum for each array, which take four times as long to
+    write for small ones.
     """
     header = {
         "request": {**request, "times": [0.0]},  # the times are among the arrays
@@ -130,13 +145,16 @@ def _parts(request: Mapping[str, Any], trajectory: Trajectory, arrays: Arrays) -
         if array.nbytes <= _SMALL:
             yield array.tobytes()
         else:
-            yield from (array[rows].tobytes() for rows in row_blocks(array.shape[0], array[:1].size))
+            yield from (
+                array[rows].tobytes() for rows in row_blocks(array.shape[0], array[:1].size)
+            )
 
 
 def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
     """Return what an entry holds, which is now the one used last.
 
-    Raises DamagedEntry where the file is not whole, FileNotFoundError where there is none, OSError where it cannot be read.
+    Raises DamagedEntry where the file is not whole, FileNotFoundError where there is none, OSError
+    where it cannot be read.
     """
     os.utime(path)
     try:
@@ -146,19 +164,29 @@ def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
 
 
 def unpack(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
-    """Return what the content of an entry holds; raises ValueError, KeyError, TypeError or VeselovaError where it is damaged."""
-    whole, checksum = memoryview(content)[: -_CHECKSUM.size], content[-_CHECKSUM.size :]
+    """Return what the content of an entry holds; raises ValueError, KeyError, TypeError or
+    VeselovaError where it is damaged.
+    """
+    whole = memoryview(content)[: -_CHECKSUM.size]
+    checksum = content[-_CHECKSUM.size :]
     if _CHECKSUM.pack(zlib.crc32(whole)) != checksum:
         raise ValueError("another checksum")
     line = content[: content.index(b"\n") + 1]
-    header, place, arrays = json.loads(line), len(line), {}
+    header = json.loads(line)
+    place = len(line)
+    arrays = {}
     for name, (kind, shape) in header["arrays"].items():
         size = math.prod(shape) * np.dtype(kind).itemsize
         arrays[name] = np.frombuffer(whole[place : place + size], kind).reshape(shape)
         place += size
     asked = TrajectoryRequest.model_validate(header["request"])
-    problem, provenance = asked.problem.problem(), header["provenance"]
+    problem = asked.problem.problem()
+    provenance = header["provenance"]
     if header["decimals"]:
         return asked, Trajectory.from_arrays(problem, {**arrays, "provenance": provenance})
-    times, error, remainders = arrays.pop("times"), arrays.pop("error"), arrays.pop("remainders", None)
-    return asked, Trajectory(problem, times, error, arrays, Provenance(**provenance), remainders=remainders)
+    times = arrays.pop("times")
+    error = arrays.pop("error")
+    remainders = arrays.pop("remainders", None)
+    return asked, Trajectory(
+        problem, times, error, arrays, Provenance(**provenance), remainders=remainders
+    )

@@ -16,12 +16,15 @@ __all__ = ["while_connected"]
 
 T = TypeVar("T")
 
-#: Seconds before anyone looks whether the client is there: most work is done by then, and looking takes a task of its own.
+#: Seconds before anyone looks whether the client is there: most work is done by then, and looking
+#: takes a task of its own.
 _UNWATCHED_S = 0.05
 
 
 async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) -> T:
-    """Return what the work gives; end it when the client has gone, or the server shuts down: raises Refused then."""
+    """Return what the work gives; end it when the client has gone, or the server shuts down: raises
+    Refused then.
+    """
     try:
         with anyio.CancelScope() as scope:
             watcher: asyncio.Task[None] | None = None
@@ -39,8 +42,11 @@ async def while_connected(request: Request, work: Callable[[], Awaitable[T]]) ->
                 if watcher is not None:
                     watcher.cancel()
     except anyio.get_cancelled_exc_class():
-        # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an answer all the same.
-        raise Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5) from None
+        # The grace after SIGTERM has run out. The worker is dead by now; the client is owed an
+        # answer all the same.
+        raise Refused(
+            "shutting-down", "The server is shutting down and stopped this work.", retry_after=5
+        ) from None
     raise Refused("client-gone", "The client closed the connection, and the work was stopped.")
 
 

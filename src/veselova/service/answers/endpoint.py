@@ -1,4 +1,6 @@
-"""Answers to requests for motions and tori: negotiated, taken from the cache or computed, in memory or through the spool."""
+"""Answers to requests for motions and tori: negotiated, taken from the cache or computed, in memory
+or through the spool.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from veselova.service.answers.cache import Cache
 from veselova.service.answers.cache_entry import DamagedEntry
 from veselova.service.answers.disconnect import while_connected
 from veselova.service.answers.etag import entity_tag, is_identity, matches
-from veselova.service.answers.rendering import Rendering, Representation, render_answer, render_kept, render_solution
+from veselova.service.answers.rendering import (
+    Rendering,
+    Representation,
+    render_answer,
+    render_kept,
+    render_solution,
+)
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.answers.spool import Spool, SpooledResponse
@@ -36,7 +44,8 @@ _LARGE_BYTES = 1_000_000
 #: The header field that has the provenance of a trajectory, whatever its format, as JSON.
 PROVENANCE = "Veselova-Provenance"
 
-#: What a name stands for never changes; only who asked may keep it, since a server may ask for keys.
+#: What a name stands for never changes; only who asked may keep it, since a server may ask for
+#: keys.
 _FOREVER = "private, max-age=31536000, immutable"
 
 #: What Cache-Status says of an answer that came from the cache.
@@ -46,8 +55,13 @@ _HIT = "veselova; hit"
 class Answers:
     """What one server answers, from its workers, its cache and its spool."""
 
-    def __init__(self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics) -> None:
-        self._settings, self._workers, self._reader, self._metrics = settings, workers, reader, metrics
+    def __init__(
+        self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics
+    ) -> None:
+        self._settings = settings
+        self._workers = workers
+        self._reader = reader
+        self._metrics = metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
         self._write_behind = WriteBehind(self._cache)
         self._spool = Spool(settings.data_dir / "spool")
@@ -71,49 +85,76 @@ class Answers:
         async def work() -> Response:
             with self._metrics.work(kind, asked.system, asked.engine):
                 delivery = await self._workers.run(
-                    render_answer, kind, asked.content, wanted, budget_s=asked.budget_s, caller=caller_of(request).name
+                    render_answer,
+                    kind,
+                    asked.content,
+                    wanted,
+                    budget_s=asked.budget_s,
+                    caller=caller_of(request).name,
                 )
             return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
 
         return await self._run_while_connected(request, work, wanted.place)
 
     async def trajectory(self, request: Request) -> Response:
-        """Return the answer to a POST, from the cache where it is kept; raises Refused where the client has it already."""
+        """Return the answer to a POST, from the cache where it is kept; raises Refused where the
+        client has it already.
+        """
         form = _format(request)
         asked = await self._reader.parse_body("trajectory", request)
         name = asked.name
         kept_as = _cache_name(name, request)
         await self._require_news(request, kept_as, entity_tag(name, form.name))
         wanted = Representation(form.name, _coding(request), self._place(asked.large))
-        entry, content = self._cache.entry(kept_as), self._write_behind.find(kept_as)
-        task = (render_kept, content, wanted) if content else (render_solution, asked.content, wanted, entry)
+        entry = self._cache.entry(kept_as)
+        content = self._write_behind.find(kept_as)
+        task = (
+            (render_kept, content, wanted)
+            if content
+            else (render_solution, asked.content, wanted, entry)
+        )
 
         async def work() -> Response:
             with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
-                    delivery = await self._workers.run(*task, budget_s=asked.budget_s, caller=caller_of(request).name)
+                    delivery = await self._workers.run(
+                        *task, budget_s=asked.budget_s, caller=caller_of(request).name
+                    )
                     ending.cached = delivery.cached
                 finally:
                     self._metrics.count_cached(hit=ending.cached)
             headers = _headers(name, form, await self._keep(kept_as, delivery))
-            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.cached else headers)
+            return _response(
+                delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.cached else headers
+            )
 
-        return await self._run_while_connected(request, work, wanted.place, None if entry is None else entry.part)
+        return await self._run_while_connected(
+            request, work, wanted.place, None if entry is None else entry.part
+        )
 
     async def _require_news(self, request: Request, kept_as: str, tag: str) -> None:
-        """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304 answers GET and HEAD alone."""
+        """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304
+        answers GET and HEAD alone.
+        """
         stated = _header(request, "if-none-match")
         if stated is None:
             return
         if matches(stated, tag, await self._find(kept_as) is not None):
-            raise Refused("precondition-failed", f"If-None-Match: required another entity than {tag}, which this request has.")
+            raise Refused(
+                "precondition-failed",
+                f"If-None-Match: required another entity than {tag}, which this request has.",
+            )
 
     async def _find(self, name: str) -> bytes | str | None:
-        """Return an entry that is kept: the content of one that is not written yet, the file of another."""
+        """Return an entry that is kept: the content of one that is not written yet, the file of
+        another.
+        """
         return self._write_behind.find(name) or await to_thread.run_sync(self._cache.find, name)
 
     async def _keep(self, name: str, delivery: Rendering) -> bool:
-        """See to what the cache has to do with an answer, and return whether it can be had again."""
+        """See to what the cache has to do with an answer, and return whether it can
+        be had again.
+        """
         if delivery.damaged:
             await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
         if delivery.not_stored is not None:
@@ -125,7 +166,9 @@ class Answers:
         return delivery.cached or delivery.stored > 0
 
     async def get_kept(self, name: str, request: Request) -> Response:
-        """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not kept (any more)."""
+        """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not
+        kept (any more).
+        """
         form = _format(request)
         kept_as = _cache_name(name, request)
         cached = await self._find(kept_as) if is_identity(name) else None
@@ -138,7 +181,9 @@ class Answers:
             response = Response(headers={**headers, "Content-Type": form.media_type})
             del response.headers["content-length"]  # that of the GET is not known before it
             return response
-        wanted = Representation(form.name, _coding(request), self._place(_bytes(cached) > _LARGE_BYTES))
+        wanted = Representation(
+            form.name, _coding(request), self._place(_bytes(cached) > _LARGE_BYTES)
+        )
 
         async def work() -> Response:
             delivery = await self._restore(kept_as, cached, wanted, caller_of(request).name)
@@ -148,10 +193,14 @@ class Answers:
 
         return await self._run_while_connected(request, work, wanted.place)
 
-    async def _restore(self, name: str, cached: bytes | str, wanted: Representation, caller: str) -> Rendering | None:
+    async def _restore(
+        self, name: str, cached: bytes | str, wanted: Representation, caller: str
+    ) -> Rendering | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
-            return await self._workers.run(render_kept, cached, wanted, budget_s=self._settings.max_budget_s, caller=caller)
+            return await self._workers.run(
+                render_kept, cached, wanted, budget_s=self._settings.max_budget_s, caller=caller
+            )
         except DamagedEntry:
             await to_thread.run_sync(self._cache.discard, name)
         except FileNotFoundError:
@@ -163,7 +212,9 @@ class Answers:
 
     @staticmethod
     async def _run_while_connected(request: Request, work: Any, *places: str | None) -> Response:
-        """Return what the work gives while the client is there; of work that was stopped no file is left."""
+        """Return what the work gives while the client is there; of work that was stopped no file is
+        left.
+        """
         try:
             return await while_connected(request, work)
         except BaseException:
@@ -185,10 +236,14 @@ def _response(delivery: Rendering, wanted: Representation, headers: Mapping[str,
 
 
 def _headers(name: str, form: Format, cached: bool = True) -> dict[str, str]:
-    """Return what the headers of a trajectory say of its name: its own address where it can be had there again."""
+    """Return what the headers of a trajectory say of its name: its own address where it can be had
+    there again.
+    """
     headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
     if form.name != "json":
-        headers["Content-Disposition"] = f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
+        headers["Content-Disposition"] = (
+            f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
+        )
     return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if cached else headers
 
 
@@ -197,7 +252,9 @@ def _header(request: Request, name: str) -> str | None:
 
 
 def _format(request: Request) -> Format:
-    return format_of(negotiate_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()]))
+    return format_of(
+        negotiate_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()])
+    )
 
 
 def _coding(request: Request) -> str:
@@ -212,10 +269,15 @@ def _bytes(cached: bytes | str) -> int:
 
 
 def _cache_name(name: str, request: Request) -> str:
-    """Return the name under which the cache has an answer: that of an owner is no name of an answer, and so nobody else's."""
+    """Return the name under which the cache has an answer: that of an owner is no name of an
+    answer, and so nobody else's.
+    """
     owner = caller_of(request).owner
     return f"{owner}-{name}" if owner else name
 
 
 def _not_kept(name: str) -> Refused:
-    return Refused("no-such-answer", f"No trajectory is kept as {name[:80]}; POST its request to /v1/trajectories.")
+    return Refused(
+        "no-such-answer",
+        f"No trajectory is kept as {name[:80]}; POST its request to /v1/trajectories.",
+    )

@@ -1,4 +1,6 @@
-"""Answers as a worker process gives them: taken from the cache or computed, written in the format and coding asked for."""
+"""Answers as a worker process gives them: taken from the cache or computed, written in the format
+and coding asked for.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ _MOST_SENT = 1_000_000
 
 @dataclass(frozen=True)
 class Representation:
-    """How an answer is to be given: the format's name, the content coding, and the file to write; in memory where it is None."""
+    """How an answer is to be given: the format's name, the content coding, and the file to write;
+    in memory where it is None.
+    """
 
     format: str
     coding: str
@@ -39,10 +43,12 @@ class Representation:
 
 @dataclass(frozen=True)
 class Rendering:
-    """An answer: its bytes, or None where they are in the file wanted; its coding and its provenance.
+    """An answer: its bytes, or None where they are in the file wanted; its coding and its
+    provenance.
 
-    Of the cache: whether the answer came from it, the bytes of the entry that was written, or the content of one that is yet to
-    be, whether one was damaged, and why none could be read or written.
+    Of the cache: whether the answer came from it, the bytes of the entry that was written, or the
+    content of one that is yet to be, whether one was damaged, and why none could be read or
+    written.
     """
 
     body: bytes | None
@@ -56,19 +62,25 @@ class Rendering:
 
 
 def render_answer(kind: str, request: bytes, wanted: Representation) -> Rendering:
-    """Return the JSON answer of a kind other than a trajectory; ``request`` is the pickle of a validated request's fields."""
+    """Return the JSON answer of a kind other than a trajectory; ``request`` is the pickle of a
+    validated request's fields.
+    """
     model, compute = TASKS[kind]
     document = compute(model.model_validate(pickle.loads(request)))
     return _deliver(lambda stream: write_document(document, stream), wanted, wanted.coding)
 
 
 def render_solution(request: bytes, wanted: Representation, entry: Entry | None) -> Rendering:
-    """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed, and kept if that can be.
+    """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed,
+    and kept if that can be.
 
-    A small entry is not written: it goes to the server, which does that when the answer has been sent.
+    A small entry is not written: it goes to the server, which does that when the answer has been
+    sent.
     """
-    damaged, failure = False, None
-    if entry is not None and os.access(entry.path, os.F_OK):  # which raises nothing: most answers are new
+    damaged = False
+    failure = None
+    # which raises nothing: most answers are new
+    if entry is not None and os.access(entry.path, os.F_OK):
         try:
             return _write(*read_entry(entry.path), wanted, cached=True)
         except FileNotFoundError:
@@ -82,7 +94,9 @@ def render_solution(request: bytes, wanted: Representation, entry: Entry | None)
     trajectory = solve_request(asked)
     cached: dict[str, Any] = {"damaged": damaged, "not_stored": failure}
     if entry is not None and failure is None:
-        content = pack(stated, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
+        content = (
+            pack(stated, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
+        )
         try:
             cached |= {"entry": content} if content else {"stored": entry.write(stated, trajectory)}
         except OSError as error:
@@ -91,21 +105,30 @@ def render_solution(request: bytes, wanted: Representation, entry: Entry | None)
 
 
 def render_kept(cached: str | bytes, wanted: Representation) -> Rendering:
-    """Return a trajectory that was kept, in a file or as the content of one that is yet to be written.
+    """Return a trajectory that was kept, in a file or as the content of one that is yet to be
+    written.
 
     Raises DamagedEntry where the file is not whole, OSError where it cannot be read.
     """
-    return _write(*(read_entry(cached) if isinstance(cached, str) else unpack(cached)), wanted, cached=True)
+    return _write(
+        *(read_entry(cached) if isinstance(cached, str) else unpack(cached)), wanted, cached=True
+    )
 
 
-def _write(asked: TrajectoryRequest, trajectory: Trajectory, wanted: Representation, **facts: Any) -> Rendering:
+def _write(
+    asked: TrajectoryRequest, trajectory: Trajectory, wanted: Representation, **facts: Any
+) -> Rendering:
     form: Format = FORMATS[wanted.format]
     coding = "identity" if form.compressed else wanted.coding
     facts["provenance"] = json.dumps(trajectory.provenance.as_dict())
-    return _deliver(lambda stream: form.write(trajectory, stream, asked.outputs), wanted, coding, **facts)
+    return _deliver(
+        lambda stream: form.write(trajectory, stream, asked.outputs), wanted, coding, **facts
+    )
 
 
-def _deliver(write: Callable[[BinaryIO], None], wanted: Representation, coding: str, **facts: Any) -> Rendering:
+def _deliver(
+    write: Callable[[BinaryIO], None], wanted: Representation, coding: str, **facts: Any
+) -> Rendering:
     """Return what is written, in its coding, with what else there is to say of it."""
     if wanted.place is not None:
         try:
@@ -113,7 +136,11 @@ def _deliver(write: Callable[[BinaryIO], None], wanted: Representation, coding: 
                 write(stream)
         except OSError as error:
             Path(wanted.place).unlink(missing_ok=True)
-            raise Refused("storage-full", f"The answer could not be written: {error.strerror}.", retry_after=60) from None
+            raise Refused(
+                "storage-full",
+                f"The answer could not be written: {error.strerror}.",
+                retry_after=60,
+            ) from None
         return Rendering(None, coding, **facts)
     plain = io.BytesIO()
     write(plain)

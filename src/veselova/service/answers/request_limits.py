@@ -20,32 +20,50 @@ def require_acceptable(accept: str | None) -> None:
 
 
 def require_modest(document: Any, settings: Settings) -> None:
-    """Raise InvalidInput where a document is deeper, or has longer texts, than the settings allow."""
+    """Raise InvalidInput where a document is deeper, or has longer texts, than the
+    settings allow.
+    """
     for depth, layer in enumerate(layers(document)):
         if depth > settings.max_depth:
             raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
         longest = max((len(value) for value in layer if isinstance(value, str)), default=0)
         if longest > settings.max_text:
-            raise InvalidInput((), f"texts of at most {settings.max_text} characters", f"one of {longest}")
+            raise InvalidInput(
+                (), f"texts of at most {settings.max_text} characters", f"one of {longest}"
+            )
 
 
 def admit(request: TorusRequest, settings: Settings) -> None:
-    """Raise InvalidInput where a request is beyond the limits of this server, before its numbers are looked at."""
+    """Raise InvalidInput where a request is beyond the limits of this server, before its numbers
+    are looked at.
+    """
     n = request.problem.dimension
     if n > settings.max_dimension:
         raise InvalidInput(
-            ("problem", request.problem.measured), f"at most {settings.max_dimension} entries on this server", str(n)
+            ("problem", request.problem.measured),
+            f"at most {settings.max_dimension} entries on this server",
+            str(n),
         )
     if request.budget_s > settings.max_budget_s:
-        raise InvalidInput(("budget_s",), f"at most {settings.max_budget_s:g} on this server", f"{request.budget_s:g}")
+        raise InvalidInput(
+            ("budget_s",),
+            f"at most {settings.max_budget_s:g} on this server",
+            f"{request.budget_s:g}",
+        )
     count = request.time_count()
     if count > settings.max_times:
-        raise InvalidInput(("times",), f"at most {settings.max_times} times on this server", str(count)[:30])
+        raise InvalidInput(
+            ("times",), f"at most {settings.max_times} times on this server", str(count)[:30]
+        )
     if count * n * n > settings.max_values:
         raise InvalidInput(
-            ("times",), f"at most {settings.max_values} frame entries (times × n²) on this server", str(count * n * n)
+            ("times",),
+            f"at most {settings.max_values} frame entries (times × n²) on this server",
+            str(count * n * n),
         )
     if isinstance(request, ComparisonRequest):
         if request.digits > settings.max_digits:
-            raise InvalidInput(("digits",), f"at most {settings.max_digits} on this server", str(request.digits))
+            raise InvalidInput(
+                ("digits",), f"at most {settings.max_digits} on this server", str(request.digits)
+            )
         require_hope(request, settings)

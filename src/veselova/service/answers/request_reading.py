@@ -18,7 +18,12 @@ from veselova.service.answers.request_limits import admit, require_modest
 from veselova.service.api.caller import caller_of
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
-from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.request_models import (
+    ComparisonRequest,
+    TorusRequest,
+    TrajectoryRequest,
+    read_request,
+)
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.workers.pool import Workers
@@ -43,9 +48,11 @@ _UNFINISHED = {
 
 @dataclass(frozen=True)
 class Asked:
-    """A request as its server needs it: what it is about, and a pickle, of its validated fields for the worker, of the SweepPlan.
+    """A request as its server needs it: what it is about, and a pickle, of its validated fields for
+    the worker, of the SweepPlan.
 
-    ``name`` is the name of the answer, of a trajectory; ``large`` says whether the answer is written to a file.
+    ``name`` is the name of the answer, of a trajectory; ``large`` says whether the answer is
+    written to a file.
     """
 
     system: str
@@ -60,26 +67,32 @@ class Reader:
     """Reads the bodies that one server is sent."""
 
     def __init__(self, settings: Settings, workers: Workers) -> None:
-        self._settings, self._workers = settings, workers
+        self._settings = settings
+        self._workers = workers
 
     async def parse_body(self, kind: str, request: Request) -> Asked:
         """Return what the body of a request asks, of a kind of TASKS or of a sweep.
 
-        Raises Refused for another media type, a body over the limit, one that does not come whole, or text that is not JSON;
-        InvalidInput or InvalidRequest for what is wrong with it.
+        Raises Refused for another media type, a body over the limit, one that does not come whole,
+        or text that is not JSON; InvalidInput or InvalidRequest for what is wrong with it.
         """
         body = await self._body(request)
         if len(body) <= _SMALL_BYTES:
             if kind == "sweep":  # problems of which are made, in a tenth of a second
                 return await to_thread.run_sync(_read, kind, body, self._settings)
             return _read(kind, body, self._settings)
-        caller, budget_s = caller_of(request).name, self._settings.max_budget_s
-        return await self._workers.run(_read, kind, body, self._settings, budget_s=budget_s, caller=caller)
+        caller = caller_of(request).name
+        budget_s = self._settings.max_budget_s
+        return await self._workers.run(
+            _read, kind, body, self._settings, budget_s=budget_s, caller=caller
+        )
 
     async def _body(self, request: Request) -> bytes:
         _require_json(request)
         limit = self._settings.max_body_bytes
-        too_large = Refused("body-too-large", f"The body: required at most {limit} bytes; given more.")
+        too_large = Refused(
+            "body-too-large", f"The body: required at most {limit} bytes; given more."
+        )
         declared = request.headers.get("content-length", "")
         if declared.isdigit() and int(declared[:20]) > limit:
             raise too_large
@@ -91,16 +104,27 @@ class Reader:
                     raise too_large
         except ClientDisconnect:
             code = request.scope.get("state", {}).get("unfinished", "client-gone")
-            raise Refused(code, _UNFINISHED[code], retry_after=5 if code == "shutting-down" else None) from None
+            raise Refused(
+                code, _UNFINISHED[code], retry_after=5 if code == "shutting-down" else None
+            ) from None
         return bytes(body)
 
 
 def _require_json(request: Request) -> None:
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
-    if media_type != "application/json" and not (media_type.startswith("application/") and media_type.endswith("+json")):
-        raise Refused("unsupported-media-type", f"Content-Type: required application/json; given {media_type[:100] or 'none'}.")
-    if (coding := request.headers.get("content-encoding", "identity").strip().lower()) != "identity":
-        raise Refused("unsupported-media-type", f"Content-Encoding: required none; given {coding[:100]}.")
+    if media_type != "application/json" and not (
+        media_type.startswith("application/") and media_type.endswith("+json")
+    ):
+        raise Refused(
+            "unsupported-media-type",
+            f"Content-Type: required application/json; given {media_type[:100] or 'none'}.",
+        )
+    if (
+        coding := request.headers.get("content-encoding", "identity").strip().lower()
+    ) != "identity":
+        raise Refused(
+            "unsupported-media-type", f"Content-Encoding: required none; given {coding[:100]}."
+        )
 
 
 def _read(kind: str, body: bytes, settings: Settings) -> Asked:
@@ -112,15 +136,30 @@ def _read(kind: str, body: bytes, settings: Settings) -> Asked:
     admit(request, settings)
     if isinstance(request, SweepRequest):
         content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
-        return Asked(request.problem.system, request.engine or "", request.budget_s, False, request.id, content)
-    stated, name, engine = request.model_dump(), "", "both" if kind == "comparison" else "analytic"
+        return Asked(
+            request.problem.system,
+            request.engine or "",
+            request.budget_s,
+            False,
+            request.id,
+            content,
+        )
+    stated = request.model_dump()
+    name = ""
+    engine = "both" if kind == "comparison" else "analytic"
     if isinstance(request, TrajectoryRequest):
-        name, engine = cache_key(request, stated), request.chosen_engine
+        name = cache_key(request, stated)
+        engine = request.chosen_engine
     content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
-    return Asked(request.problem.system, engine, request.budget_s, _is_large(request), name, content)
+    return Asked(
+        request.problem.system, engine, request.budget_s, _is_large(request), name, content
+    )
 
 
 def _is_large(request: TorusRequest) -> bool:
     if not isinstance(request, ComparisonRequest):
         return False
-    return request.time_count() * request.problem.dimension**2 * request.digits / FEWEST_DIGITS > _LARGE_NUMBERS
+    return (
+        request.time_count() * request.problem.dimension**2 * request.digits / FEWEST_DIGITS
+        > _LARGE_NUMBERS
+    )

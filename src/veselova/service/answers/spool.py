@@ -1,4 +1,6 @@
-"""Large answers on their way: files that a worker writes and the server streams, in a folder that ends with the server."""
+"""Large answers on their way: files that a worker writes and the server streams, in a folder that
+ends with the server.
+"""
 
 from __future__ import annotations
 
@@ -30,11 +32,14 @@ _CHUNK = 1 << 18
 
 
 #: How the folder of a server begins, and the seconds that a new one has to be locked by its server.
-_PREFIX, _NEW_S = "veselova-spool-", 60.0
+_PREFIX = "veselova-spool-"
+_NEW_S = 60.0
 
 
 class Spool:
-    """A folder of this server alone. A file has no name any more when it is sent, so nothing stays behind of it."""
+    """A folder of this server alone. A file has no name any more when it is sent, so nothing stays
+    behind of it.
+    """
 
     def __init__(self, parent: Path) -> None:
         self._parent = parent
@@ -42,7 +47,9 @@ class Spool:
         self._lock: int | None = None
 
     def open(self) -> None:
-        """Make the folder below its parent, or below the system's temporary folder where that cannot be written."""
+        """Make the folder below its parent, or below the system's temporary folder where that
+        cannot be written.
+        """
         for parent in (self._parent, Path(tempfile.gettempdir())):
             try:
                 if parent == self._parent:
@@ -51,7 +58,11 @@ class Spool:
                 self._folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
                 self._lock = _lock(self._folder)
             except (OSError, InvalidInput) as error:
-                _LOG.warning("%s cannot hold large answers on their way: %s", parent, getattr(error, "strerror", None) or error)
+                _LOG.warning(
+                    "%s cannot hold large answers on their way: %s",
+                    parent,
+                    getattr(error, "strerror", None) or error,
+                )
             else:
                 return
 
@@ -68,11 +79,15 @@ class Spool:
 
 
 def _remove_orphans(parent: Path) -> None:
-    """Remove the folders of servers of this account that were killed: their locks went with them."""
+    """Remove the folders of servers of this account that were killed: their locks
+    went with them.
+    """
     for folder in parent.glob(f"{_PREFIX}*"):
         with suppress(OSError):
             state = folder.lstat()
-            if not stat.S_ISDIR(state.st_mode) or (hasattr(os, "geteuid") and state.st_uid != os.geteuid()):
+            if not stat.S_ISDIR(state.st_mode) or (
+                hasattr(os, "geteuid") and state.st_uid != os.geteuid()
+            ):
                 continue
             if time.time() - state.st_mtime > _NEW_S and (lock := _lock(folder)) is not None:
                 shutil.rmtree(folder, ignore_errors=True)
@@ -80,7 +95,9 @@ def _remove_orphans(parent: Path) -> None:
 
 
 def _lock(folder: Path) -> int | None:
-    """Return a lock on a folder, which ends with this process; raises OSError where another has it. None without locks."""
+    """Return a lock on a folder, which ends with this process; raises OSError where another has it.
+    None without locks.
+    """
     try:
         import fcntl
     except ImportError:  # not a POSIX system

@@ -1,4 +1,6 @@
-"""Entries of the cache on their way to the disk: in memory from before their answers leave until they are written."""
+"""Entries of the cache on their way to the disk: in memory from before their answers leave until
+they are written.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +17,24 @@ __all__ = ["WriteBehind"]
 #: Bytes that may be on their way together.
 _MOST = 8_000_000
 
-#: Seconds for which an entry waits: whoever asks again at once is heard first, and entries that come meanwhile go along.
+#: Seconds for which an entry waits: whoever asks again at once is heard first, and entries that
+#: come meanwhile go along.
 _PAUSE_S = 0.005
 
 
 class WriteBehind:
-    """What is kept and not written yet. Writing follows the answers as long as it works and keeps up with them.
+    """What is kept and not written yet. Writing follows the answers as long as it works and keeps
+    up with them.
 
-    An entry is written before its answer leaves where the last one could not be written, where none has been yet, and where
-    ``most`` bytes are on their way. One that fails after its answer has left stays here, at its address, until the disk takes
-    entries again.
+    An entry is written before its answer leaves where the last one could not be written, where none
+    has been yet, and where
+    ``most`` bytes are on their way. One that fails after its answer has left stays here, at its
+    address, until the disk takes entries again.
     """
 
     def __init__(self, cache: Cache, most: int = _MOST) -> None:
-        self._cache, self._most = cache, most
+        self._cache = cache
+        self._most = most
         self._contents: dict[str, bytes] = {}
         self._size = 0
         self._open = self._works = False
@@ -67,12 +73,15 @@ class WriteBehind:
             await self._write(self._contents)
 
     async def _write(self, contents: dict[str, bytes]) -> bool:
-        """Write entries until one fails, and make room where they fill the cache; return whether all are on the disk."""
+        """Write entries until one fails, and make room where they fill the cache; return whether
+        all are on the disk.
+        """
         contents = dict(contents)  # those that arrive meanwhile are left to the next time
         written = await to_thread.run_sync(self._cache.write, contents)
         for name in written:
             self._size -= len(self._contents.pop(name, b""))
-        worked, self._works = self._works, len(written) == len(contents)
+        worked = self._works
+        self._works = len(written) == len(contents)
         if self._works and not worked and self._contents:
             self._due.set()
         if written and self._cache.is_full(sum(written.values())):

@@ -1,1 +1,3 @@
-"""The contract of HTTP: models of requests, JSON documents, problem documents, media types, settings."""
+"""The contract of HTTP: models of requests, JSON documents, problem documents, media types,
+settings.
+"""

@@ -13,7 +13,8 @@ __all__ = ["atomic_file"]
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Give the name of a part to write; at the end of the block it is on the disk and becomes the file, or is gone.
+    """Give the name of a part to write; at the end of the block it is on the disk and becomes the
+    file, or is gone.
 
     A death of the process leaves the part, whose name ends in ``.part``.
     """

@@ -1,4 +1,6 @@
-"""Who asks: whose jobs and answers a request may see, and whose share of the server its work takes."""
+"""Who asks: whose jobs and answers a request may see, and whose share of the server
+its work takes.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from typing import Any
 
 __all__ = ["ADMIN", "ANONYMOUS", "READ", "SCOPES", "SOLVE", "Caller", "caller_of", "put_caller"]
 
-#: What a key allows, each all of those before it: to read, to have work done and ended, to see what all do.
+#: What a key allows, each all of those before it: to read, to have work done and ended, to see what
+#: all do.
 READ, SOLVE, ADMIN = SCOPES = ("read", "solve", "admin")
 
 #: Where the scope of an ASGI request has its caller.
@@ -17,7 +20,9 @@ _PLACE = "veselova.caller"
 
 @dataclass(frozen=True)
 class Caller:
-    """Who asks: ``owner`` has jobs and answers, and is empty where no key is shown; ``name`` is whose share of the work it is."""
+    """Who asks: ``owner`` has jobs and answers, and is empty where no key is shown; ``name`` is
+    whose share of the work it is.
+    """
 
     name: str = ""
     owner: str = ""

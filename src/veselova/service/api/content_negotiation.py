@@ -1,4 +1,6 @@
-"""Which of the offered media types, and which content coding, a request's headers prefer (RFC 9110, 12.5)."""
+"""Which of the offered media types, and which content coding, a request's headers prefer (RFC 9110,
+12.5).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ CODINGS = ("zstd", "gzip")
 
 
 def negotiate_type(accept: str | None, offered: Sequence[str]) -> str:
-    """Return the offered media type of the highest quality, the first of equals; raises Refused where none is acceptable."""
+    """Return the offered media type of the highest quality, the first of equals; raises Refused
+    where none is acceptable.
+    """
     if not accept:
         return offered[0]
     qualities = _qualities(accept)
@@ -26,7 +30,9 @@ def negotiate_type(accept: str | None, offered: Sequence[str]) -> str:
     best = max(offered, key=quality)
     if quality(best) > 0:
         return best
-    raise Refused("not-acceptable", f"Accept: required one of {', '.join(offered)}; given {accept[:100]}.")
+    raise Refused(
+        "not-acceptable", f"Accept: required one of {', '.join(offered)}; given {accept[:100]}."
+    )
 
 
 def negotiate_coding(accept_encoding: str | None) -> str:
@@ -50,7 +56,9 @@ def _qualities(header: str) -> dict[str, float]:
 
 
 def _quality(text: str) -> float:
-    """Return a quality; what is none counts as 1, since the name before it was written for a reason."""
+    """Return a quality; what is none counts as 1, since the name before it was written for a
+    reason.
+    """
     try:
         value = float(text)
     except ValueError:

@@ -6,7 +6,8 @@ from typing import Any
 
 __all__ = ["ANSWERS", "BODY4", "BODY4_PROBLEM"]
 
-#: A four-dimensional body with distinct A's, thrown so that no phase is slow (examples/body4.json is this document).
+#: A four-dimensional body with distinct A's, thrown so that no phase is slow (examples/body4.json
+#: is this document).
 BODY4_PROBLEM: dict[str, Any] = {
     "system": "veselova",
     "A": [3, 2, "1.5", 1],
@@ -16,14 +17,17 @@ BODY4_PROBLEM: dict[str, Any] = {
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": 601}}
 
-#: Answers to ``{"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}`` and to its torus, by kind, for the
-#: OpenAPI document; a test holds them against the engine.
+#: Answers to ``{"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}`` and to its
+#: torus, by kind, for the OpenAPI document; a test holds them against the engine.
 ANSWERS: dict[str, Any] = {
     "trajectory": {
         "engine": "analytic",
         "times": [0.0, 1.0],
         "series": {
-            "q": [[0.5, 0.5, 0.5, 0.5], [0.8189416993637, -0.3364049416798, 0.0872800259113, -0.4566710033860]],
+            "q": [
+                [0.5, 0.5, 0.5, 0.5],
+                [0.8189416993637, -0.3364049416798, 0.0872800259113, -0.4566710033860],
+            ],
             "tau1": [0.0, 1.925209394455],
         },
         "integrals": {"energy": {"initial": 0.5075, "drift": 1.5e-15}},
@@ -41,7 +45,15 @@ ANSWERS: dict[str, Any] = {
         "n": 4,
         "energy": 0.5075,
         "constants": [0.579757165853, 0.827262538580],
-        "branch_points": [0.0, 0.333333333333, 0.5, 0.579757165853, 0.666666666667, 0.827262538580, 1.0],
+        "branch_points": [
+            0.0,
+            0.333333333333,
+            0.5,
+            0.579757165853,
+            0.666666666667,
+            0.827262538580,
+            1.0,
+        ],
         "origins": ["c1", "I1", "I2", "c2", "I3", "c3", "I4"],
         "periods": [
             [56.2829397095, -78.3701656176, 26.0061563766],

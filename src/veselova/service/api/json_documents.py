@@ -1,4 +1,6 @@
-"""The JSON of answers, both ways: a result becomes a document, and a document the same result again."""
+"""The JSON of answers, both ways: a result becomes a document, and a document the same result
+again.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,10 @@ from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import InternalContradiction
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.torus import Torus
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.trajectory import Trajectory
 
 __all__ = [
     "comparison_document",
@@ -33,24 +36,35 @@ __all__ = [
 _FEW_NUMBERS = 10_000
 
 
-def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = None) -> dict[str, Any]:
-    """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's start and drift.
+def trajectory_document(
+    trajectory: Trajectory, outputs: Iterable[str] | None = None
+) -> dict[str, Any]:
+    """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's
+    start and drift.
 
     Decimals are strings, and each series has one of radii beside it.
     """
-    drift, decimals, names = trajectory.drift, trajectory.decimals, tuple(outputs or trajectory.problem.outputs)
+    drift = trajectory.drift
+    decimals = trajectory.decimals
+    names = tuple(outputs or trajectory.problem.outputs)
     error: Any
     if decimals is None:
-        series, error, radii = {name: trajectory.series(name) for name in names}, trajectory.error, {}
+        series = {name: trajectory.series(name) for name in names}
+        error = trajectory.error
+        radii = {}
     else:
-        series, error = {name: decimals.strings(name) for name in names}, [str(error) for error in decimals.error]
+        series = {name: decimals.strings(name) for name in names}
+        error = [str(error) for error in decimals.error]
         radii = {"radii": {name: decimals.strings(name, radii=True) for name in names}}
     return {
         "engine": trajectory.provenance.engine,
         "times": trajectory.times,
         **({} if trajectory.remainders is None else {"remainders": trajectory.remainders}),
         "series": series,
-        "integrals": {name: {"initial": values[0], "drift": drift[name]} for name, values in trajectory.integrals.items()},
+        "integrals": {
+            name: {"initial": values[0], "drift": drift[name]}
+            for name, values in trajectory.integrals.items()
+        },
         "error": error,
         "provenance": trajectory.provenance.as_dict(),
         **radii,
@@ -58,12 +72,21 @@ def trajectory_document(trajectory: Trajectory, outputs: Iterable[str] | None = 
 
 
 def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
-    """Return the trajectory of a document that has the stored outputs; numbers come back to the last bit or digit."""
+    """Return the trajectory of a document that has the stored outputs; numbers come back to the
+    last bit or digit.
+    """
     if "radii" in document:
         return _with_decimals(problem, document)
     series = {name: np.array(document["series"][name], dtype=np.float64) for name in problem.stored}
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
-    return Trajectory(problem, times, error, series, Provenance(**document["provenance"]), remainders=_remainders(document))
+    return Trajectory(
+        problem,
+        times,
+        error,
+        series,
+        Provenance(**document["provenance"]),
+        remainders=_remainders(document),
+    )
 
 
 def _remainders(document: Mapping[str, Any]) -> Any:
@@ -72,18 +95,29 @@ def _remainders(document: Mapping[str, Any]) -> Any:
 
 
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
-    midpoints, radii = ({name: decimals_of(document[kind][name]) for name in problem.stored} for kind in ("series", "radii"))
+    midpoints, radii = (
+        {name: decimals_of(document[kind][name]) for name in problem.stored}
+        for kind in ("series", "radii")
+    )
     provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     for name in problem.derived:
-        midpoints[name], radii[name] = problem.derive_decimals(name, midpoints, radii, provenance.digits)
+        midpoints[name], radii[name] = problem.derive_decimals(
+            name, midpoints, radii, provenance.digits
+        )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
     times = np.array(document["times"], dtype=np.float64)
-    return Trajectory.of_decimals(problem, times, decimals, provenance, remainders=_remainders(document))
+    return Trajectory.of_decimals(
+        problem, times, decimals, provenance, remainders=_remainders(document)
+    )
 
 
-def comparison_document(comparison: Comparison, outputs: Iterable[str] | None = None) -> dict[str, Any]:
-    """Return the document of a comparison: both trajectories, and the largest deviation of every output."""
+def comparison_document(
+    comparison: Comparison, outputs: Iterable[str] | None = None
+) -> dict[str, Any]:
+    """Return the document of a comparison: both trajectories, and the largest deviation of every
+    output.
+    """
     outputs = None if outputs is None else tuple(outputs)
     return {
         **comparison.summary(),
@@ -94,7 +128,9 @@ def comparison_document(comparison: Comparison, outputs: Iterable[str] | None = 
 
 def comparison_of(problem: Problem, document: Mapping[str, Any]) -> Comparison:
     """Return the comparison of a document whose trajectories have the stored outputs."""
-    return Comparison(trajectory_of(problem, document["analytic"]), trajectory_of(problem, document["numeric"]))
+    return Comparison(
+        trajectory_of(problem, document["analytic"]), trajectory_of(problem, document["numeric"])
+    )
 
 
 def torus_of(document: Mapping[str, Any]) -> Torus:
@@ -107,14 +143,18 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 
 
 def encode(document: Mapping[str, Any]) -> bytes:
-    """Return a document as JSON bytes; NaN and infinity, which JSON cannot say and orjson writes as null, are our bug."""
+    """Return a document as JSON bytes; NaN and infinity, which JSON cannot say and orjson writes as
+    null, are our bug.
+    """
     stream = io.BytesIO()
     write_document(document, stream)
     return stream.getvalue()
 
 
 def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
-    """Write a document as JSON, its arrays block by block, so that the text of large ones is never in memory as a whole."""
+    """Write a document as JSON, its arrays block by block, so that the text of large ones is never
+    in memory as a whole.
+    """
     if _numbers(document) <= _FEW_NUMBERS:
         text = orjson.dumps(document, _writable, orjson.OPT_SERIALIZE_NUMPY)
         if b"null" in text:  # which may be one as well, or in a text
@@ -127,7 +167,11 @@ def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
 def _numbers(document: Mapping[str, Any]) -> int:
     """Return how many numbers the arrays of a document have."""
     return sum(
-        value.size if isinstance(value, np.ndarray) else _numbers(value) if isinstance(value, dict) else 0
+        value.size
+        if isinstance(value, np.ndarray)
+        else _numbers(value)
+        if isinstance(value, dict)
+        else 0
         for value in document.values()
     )
 
@@ -156,7 +200,9 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
 
 
 def _writable(value: Any) -> Any:
-    """Return what orjson does not take, arrays in another order than they are written in, as what it does."""
+    """Return what orjson does not take, arrays in another order than they are written in, as what
+    it does.
+    """
     if isinstance(value, np.ndarray):
         return np.ascontiguousarray(value) if value.ndim else value.item()
     if isinstance(value, Mapping):

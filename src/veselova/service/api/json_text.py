@@ -1,4 +1,6 @@
-"""JSON as text: decoded in linear time, with pointers to repeated names, and numbers as they were written."""
+"""JSON as text: decoded in linear time, with pointers to repeated names, and numbers as they were
+written.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,12 @@ _SHOWN_DIGITS = 100
 
 
 def decode(text: bytes) -> Any:
-    """Return the document that a text states; raises Refused when it is not JSON, InvalidRequest where names come twice.
+    """Return the document that a text states; raises Refused when it is not JSON, InvalidRequest
+    where names come twice.
 
-    NaN, Infinity and 1e999 are no JSON, but their sender is helped more by the name of the field: Python's own parser takes
-    them, and the validation that follows refuses every number that is not finite. Of two fields of one name neither is taken.
+    NaN, Infinity and 1e999 are no JSON, but their sender is helped more by the name of the field:
+    Python's own parser takes them, and the validation that follows refuses every number that is not
+    finite. Of two fields of one name neither is taken.
     """
     if not text.strip():
         raise Refused("malformed-json", "The body: required one JSON document; given nothing.")
@@ -60,21 +64,27 @@ def decode(text: bytes) -> Any:
         if len(found) < len(pairs):
             counts = Counter(name for name, _ in pairs)
             names = [name for name, count in counts.items() if count > 1]
-            repeated[id(found)] = (found, names[:MOST_FAULTS])  # the object is kept, and its id with it
+            # the object is kept, and its id with it
+            repeated[id(found)] = (found, names[:MOST_FAULTS])
         return found
 
     decoder = json.JSONDecoder(object_pairs_hook=fields, parse_int=_integer, parse_float=_float)
     try:
-        document = decoder.decode(text.decode("utf-8-sig"))  # some editors put a byte order mark before it
+        # some editors put a byte order mark before it
+        document = decoder.decode(text.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise Refused("malformed-json", f"The body: required one JSON document; {reason}.") from None
+        raise Refused(
+            "malformed-json", f"The body: required one JSON document; {reason}."
+        ) from None
     if repeated:
         raise InvalidRequest(list(islice(_repetitions(document, repeated), MOST_FAULTS + 1)))
     return document
 
 
-def _repetitions(document: Any, repeated: Mapping[int, tuple[Any, list[str]]]) -> Iterator[InvalidInput]:
+def _repetitions(
+    document: Any, repeated: Mapping[int, tuple[Any, list[str]]]
+) -> Iterator[InvalidInput]:
     """Yield a fault for every name that comes twice, deeper ones last."""
     reached = False
     for path, value in _objects(document):
@@ -82,11 +92,17 @@ def _repetitions(document: Any, repeated: Mapping[int, tuple[Any, list[str]]]) -
             reached = True
             yield InvalidInput((*path, name), "each field once", "two fields of this name")
     if not reached:
-        yield InvalidInput((), f"each field once, and at most {_DEEPEST} levels of nesting", "two fields of one name")
+        yield InvalidInput(
+            (),
+            f"each field once, and at most {_DEEPEST} levels of nesting",
+            "two fields of one name",
+        )
 
 
 def layers(document: Any) -> Iterator[list[Any]]:
-    """Yield the values of a document level by level, the document itself first, without recursion."""
+    """Yield the values of a document level by level, the document itself first,
+    without recursion.
+    """
     layer = [document]
     while layer:
         yield layer
@@ -99,7 +115,9 @@ def layers(document: Any) -> Iterator[list[Any]]:
 
 
 def _objects(document: Any) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Yield the objects of a document with their places, in the order of the text; those further inside are left out."""
+    """Yield the objects of a document with their places, in the order of the text; those further
+    inside are left out.
+    """
     ahead: list[tuple[Path, Any]] = [((), document)]
     while ahead:
         path, value = ahead.pop()
@@ -107,11 +125,15 @@ def _objects(document: Any) -> Iterator[tuple[Path, dict[str, Any]]]:
             yield path, value
         if len(path) < _DEEPEST:
             inner = value.items() if isinstance(value, dict) else enumerate(value)
-            ahead += [((*path, part), item) for part, item in inner if isinstance(item, (dict, list))][::-1]
+            ahead += [
+                ((*path, part), item) for part, item in inner if isinstance(item, (dict, list))
+            ][::-1]
 
 
 def _integer(text: str) -> int | str:
-    """Return an integer; one of more digits than Python reads stays a text, which its field then refuses."""
+    """Return an integer; one of more digits than Python reads stays a text, which its field then
+    refuses.
+    """
     return int(text) if len(text) < _LONGEST_INTEGER else text
 
 

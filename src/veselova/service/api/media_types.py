@@ -1,4 +1,6 @@
-"""The formats of a trajectory and the content codings, as a worker writes them: block by block, to memory or to a file."""
+"""The formats of a trajectory and the content codings, as a worker writes them: block by block, to
+memory or to a file.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def _write_json(trajectory: Trajectory, stream: BinaryIO, outputs: Outputs) -> N
 
 @dataclass(frozen=True)
 class Format:
-    """One representation of a trajectory. ``compressed``: it is already, so that no content coding is put on top."""
+    """One representation of a trajectory. ``compressed``: it is already, so that no content coding
+    is put on top.
+    """
 
     name: str
     media_type: str
@@ -55,7 +59,9 @@ def format_of(media_type: str) -> Format:
 
 @contextmanager
 def encode_stream(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
-    """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or ``identity``."""
+    """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or
+    ``identity``.
+    """
     if coding == "identity":
         yield stream
         return

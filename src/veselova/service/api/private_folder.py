@@ -15,7 +15,9 @@ _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def make_private(path: Path) -> None:
-    """Make a folder, and those above it that are missing, for this account alone; one that is there stays as it is."""
+    """Make a folder, and those above it that are missing, for this account alone; one that is there
+    stays as it is.
+    """
     missing = []
     for folder in (path, *path.parents):
         if os.path.lexists(folder):
@@ -26,9 +28,11 @@ def make_private(path: Path) -> None:
 
 
 def own_folder(path: Path) -> None:
-    """Make a folder, and those above it that are missing, readable and writable by this account alone.
+    """Make a folder, and those above it that are missing, readable and writable by this account
+    alone.
 
-    Raises InvalidInput for a folder that is there and is not this account's own, OSError where it cannot be made.
+    Raises InvalidInput for a folder that is there and is not this account's own, OSError where it
+    cannot be made.
     """
     make_private(path)
     require_own(path)
@@ -37,15 +41,18 @@ def own_folder(path: Path) -> None:
 
 
 def require_own(path: Path) -> None:
-    """Raise InvalidInput where a folder is not this account's, where others may write into it, or where another's link leads.
+    """Raise InvalidInput where a folder is not this account's, where others may write into it, or
+    where another's link leads.
 
     Where everybody may make names, as in the folder of temporary files, no link is followed.
     What is no folder, or is not there, is left to whoever opens it.
     """
-    if not hasattr(os, "geteuid"):  # not a POSIX system: access is a matter of lists, which the folder inherits
+    # not a POSIX system: access is a matter of lists, which the folder inherits
+    if not hasattr(os, "geteuid"):
         return
     try:
-        link, folder = path.lstat(), path.stat()
+        link = path.lstat()
+        folder = path.stat()
     except OSError:
         return
     if not stat.S_ISDIR(folder.st_mode):
@@ -56,7 +63,9 @@ def require_own(path: Path) -> None:
     if folder.st_uid != account:
         raise _refusal(path, f"one of account {folder.st_uid}, while this is account {account}")
     if folder.st_mode & _OTHERS_WRITE:
-        raise _refusal(path, f"one of mode {stat.S_IMODE(folder.st_mode):04o} (chmod go-w '{path}')")
+        raise _refusal(
+            path, f"one of mode {stat.S_IMODE(folder.st_mode):04o} (chmod go-w '{path}')"
+        )
 
 
 def _is_shared(folder: Path) -> bool:
@@ -78,5 +87,7 @@ def restrict_file(path: Path) -> None:
 
 
 def _refusal(path: Path, given: str) -> InvalidInput:
-    required = f"a folder of state that this account owns and nobody else may write, in place of {path}"
+    required = (
+        f"a folder of state that this account owns and nobody else may write, in place of {path}"
+    )
     return InvalidInput(("VESELOVA_DATA_DIR",), required, given)

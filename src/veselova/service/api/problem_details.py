@@ -1,6 +1,7 @@
 """RFC 9457 problem documents: the one table from exception to HTTP status and code.
 
-The command line has it too, and no use for the framework: that is imported where a response is made.
+The command line has it too, and no use for the framework: that is imported where a response is
+made.
 """
 
 from __future__ import annotations
@@ -11,7 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import orjson
 
-from veselova.mechanics.core.errors import BackendMissing, InternalContradiction, InvalidInput, InvalidRequest, Unsolved, summary
+from veselova.mechanics.core.errors import (
+    BackendMissing,
+    InternalContradiction,
+    InvalidInput,
+    InvalidRequest,
+    Unsolved,
+    summary,
+)
 
 if TYPE_CHECKING:
     from starlette.exceptions import HTTPException
@@ -21,10 +29,15 @@ __all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_code", "problem_document",
 
 MEDIA_TYPE = "application/problem+json"
 
-#: Status codes of HTTPException that the framework itself raises, with the code and title of their documents.
-_FRAMEWORK = {404: ("not-found", "No such resource"), 405: ("method-not-allowed", "Method not allowed")}
+#: Status codes of HTTPException that the framework itself raises, with the code and title of their
+#: documents.
+_FRAMEWORK = {
+    404: ("not-found", "No such resource"),
+    405: ("method-not-allowed", "Method not allowed"),
+}
 
-#: Exception → (status, code, title); the most specific class of an exception decides. ``type`` is urn:veselova:problem:code.
+#: Exception → (status, code, title); the most specific class of an exception decides. ``type`` is
+#: urn:veselova:problem:code.
 TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
     InvalidInput: (422, "invalid-input", "The input is not valid"),
     InvalidRequest: (422, "invalid-input", "The input is not valid"),
@@ -93,7 +106,9 @@ class Refused(Exception):
 
 
 def problem_document(error: Exception) -> dict[str, Any]:
-    """Return the problem document of an exception; what is not ours is reported without its message."""
+    """Return the problem document of an exception; what is not ours is reported without its
+    message.
+    """
     if isinstance(error, Refused):
         status, title = _REFUSALS[error.code]
         return _document(status, error.code, title, error.detail)
@@ -107,7 +122,9 @@ def problem_document(error: Exception) -> dict[str, Any]:
         faults = [_in_json(fault) for fault in error.faults]
         further = getattr(error, "further", 0)
         document["detail"] = summary(faults, further)
-        document["errors"] = [{"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults]
+        document["errors"] = [
+            {"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults
+        ]
         if further:
             document["further_errors"] = further
     if isinstance(error, Unsolved):
@@ -116,7 +133,9 @@ def problem_document(error: Exception) -> dict[str, Any]:
 
 
 def problem_code(error: Exception) -> str:
-    """Return the name of what went wrong: the outcome of an engine, or the code of the problem document."""
+    """Return the name of what went wrong: the outcome of an engine, or the code of the problem
+    document.
+    """
     document = problem_document(error)
     return str(document.get("outcome") or document["type"].rpartition(":")[2])
 
@@ -133,13 +152,20 @@ def problem_response(error: Exception) -> Response:
 
 
 def _is_of_framework(error: Exception) -> TypeGuard[HTTPException]:
-    """Return whether an exception is an HTTPException; a framework that is not loaded has raised none."""
+    """Return whether an exception is an HTTPException; a framework that is not loaded has raised
+    none.
+    """
     framework = sys.modules.get("starlette.exceptions")
     return framework is not None and isinstance(error, framework.HTTPException)
 
 
 def _document(status: int, code: str, title: str, detail: str) -> dict[str, Any]:
-    return {"type": f"urn:veselova:problem:{code}", "title": title, "status": status, "detail": detail}
+    return {
+        "type": f"urn:veselova:problem:{code}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+    }
 
 
 def _in_json(fault: InvalidInput) -> InvalidInput:

@@ -1,7 +1,8 @@
 """The JSON of problems: one model for each system, told apart by ``system``.
 
-The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document) and validated where the
-problem is built, so that Python, command line and HTTP refuse the same input with the same sentence.
+The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document)
+and validated where the problem is built, so that Python, command line and HTTP refuse the same
+input with the same sentence.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 __all__ = ["SYSTEMS", "ProblemModel", "Request", "Times"]
 
 _NUMBER = {
-    "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100}],
+    "anyOf": [
+        {"type": "number"},
+        {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100},
+    ],
     "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
 }
 _VECTOR = {"type": "array", "items": _NUMBER, "minItems": 2}
@@ -46,8 +50,17 @@ _INERTIA_OPERATOR = {
             "additionalProperties": False,
         }
         for name, schema in (
-            ("special", {**_VECTOR, "description": "A_1 … A_n > 0 of (4.5): 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j"}),
-            ("matrix", {"type": "array", "items": {"type": "array", "items": _NUMBER}, "minItems": 1}),
+            (
+                "special",
+                {
+                    **_VECTOR,
+                    "description": "A_1 … A_n > 0 of (4.5): 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j",
+                },
+            ),
+            (
+                "matrix",
+                {"type": "array", "items": {"type": "array", "items": _NUMBER}, "minItems": 1},
+            ),
         )
     ],
 }
@@ -55,7 +68,10 @@ _MONOMIAL = {
     "type": "object",
     "properties": {
         "coefficient": _NUMBER,
-        "powers": {"type": "array", "items": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3}},
+        "powers": {
+            "type": "array",
+            "items": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
+        },
     },
     "required": ["coefficient", "powers"],
     "additionalProperties": False,
@@ -91,10 +107,19 @@ _SEPARABLE = {
     "minProperties": 1,
     "additionalProperties": False,
 }
-_COLUMNS = {"type": "array", "items": {"type": "array", "items": _NUMBER, "minItems": 1}, "minItems": 2}
+_COLUMNS = {
+    "type": "array",
+    "items": {"type": "array", "items": _NUMBER, "minItems": 1},
+    "minItems": 2,
+}
 _BODY_INERTIA = {
     "anyOf": [
-        {"type": "object", "properties": {name: form}, "required": [name], "additionalProperties": False}
+        {
+            "type": "object",
+            "properties": {name: form},
+            "required": [name],
+            "additionalProperties": False,
+        }
         for name, form in (("special", _VECTOR), ("matrix", _COLUMNS))
     ]
 }
@@ -111,7 +136,12 @@ BodyInertia = Annotated[Any, WithJsonSchema(_BODY_INERTIA)]
 Whole = Annotated[Any, WithJsonSchema(_WHOLE)]
 InertiaOperator = Annotated[Any, WithJsonSchema(_INERTIA_OPERATOR)]
 Matrix = Annotated[Any, WithJsonSchema(_MATRIX)]
-Potential = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "array", "items": _MONOMIAL, "minItems": 1}, {"type": "null"}]})]
+Potential = Annotated[
+    Any,
+    WithJsonSchema(
+        {"anyOf": [{"type": "array", "items": _MONOMIAL, "minItems": 1}, {"type": "null"}]}
+    ),
+]
 SeparableData = Annotated[Any, WithJsonSchema({"anyOf": [_SEPARABLE, {"type": "null"}]})]
 Times = Annotated[Any, WithJsonSchema(_TIMES)]
 
@@ -125,7 +155,8 @@ class Request(BaseModel):
 class SystemModel(Request):
     """A problem of one system."""
 
-    #: What the model becomes, and the field that shows its size: a number, or a list with as many entries.
+    #: What the model becomes, and the field that shows its size: a number, or a list with as many
+    #: entries.
     problem_class: ClassVar[type[Problem]]
     measured: ClassVar[str]
 
@@ -147,21 +178,38 @@ class SystemModel(Request):
 
 
 class VeselovaModel(SystemModel):
-    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state at t = 0."""
+    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state
+    at t = 0.
+    """
 
     problem_class: ClassVar[type[Problem]] = Veselova
     measured: ClassVar[str] = "A"
 
     system: Literal["veselova"]
-    A: Annotated[Inertia, Field(description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2")]
+    A: Annotated[
+        Inertia,
+        Field(
+            description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2"
+        ),
+    ]
     q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
     q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
-    frame: Annotated[Frame, Field(description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out")] = None
-    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
+    frame: Annotated[
+        Frame,
+        Field(
+            description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out"
+        ),
+    ] = None
+    normalize: Annotated[
+        bool,
+        Field(description="scale q to unit length and project q_dot on its tangent space first"),
+    ] = False
 
 
 class NeumannModel(SystemModel):
-    """The Neumann system on the unit sphere with potential ½(A⁻¹q,q), in its own time τ₁, and its state at τ₁ = 0."""
+    """The Neumann system on the unit sphere with potential ½(A⁻¹q,q), in its own time τ₁, and its
+    state at τ₁ = 0.
+    """
 
     problem_class: ClassVar[type[Problem]] = NeumannSystem
     measured: ClassVar[str] = "A"
@@ -170,11 +218,16 @@ class NeumannModel(SystemModel):
     A: Annotated[Vector, Field(description="n positive numbers; n ≥ 2")]
     q: Annotated[Vector, Field(description="unit vector, n numbers")]
     q_prime: Annotated[Vector, Field(description="its velocity dq/dτ₁, orthogonal to q, n numbers")]
-    normalize: Annotated[bool, Field(description="scale q to unit length and project q_prime on its tangent space first")] = False
+    normalize: Annotated[
+        bool,
+        Field(description="scale q to unit length and project q_prime on its tangent space first"),
+    ] = False
 
 
 class EllipsoidGeodesicModel(SystemModel):
-    """A geodesic on the ellipsoid Σ X_i²/A_i = 1, in its arc length s, with the normals of the quadrics its tangent touches."""
+    """A geodesic on the ellipsoid Σ X_i²/A_i = 1, in its arc length s, with the normals of the
+    quadrics its tangent touches.
+    """
 
     problem_class: ClassVar[type[Problem]] = EllipsoidGeodesic
     measured: ClassVar[str] = "A"
@@ -183,7 +236,9 @@ class EllipsoidGeodesicModel(SystemModel):
     A: Annotated[Vector, Field(description="squares of the semiaxes, n positive numbers; n ≥ 2")]
     X: Annotated[Vector, Field(description="point of the ellipsoid at s = 0, n numbers")]
     X_dot: Annotated[Vector, Field(description="unit tangent dX/ds there, n numbers")]
-    normalize: Annotated[bool, Field(description="scale X onto the ellipsoid, project and scale X_dot first")] = False
+    normalize: Annotated[
+        bool, Field(description="scale X onto the ellipsoid, project and scale X_dot first")
+    ] = False
 
 
 class RigidBodyModel(SystemModel):
@@ -191,16 +246,29 @@ class RigidBodyModel(SystemModel):
 
     measured: ClassVar[str] = "inertia"
 
-    inertia: Annotated[Tensor, Field(description="3 positive principal moments, or a symmetric positive definite 3 × 3 matrix")]
+    inertia: Annotated[
+        Tensor,
+        Field(
+            description="3 positive principal moments, or a symmetric positive definite 3 × 3 "
+            "matrix"
+        ),
+    ]
     gamma: Annotated[Triple, Field(description="unit vector e_1 = γ seen from the body")]
     Omega: Annotated[Triple, Field(description="angular velocity in the body")]
-    potential: Annotated[PotentialData, Field(description="V(γ), the sum of the parts given; zero when left out")] = None
-    frame: Annotated[Attitude, Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out")] = None
+    potential: Annotated[
+        PotentialData, Field(description="V(γ), the sum of the parts given; zero when left out")
+    ] = None
+    frame: Annotated[
+        Attitude,
+        Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out"),
+    ] = None
     normalize: Annotated[bool, Field(description="scale gamma to unit length first")] = False
 
 
 class VeselovaSO3Model(RigidBodyModel):
-    """The Veselova system on T SO(3), equations (3.1): (Ω,γ) = const in a potential V(γ) (Clebsch, (3.5), any polynomial)."""
+    """The Veselova system on T SO(3), equations (3.1): (Ω,γ) = const in a potential V(γ) (Clebsch,
+    (3.5), any polynomial).
+    """
 
     problem_class: ClassVar[type[Problem]] = VeselovaSO3
 
@@ -216,7 +284,9 @@ class EulerPoissonModel(RigidBodyModel):
 
 
 class StiefelModel(SystemModel):
-    """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the constraints of rank r."""
+    """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the
+    constraints of rank r.
+    """
 
     problem_class: ClassVar[type[Problem]] = StiefelFlow
     measured: ClassVar[str] = "X"
@@ -225,18 +295,32 @@ class StiefelModel(SystemModel):
     inertia: Annotated[
         BodyInertia,
         Field(
-            description='{"special": n positive numbers A} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …}, symmetric '
+            description='{"special": n positive numbers A} for 𝓘(E_i∧E_j) = (A_iA_j/det A) '
+            'E_i∧E_j, or {"matrix": …}, symmetric '
             "and positive definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order"
         ),
     ]
-    X: Annotated[Columns, Field(description="n rows of r numbers, the columns e_1 … e_r orthonormal; 1 ≤ r ≤ n")]
-    P: Annotated[Columns, Field(description="its momentum, n rows of r numbers, XᵀP skew; either this or X_dot")] = None
-    X_dot: Annotated[Columns, Field(description="its velocity, n rows of r numbers, XᵀẊ skew; either this or P")] = None
-    normalize: Annotated[bool, Field(description="make X orthonormal and project P or X_dot on its tangent space first")] = False
+    X: Annotated[
+        Columns,
+        Field(description="n rows of r numbers, the columns e_1 … e_r orthonormal; 1 ≤ r ≤ n"),
+    ]
+    P: Annotated[
+        Columns,
+        Field(description="its momentum, n rows of r numbers, XᵀP skew; either this or X_dot"),
+    ] = None
+    X_dot: Annotated[
+        Columns, Field(description="its velocity, n rows of r numbers, XᵀẊ skew; either this or P")
+    ] = None
+    normalize: Annotated[
+        bool,
+        Field(description="make X orthonormal and project P or X_dot on its tangent space first"),
+    ] = False
 
 
 class LRModel(SystemModel):
-    """An LR system on SO(n): any inertia, ⟨ω, e_p∧e_q⟩ = const for r < p < q ≤ n, a potential, and its state at t = 0."""
+    """An LR system on SO(n): any inertia, ⟨ω, e_p∧e_q⟩ = const for r < p < q ≤ n, a potential, and
+    its state at t = 0.
+    """
 
     problem_class: ClassVar[type[Problem]] = LRSystem
     measured: ClassVar[str] = "n"
@@ -245,20 +329,35 @@ class LRModel(SystemModel):
     n: Annotated[Whole, Field(description="dimension of the body, n ≥ 2")]
     rank: Annotated[Whole, Field(description="r of D_r, from 1 to n − 1 (no constraints)")]
     inertia: Annotated[
-        InertiaOperator, Field(description="special, or symmetric positive definite on the basis E_i∧E_j, i < j, lexicographic")
+        InertiaOperator,
+        Field(
+            description="special, or symmetric positive definite on the basis E_i∧E_j, i < j, "
+            "lexicographic"
+        ),
     ]
     omega: Annotated[Matrix, Field(description="angular velocity g⁻¹ġ in the body, skew n × n")]
     g: Annotated[
-        Frame, Field(description="attitude, body to space, orthogonal n × n, frame = gᵀ; the identity when left out")
+        Frame,
+        Field(
+            description="attitude, body to space, orthogonal n × n, frame = gᵀ; the identity when "
+            "left out"
+        ),
     ] = None
-    potential: Annotated[Potential, Field(description="v(g) as a sum of monomials in the entries of g")] = None
+    potential: Annotated[
+        Potential, Field(description="v(g) as a sum of monomials in the entries of g")
+    ] = None
     homogeneous: Annotated[
-        bool, Field(description="require ⟨ω, e_p∧e_q⟩ = 0 and project ω on it; else they are what ω gives")
+        bool,
+        Field(
+            description="require ⟨ω, e_p∧e_q⟩ = 0 and project ω on it; else they are what ω gives"
+        ),
     ] = False
 
 
 class SeparableModel(SystemModel):
-    """The reduced rank-one system in n dimensions, in the potentials of (3.5), and its state at t = 0."""
+    """The reduced rank-one system in n dimensions, in the potentials of (3.5), and its state at t =
+    0.
+    """
 
     problem_class: ClassVar[type[Problem]] = SeparableVeselova
     measured: ClassVar[str] = "A"
@@ -267,8 +366,13 @@ class SeparableModel(SystemModel):
     A: Annotated[Vector, Field(description="n positive numbers, no two equal; n ≥ 2")]
     q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
     q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
-    potential: Annotated[SeparableData, Field(description="α₁ (quartic), α₂ (quadratic), β_1 … β_n (centrifugal)")] = None
-    normalize: Annotated[bool, Field(description="scale q to unit length and project q_dot on its tangent space first")] = False
+    potential: Annotated[
+        SeparableData, Field(description="α₁ (quartic), α₂ (quadratic), β_1 … β_n (centrifugal)")
+    ] = None
+    normalize: Annotated[
+        bool,
+        Field(description="scale q to unit length and project q_dot on its tangent space first"),
+    ] = False
 
 
 #: The systems, by the name that tells them apart.

@@ -14,17 +14,20 @@ from limits.aio.strategies import FixedWindowRateLimiter
 
 __all__ = ["Allowance", "RateLimit", "network_of", "rate_of"]
 
-#: One subscriber of IPv6 has at least a network of this length, and may take a new address in it for every request.
+#: One subscriber of IPv6 has at least a network of this length, and may take a new address in it
+#: for every request.
 _IPV6_PREFIX = 64
 
-#: Callers counted by themselves in one window; others share one count. Every request looks through all of them for those whose
-#: window has ended: 0.7 ms at this number.
+#: Callers counted by themselves in one window; others share one count. Every request looks through
+#: all of them for those whose window has ended: 0.7 ms at this number.
 _MOST_CALLERS = 10_000
 
 
 @dataclass(frozen=True)
 class Allowance:
-    """What a caller has left in the current window: requests, and the whole seconds until the window ends."""
+    """What a caller has left in the current window: requests, and the whole seconds until the
+    window ends.
+    """
 
     quota: int
     window_s: int
@@ -34,7 +37,9 @@ class Allowance:
 
     @property
     def headers(self) -> dict[str, str]:
-        """Return the fields RateLimit-Policy and RateLimit (draft-ietf-httpapi-ratelimit-headers)."""
+        """Return the fields RateLimit-Policy and RateLimit
+        (draft-ietf-httpapi-ratelimit-headers).
+        """
         return {
             "RateLimit-Policy": f'"default";q={self.quota};w={self.window_s}',
             "RateLimit": f'"default";r={self.left};t={self.reset_s}',
@@ -44,7 +49,8 @@ class Allowance:
 class RateLimit:
     """A limit such as 120/minute, counted for every caller by itself.
 
-    A fixed window costs one counter for each caller, and its end is known exactly; around it a caller may spend two quotas.
+    A fixed window costs one counter for each caller, and its end is known exactly; around it a
+    caller may spend two quotas.
     """
 
     def __init__(self, item: RateLimitItem) -> None:
@@ -64,7 +70,11 @@ class RateLimit:
 
     def _count(self, caller: str) -> str:
         known = self._storage.expirations
-        return caller if len(known) < _MOST_CALLERS or self._item.key_for(caller) in known else "everyone else"
+        return (
+            caller
+            if len(known) < _MOST_CALLERS or self._item.key_for(caller) in known
+            else "everyone else"
+        )
 
     async def _allowance(self, caller: str, granted: bool) -> Allowance:
         end, left = await self._limiter.get_window_stats(self._item, caller)
@@ -73,7 +83,9 @@ class RateLimit:
 
 
 def rate_of(text: str) -> RateLimit | None:
-    """Return the limit that a text states, None for ``none``; raises ValueError for a text that states no limit."""
+    """Return the limit that a text states, None for ``none``; raises ValueError for a text that
+    states no limit.
+    """
     if text == "none":
         return None
     try:
@@ -81,7 +93,9 @@ def rate_of(text: str) -> RateLimit | None:
     except ValueError:
         item = None
     if item is None or item.amount < 1 or ";" in text or "," in text:
-        raise ValueError("required requests per second, minute, hour or day, such as 120/minute, or none")
+        raise ValueError(
+            "required requests per second, minute, hour or day, such as 120/minute, or none"
+        )
     return RateLimit(item)
 
 

@@ -1,7 +1,9 @@
-"""The JSON of requests: which fields there are. What numbers may be is said once, by mechanics.exact.
+"""The JSON of requests: which fields there are. What numbers may be is said once, by
+mechanics.exact.
 
-The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document) and validated where the
-problem is built, so that Python, command line and HTTP refuse the same input with the same sentence.
+The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document)
+and validated where the problem is built, so that Python, command line and HTTP refuse the same
+input with the same sentence.
 """
 
 from __future__ import annotations
@@ -15,7 +17,15 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.engines import require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, InvalidRequest, VeselovaError, did_you_mean, show, unknown_name
+from veselova.mechanics.core.errors import (
+    Faults,
+    InvalidInput,
+    InvalidRequest,
+    VeselovaError,
+    did_you_mean,
+    show,
+    unknown_name,
+)
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
@@ -24,7 +34,8 @@ from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, 
 
 __all__ = ["MOST_OUTPUTS", "ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
 
-#: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to the field's own message.
+#: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
+#: the field's own message.
 _DEEPEST = 8
 
 #: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
@@ -33,7 +44,8 @@ _MOST_FIELDS = 40
 #: No system has as many series.
 MOST_OUTPUTS = 20
 
-#: Problems and times up to here are looked at for further faults before the limits of the server are.
+#: Problems and times up to here are looked at for further faults before the limits of the server
+#: are.
 _SMALL_DIMENSION = 16
 _FEW_TIMES = 1000
 
@@ -47,7 +59,10 @@ class TorusRequest(Request):
     model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
 
     problem: ProblemModel
-    budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped")] = 10.0
+    budget_s: Annotated[
+        float,
+        Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
+    ] = 10.0
 
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request for the system that it asks of."""
@@ -63,20 +78,38 @@ class ComparisonRequest(TorusRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
 
-    times: Annotated[Times, Field(description="finite, in any order; the start is t = 0, negative times are fine")]
-    method: Annotated[str | None, Field(description="analytic: theta, products, nufft, angles; numeric: dop853, taylor")] = None
-    formulation: Annotated[str | None, Field(description="numeric: which equations of the system are integrated")] = None
+    times: Annotated[
+        Times,
+        Field(description="finite, in any order; the start is t = 0, negative times are fine"),
+    ]
+    method: Annotated[
+        str | None,
+        Field(description="analytic: theta, products, nufft, angles; numeric: dop853, taylor"),
+    ] = None
+    formulation: Annotated[
+        str | None, Field(description="numeric: which equations of the system are integrated")
+    ] = None
     outputs: Annotated[
         list[str] | None,
-        Field(min_length=1, max_length=MOST_OUTPUTS, description="series of the system (GET /v1/systems); all when left out"),
+        Field(
+            min_length=1,
+            max_length=MOST_OUTPUTS,
+            description="series of the system (GET /v1/systems); all when left out",
+        ),
     ] = None
     digits: Annotated[
-        int, Field(ge=FEWEST_DIGITS, le=FEWEST_DIGITS, description="a comparison has the digits of the numeric engine")
+        int,
+        Field(
+            ge=FEWEST_DIGITS,
+            le=FEWEST_DIGITS,
+            description="a comparison has the digits of the numeric engine",
+        ),
     ] = FEWEST_DIGITS
 
     def time_grid(self) -> TimeGrid:
         """Return the times asked for; raises InvalidInput located at ``times``."""
-        if not isinstance(self.times, (list, dict)):  # Python takes a single number too, the schema of requests does not
+        # Python takes a single number too, the schema of requests does not
+        if not isinstance(self.times, (list, dict)):
             required = "a list of numbers, or exactly the fields start, stop, count"
             raise InvalidInput(("times",), required, show(self.times))
         return TimeGrid.of(self.times, self._exact)
@@ -88,12 +121,17 @@ class ComparisonRequest(TorusRequest):
 
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request for the system that it asks of."""
-        kind, faults = SYSTEMS[self.problem.system].problem_class, Faults()
+        kind = SYSTEMS[self.problem.system].problem_class
+        faults = Faults()
         self._try_options(faults)
         for i, name in enumerate(self.outputs or ()):
             if name not in kind.outputs:
                 faults.found.append(unknown_name(("outputs", i), name, list(kind.outputs)))
-        if faults.found and self.problem.dimension <= _SMALL_DIMENSION and self.time_count() <= _FEW_TIMES:
+        if (
+            faults.found
+            and self.problem.dimension <= _SMALL_DIMENSION
+            and self.time_count() <= _FEW_TIMES
+        ):
             faults.attempt(self.problem.problem)
             faults.attempt(self.time_grid)
         return faults.found
@@ -101,7 +139,13 @@ class ComparisonRequest(TorusRequest):
     def _try_options(self, faults: Faults) -> None:
         """Collect what is wrong with the options of the engines."""
         if self.method is not None:  # of the numerical engine
-            faults.attempt(require_options, SYSTEMS[self.problem.system].problem_class, "numeric", self.method, None)
+            faults.attempt(
+                require_options,
+                SYSTEMS[self.problem.system].problem_class,
+                "numeric",
+                self.method,
+                None,
+            )
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""
@@ -115,18 +159,27 @@ class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
     engine: Annotated[
-        Literal["analytic", "numeric"] | None, Field(description="analytic where the problem has a closed form, when left out")
+        Literal["analytic", "numeric"] | None,
+        Field(description="analytic where the problem has a closed form, when left out"),
     ] = None
     digits: Annotated[
-        int, Field(ge=FEWEST_DIGITS, le=MOST_DIGITS, description=f"beyond {FEWEST_DIGITS}, answers are decimal strings")
+        int,
+        Field(
+            ge=FEWEST_DIGITS,
+            le=MOST_DIGITS,
+            description=f"beyond {FEWEST_DIGITS}, answers are decimal strings",
+        ),
     ] = FEWEST_DIGITS
-    certified: Annotated[bool, Field(description="whether every number comes with a proven bound of its error")] = False
+    certified: Annotated[
+        bool, Field(description="whether every number comes with a proven bound of its error")
+    ] = False
 
     @cached_property
     def chosen_engine(self) -> str:
         """Return the engine asked for, or the one that serves the problem when none is."""
         kind = SYSTEMS[self.problem.system].problem_class
-        if self.engine or kind.default_engine is Problem.default_engine:  # then it is the same for all problems of the system
+        # then it is the same for all problems of the system
+        if self.engine or kind.default_engine is Problem.default_engine:
             return self.engine or next(iter(kind.engines))
         try:
             return self.problem.problem().default_engine
@@ -137,8 +190,18 @@ class TrajectoryRequest(ComparisonRequest):
         kind = SYSTEMS[self.problem.system].problem_class
         if self.engine is None and (self.method, self.formulation) == (None, None):
             return
-        engine = self.engine or ("analytic" if self._exact and "analytic" in kind.engines else self.chosen_engine)
-        faults.attempt(require_options, kind, engine, self.method, self.formulation, self.digits, self.certified)
+        engine = self.engine or (
+            "analytic" if self._exact and "analytic" in kind.engines else self.chosen_engine
+        )
+        faults.attempt(
+            require_options,
+            kind,
+            engine,
+            self.method,
+            self.formulation,
+            self.digits,
+            self.certified,
+        )
 
     @property
     def _exact(self) -> bool:
@@ -149,17 +212,26 @@ _Model = TypeVar("_Model", bound=TorusRequest)
 
 
 def read_request(model: type[_Model], document: Any) -> _Model:
-    """Return the request that a decoded JSON document states; raises InvalidRequest with every fault found."""
+    """Return the request that a decoded JSON document states; raises InvalidRequest with every
+    fault found.
+    """
     if _is_deeper(document, _DEEPEST):
         raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
-    for path, part in (((), document), (("problem",), document.get("problem") if isinstance(document, dict) else None)):
+    for path, part in (
+        ((), document),
+        (("problem",), document.get("problem") if isinstance(document, dict) else None),
+    ):
         if isinstance(part, dict) and len(part) > _MOST_FIELDS:
-            raise InvalidRequest([InvalidInput(path, "the fields of a request", f"{len(part)} fields")])
+            raise InvalidRequest(
+                [InvalidInput(path, "the fields of a request", f"{len(part)} fields")]
+            )
     try:
         request = model.model_validate(document)
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=True)
-        raise InvalidRequest([_fault(item, _fields(model, document, item["loc"])) for item in found]) from None
+        raise InvalidRequest(
+            [_fault(item, _fields(model, document, item["loc"])) for item in found]
+        ) from None
     if faults := request.faults():
         raise InvalidRequest(faults)
     return request
@@ -167,22 +239,33 @@ def read_request(model: type[_Model], document: Any) -> _Model:
 
 def _is_deeper(document: Any, levels: int) -> bool:
     """Return whether a document nests deeper than so many levels."""
-    return any(isinstance(value, (dict, list)) for value in next(islice(layers(document), levels, None), ()))
+    return any(
+        isinstance(value, (dict, list))
+        for value in next(islice(layers(document), levels, None), ())
+    )
 
 
-def _fields(model: type[TorusRequest], document: Any, place: tuple[int | str, ...]) -> Sequence[str]:
+def _fields(
+    model: type[TorusRequest], document: Any, place: tuple[int | str, ...]
+) -> Sequence[str]:
     """Return the names of the fields that there are where pydantic found a fault."""
     if len(place) == 1:
         return list(model.model_fields)
-    return list(SYSTEMS[document["problem"]["system"]].model_fields) if len(place) == 3 and place[1] in SYSTEMS else []
+    return (
+        list(SYSTEMS[document["problem"]["system"]].model_fields)
+        if len(place) == 3 and place[1] in SYSTEMS
+        else []
+    )
 
 
 def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     """Return pydantic's finding in the words of the other doors: field, required, given."""
     path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
-    if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:  # where pydantic says which model it took
+    # where pydantic says which model it took
+    if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:
         path = ("problem", *path[2:])
-    kind, given = item["type"], show(item.get("input"))
+    kind = item["type"]
+    given = show(item.get("input"))
     if kind == "union_tag_not_found":
         if isinstance(item.get("input"), dict):
             return InvalidInput((*path, "system"), "this field", "nothing")
@@ -192,7 +275,11 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     if kind == "missing":
         return InvalidInput(path, "this field", "nothing")
     if kind == "extra_forbidden":
-        return InvalidInput(path, "no field of this name", f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}")
+        return InvalidInput(
+            path,
+            "no field of this name",
+            f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}",
+        )
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return InvalidInput(path, "a JSON object", given)
     required: str = {

@@ -18,12 +18,15 @@ MEGABYTE = 1_000_000
 
 
 def _state_folder() -> Path:
-    """Return the folder in which a program of this account keeps its state (XDG base directories)."""
+    """Return the folder in which a program of this account keeps its state (XDG base
+    directories).
+    """
     stated = os.environ.get("XDG_STATE_HOME")
     try:
         return Path(stated or Path.home() / ".local" / "state") / "veselova"
     except RuntimeError:  # an account without a home
-        return Path(tempfile.gettempdir()) / f"veselova-{os.getuid()}"  # which is refused where another account made it
+        # which is refused where another account made it
+        return Path(tempfile.gettempdir()) / f"veselova-{os.getuid()}"
 
 
 class Settings(BaseSettings):
@@ -31,97 +34,188 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="VESELOVA_", frozen=True)
 
-    workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes")
-    max_waiting: int = Field(default=64, ge=0, description="requests that may wait for a worker before others are refused")
+    workers: int = Field(
+        default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes"
+    )
+    max_waiting: int = Field(
+        default=64,
+        ge=0,
+        description="requests that may wait for a worker before others are refused",
+    )
     max_waiting_per_caller: int = Field(
-        default=0, ge=0, description="of them, those of one key or address; 0: a quarter where keys are required, else all"
+        default=0,
+        ge=0,
+        description="of them, those of one key or address; 0: a quarter where keys are required, "
+        "else all",
     )
     max_workers_per_caller: int = Field(
-        default=0, ge=0, description="workers for one key or address at a time; 0: all but one where keys are required, else all"
+        default=0,
+        ge=0,
+        description="workers for one key or address at a time; 0: all but one where keys are "
+        "required, else all",
     )
-    max_budget_s: float = Field(default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds")
-    shutdown_grace_s: int = Field(default=10, ge=0, description="seconds that requests in flight get after SIGTERM")
+    max_budget_s: float = Field(
+        default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
+    )
+    shutdown_grace_s: int = Field(
+        default=10, ge=0, description="seconds that requests in flight get after SIGTERM"
+    )
     estimate_slack: float = Field(
-        default=4.0, ge=0, description="refuse work whose estimated time is so many times its budget; 0 refuses none"
+        default=4.0,
+        ge=0,
+        description="refuse work whose estimated time is so many times its budget; 0 refuses none",
     )
     worker_memory_mb: int = Field(
-        default=2048, ge=256, description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused"
+        default=2048,
+        ge=256,
+        description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused",
     )
-    max_body_bytes: int = Field(default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)")
+    max_body_bytes: int = Field(
+        default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)"
+    )
     max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
-    max_text: int = Field(default=2100, ge=20, description="longest text in a request body (a number as a string)")
+    max_text: int = Field(
+        default=2100, ge=20, description="longest text in a request body (a number as a string)"
+    )
     max_dimension: int = Field(default=64, ge=2, description="largest n")
     max_digits: int = Field(default=1000, ge=15, description="most digits")
     max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")
-    max_values: int = Field(default=16_000_000, ge=1, description="most frame entries in one answer, times × n²")
+    max_values: int = Field(
+        default=16_000_000, ge=1, description="most frame entries in one answer, times × n²"
+    )
 
     max_connections: int = Field(
-        default=500, ge=1, description="connections at a time; fewer where the system allows fewer files"
+        default=500,
+        ge=1,
+        description="connections at a time; fewer where the system allows fewer files",
     )
     max_connections_per_address: int = Field(
-        default=100, ge=0, description="of them from one address (IPv6: /64 network); 0: any number, as behind a proxy"
+        default=100,
+        ge=0,
+        description="of them from one address (IPv6: /64 network); 0: any number, as behind a "
+        "proxy",
     )
-    head_timeout_s: float = Field(default=10.0, gt=0, description="seconds for the head of a request")
-    body_timeout_s: float = Field(default=120.0, gt=0, description="seconds for the whole body of a request")
-    body_bytes_per_s: int = Field(default=1000, ge=0, description="slowest body, on average; looked at after 5 seconds")
+    head_timeout_s: float = Field(
+        default=10.0, gt=0, description="seconds for the head of a request"
+    )
+    body_timeout_s: float = Field(
+        default=120.0, gt=0, description="seconds for the whole body of a request"
+    )
+    body_bytes_per_s: int = Field(
+        default=1000, ge=0, description="slowest body, on average; looked at after 5 seconds"
+    )
     send_timeout_s: float = Field(
-        default=30.0, gt=0, description="seconds in which a client must take some of an answer that waits"
+        default=30.0,
+        gt=0,
+        description="seconds in which a client must take some of an answer that waits",
     )
-    keep_alive_s: int = Field(default=5, ge=1, description="seconds that a connection may wait for its next request")
+    keep_alive_s: int = Field(
+        default=5, ge=1, description="seconds that a connection may wait for its next request"
+    )
     allowed_hosts: str = Field(
         default="auto",
-        description="names and addresses by which requests may call the server (Host), with commas between them, or *; "
+        description="names and addresses by which requests may call the server (Host), with commas "
+        "between them, or *; "
         "auto: those of loopback where it is bound to loopback, else any",
     )
 
-    data_dir: Path = Field(default_factory=_state_folder, description="folder of the database, the results of jobs and the cache")
+    data_dir: Path = Field(
+        default_factory=_state_folder,
+        description="folder of the database, the results of jobs and the cache",
+    )
     database_url: SecretStr = Field(
-        default=SecretStr(""), description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir when empty"
+        default=SecretStr(""),
+        description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir "
+        "when empty",
     )
-    cache_bytes: int = Field(default=1_000_000_000, ge=0, description="size of the cache of trajectories in data_dir; 0: none")
+    cache_bytes: int = Field(
+        default=1_000_000_000,
+        ge=0,
+        description="size of the cache of trajectories in data_dir; 0: none",
+    )
 
-    dask_scheduler: str = Field(default="", description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty")
-    dask_ca_file: Path | None = Field(default=None, description="certificate of the authority of a Dask cluster, for tls://")
-    dask_cert_file: Path | None = Field(default=None, description="certificate of this server in a Dask cluster")
-    dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
-    sweep_workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps")
-    sweep_worker_memory_mb: int = Field(
-        default=1000, ge=200, description="memory of a worker for sweeps, in MB of 10⁶ bytes, before it is ended"
+    dask_scheduler: str = Field(
+        default="",
+        description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty",
     )
-    max_running_jobs: int = Field(default=4, ge=1, description="jobs that share the workers; others wait")
-    max_jobs: int = Field(default=100, ge=1, description="jobs that may wait or run before others are refused")
-    max_sweep_problems: int = Field(default=1_000_000, ge=1, description="most problems in one sweep")
-    max_sweep_bytes: int = Field(default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated")
+    dask_ca_file: Path | None = Field(
+        default=None, description="certificate of the authority of a Dask cluster, for tls://"
+    )
+    dask_cert_file: Path | None = Field(
+        default=None, description="certificate of this server in a Dask cluster"
+    )
+    dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
+    sweep_workers: int = Field(
+        default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps"
+    )
+    sweep_worker_memory_mb: int = Field(
+        default=1000,
+        ge=200,
+        description="memory of a worker for sweeps, in MB of 10⁶ bytes, before it is ended",
+    )
+    max_running_jobs: int = Field(
+        default=4, ge=1, description="jobs that share the workers; others wait"
+    )
+    max_jobs: int = Field(
+        default=100, ge=1, description="jobs that may wait or run before others are refused"
+    )
+    max_sweep_problems: int = Field(
+        default=1_000_000, ge=1, description="most problems in one sweep"
+    )
+    max_sweep_bytes: int = Field(
+        default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated"
+    )
     max_stored_bytes: int = Field(
         default=20_000_000_000,
         ge=1000,
-        description="largest results of all jobs together, counted as promised until a job has ended",
+        description="largest results of all jobs together, counted as promised until a job has "
+        "ended",
     )
-    max_jobs_per_key: int = Field(default=20, ge=1, description="jobs of the owner of a key that may wait or run")
+    max_jobs_per_key: int = Field(
+        default=20, ge=1, description="jobs of the owner of a key that may wait or run"
+    )
     max_stored_bytes_per_key: int = Field(
-        default=5_000_000_000, ge=1000, description="largest results of all jobs of the owner of a key together"
+        default=5_000_000_000,
+        ge=1000,
+        description="largest results of all jobs of the owner of a key together",
     )
     retain_jobs_days: float = Field(
-        default=30, ge=0, le=36_525, description="days after which ended jobs are forgotten; 0: never"
+        default=30,
+        ge=0,
+        le=36_525,
+        description="days after which ended jobs are forgotten; 0: never",
     )
     retain_idempotency_days: float = Field(
         default=7,
         ge=0,
         le=36_525,
-        description="days after which an Idempotency-Key may come with another request; 0: with its job",
+        description="days after which an Idempotency-Key may come with another request; 0: with "
+        "its job",
     )
 
     keys: Literal["auto", "required", "off"] = Field(
-        default="auto", description="whether clients must show an API key; auto: unless the server binds to loopback"
+        default="auto",
+        description="whether clients must show an API key; auto: unless the server binds to "
+        "loopback",
     )
     rate_limit: str = Field(
         default="auto",
-        description="requests of one key or address, such as 120/minute, or none; auto: 600/minute beyond loopback",
+        description="requests of one key or address, such as 120/minute, or none; auto: 600/minute "
+        "beyond loopback",
     )
-    failed_key_limit: str = Field(default="20/minute", description="wrong keys from one address before it is refused, or none")
-    cors_origins: str = Field(default="", description="origins whose pages may call the service, with commas between them, or *")
-    log_format: Literal["auto", "json", "text"] = Field(default="auto", description="lines of the log; auto: text on a terminal")
-    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="least severe lines logged")
+    failed_key_limit: str = Field(
+        default="20/minute", description="wrong keys from one address before it is refused, or none"
+    )
+    cors_origins: str = Field(
+        default="",
+        description="origins whose pages may call the service, with commas between them, or *",
+    )
+    log_format: Literal["auto", "json", "text"] = Field(
+        default="auto", description="lines of the log; auto: text on a terminal"
+    )
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="info", description="least severe lines logged"
+    )
 
     @field_validator("rate_limit", "failed_key_limit")
     @classmethod
@@ -137,7 +231,9 @@ class Settings(BaseSettings):
     def _are_origins(cls, text: str) -> str:
         for origin in filter(None, map(str.strip, text.split(","))):
             if origin != "*" and not re.fullmatch(r"https?://[^/\s?#@*]+", origin):
-                raise ValueError("required origins such as https://example.org, with commas between them, or *")
+                raise ValueError(
+                    "required origins such as https://example.org, with commas between them, or *"
+                )
         return text
 
     @field_validator("allowed_hosts")
@@ -146,11 +242,16 @@ class Settings(BaseSettings):
         for name in filter(None, map(str.strip, text.split(","))):
             if name != "*" and not re.fullmatch(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?", name):
                 raise ValueError(
-                    "required names such as veselova.example or 10.0.0.5, without ports, with commas between them, or *"
+                    "required names such as veselova.example or 10.0.0.5, without ports, "
+                    "with commas between them, or *"
                 )
         return text
 
     @property
     def limits(self) -> dict[str, float]:
         """Return what a client may know: the numbers among the settings."""
-        return {name: value for name, value in self.model_dump().items() if isinstance(value, (int, float))}
+        return {
+            name: value
+            for name, value in self.model_dump().items()
+            if isinstance(value, (int, float))
+        }

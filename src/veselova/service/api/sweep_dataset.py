@@ -17,19 +17,25 @@ from veselova.service.api.sweep_request import SweepRequest
 __all__ = ["sweep_dataset"]
 
 
-def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path | None = None) -> Any:
-    """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one file).
+def sweep_dataset(
+    sweep: SweepRequest, table: bytes | Path, trajectories: Path | None = None
+) -> Any:
+    """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one
+    file).
 
-    Dimensions: each parameter with given values, by its name (``A.0``), with them as coordinate where they are numbers, and
-    ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn parameters, ``outcome``, ``detail``
-    and the findings; then the outputs, as ``trajectory.q``, with further dimensions ``time`` and their own. Raises
-    BackendMissing without xarray.
+    Dimensions: each parameter with given values, by its name (``A.0``), with them as coordinate
+    where they are numbers, and
+    ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn
+    parameters, ``outcome``, ``detail`` and the findings; then the outputs, as ``trajectory.q``,
+    with further dimensions ``time`` and their own. Raises BackendMissing without xarray.
     """
     try:
         import xarray
         from pyarrow import parquet
     except ImportError as error:
-        raise BackendMissing(error.name or "xarray", "The Dataset of a sweep", install_extra("sweeps")) from None
+        raise BackendMissing(
+            error.name or "xarray", "The Dataset of a sweep", install_extra("sweeps")
+        ) from None
     dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
     coordinates, variables, given = _of_axes(sweep)
     columns = parquet.read_table(table if isinstance(table, Path) else io.BytesIO(table))
@@ -47,16 +53,24 @@ def sweep_dataset(sweep: SweepRequest, table: bytes | Path, trajectories: Path |
 
 
 def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[str]]:
-    """Return coordinates and variables of the axes, and the columns of the table that they stand for."""
+    """Return coordinates and variables of the axes, and the columns of the table that they stand
+    for.
+    """
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     given = {"row"}
     for axis in sweep.axes:
-        parts = [[to_table_value(scalar) for _, scalar in components(axis.name, value)] for value in axis.values]
+        parts = [
+            [to_table_value(scalar) for _, scalar in components(axis.name, value)]
+            for value in axis.values
+        ]
         names = [name for name, _ in components(axis.name, axis.values[0])]
         given |= set(names)
         for name, values in zip(names, zip(*parts, strict=True), strict=True):
-            (coordinates if names == [axis.name] else variables)[name] = ((axis.name,), np.array(values))
+            (coordinates if names == [axis.name] else variables)[name] = (
+                (axis.name,),
+                np.array(values),
+            )
     return coordinates, variables, given
 
 
@@ -64,7 +78,9 @@ def _times(sweep: SweepRequest) -> TimeGrid:
     """Return the times of the motions."""
     from veselova.service.api.request_models import ComparisonRequest, read_request
 
-    return read_request(ComparisonRequest, {"problem": sweep.problem.model_dump(), "times": sweep.times}).time_grid()
+    return read_request(
+        ComparisonRequest, {"problem": sweep.problem.model_dump(), "times": sweep.times}
+    ).time_grid()
 
 
 def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str, Any]:
@@ -73,6 +89,9 @@ def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str
     axes = {**SYSTEMS[sweep.problem.system].problem_class.outputs, "error": ()}
     group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
     return {
-        f"trajectory.{name}": ([*dimensions, "time", *axes[name]], np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]))
+        f"trajectory.{name}": (
+            [*dimensions, "time", *axes[name]],
+            np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]),
+        )
         for name, array in group.arrays()
     }

@@ -1,4 +1,6 @@
-"""What a sweep varies: each parameter a place in the JSON of the problem, with the values that it takes there."""
+"""What a sweep varies: each parameter a place in the JSON of the problem, with the values that it
+takes there.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,17 @@ import numpy as np
 from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
 from veselova.mechanics.core.exact_input import exact_number
 
-__all__ = ["Axis", "Draw", "Parameter", "Path", "components", "is_double", "parameters", "replace_values", "to_table_value"]
+__all__ = [
+    "Axis",
+    "Draw",
+    "Parameter",
+    "Path",
+    "components",
+    "is_double",
+    "parameters",
+    "replace_values",
+    "to_table_value",
+]
 
 Path = tuple[str | int, ...]
 
@@ -68,21 +80,34 @@ class Draw(Parameter):
 def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[Parameter]:
     """Return the parameters of a sweep over a problem, in the order given.
 
-    Raises InvalidInput for a place that the problem has not, for two places one inside the other, and for values, grids and
-    distributions that are none; all axes together have at most ``most_values`` values.
+    Raises InvalidInput for a place that the problem has not, for two places one inside the other,
+    and for values, grids and distributions that are none; all axes together have at most
+    ``most_values`` values.
     """
     if not isinstance(vary, Mapping) or not vary or len(vary) > _MOST_PARAMETERS:
-        raise InvalidInput(("vary",), f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem", show(vary))
+        raise InvalidInput(
+            ("vary",),
+            f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem",
+            show(vary),
+        )
     found: list[Parameter] = []
     for pointer, stated in vary.items():
         where = ("vary", str(pointer)[:100].encode("utf-8", "backslashreplace").decode("utf-8"))
         path = _path(pointer, problem, where)
-        if other := next((p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None):
-            raise InvalidInput(where, "a place of its own", f"a place that overlaps with {other.name}")
+        if other := next(
+            (p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None
+        ):
+            raise InvalidInput(
+                where, "a place of its own", f"a place that overlaps with {other.name}"
+            )
         found.append(_parameter(path, stated, _value_at(problem, path), where, most_values))
         count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
         if count > most_values:
-            raise InvalidInput(("vary",), f"lists and grids of at most {most_values} values, all together", str(count))
+            raise InvalidInput(
+                ("vary",),
+                f"lists and grids of at most {most_values} values, all together",
+                str(count),
+            )
     return found
 
 
@@ -112,7 +137,9 @@ def components(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def is_double(value: Any) -> bool:
     """Return whether a value of the JSON is a number that a double holds exactly."""
-    return (type(value) is float and math.isfinite(value)) or (type(value) is int and abs(value) <= _LARGEST_INTEGER)
+    return (type(value) is float and math.isfinite(value)) or (
+        type(value) is int and abs(value) <= _LARGEST_INTEGER
+    )
 
 
 def to_table_value(value: Any) -> float | str | None:
@@ -127,7 +154,10 @@ def to_table_value(value: Any) -> float | str | None:
 
 def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
     """Return the parts of an RFC 6901 pointer to a value that the problem states."""
-    required = f'a JSON pointer to a value that the problem states, such as "/{next(iter(k for k in problem if k != "system"))}"'
+    required = (
+        "a JSON pointer to a value that the problem states, such as "
+        f'"/{next(iter(k for k in problem if k != "system"))}"'
+    )
     parts = str(pointer).split("/")
     place: Any = problem
     path: list[str | int] = []
@@ -135,7 +165,13 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         name = part.replace("~1", "/").replace("~0", "~")
         if isinstance(place, Mapping) and name in place and name != "system":
             path.append(name)
-        elif isinstance(place, list) and name.isascii() and name.isdigit() and len(name) < 6 and int(name) < len(place):
+        elif (
+            isinstance(place, list)
+            and name.isascii()
+            and name.isdigit()
+            and len(name) < 6
+            and int(name) < len(place)
+        ):
             path.append(int(name))
         else:
             raise InvalidInput(where, required, show(pointer))
@@ -150,12 +186,29 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int
         return Axis(path, _values(stated, base, where, most_values))
     if isinstance(stated, Mapping) and len(stated) == 1 and next(iter(stated)) in _DISTRIBUTIONS:
         ((distribution, bounds),) = stated.items()
-        return Draw(path, distribution, _bounds(distribution, bounds, (*where, distribution)), _shape(base, where))
-    if isinstance(stated, Mapping) and {"start", "stop", "count"} <= set(stated) <= {"start", "stop", "count", "spacing"}:
+        return Draw(
+            path,
+            distribution,
+            _bounds(distribution, bounds, (*where, distribution)),
+            _shape(base, where),
+        )
+    if isinstance(stated, Mapping) and {"start", "stop", "count"} <= set(stated) <= {
+        "start",
+        "stop",
+        "count",
+        "spacing",
+    }:
         if _shape(base, where):
-            raise InvalidInput(where, "a list of values (a grid is for one number, and this place holds a list)", show(stated))
+            raise InvalidInput(
+                where,
+                "a list of values (a grid is for one number, and this place holds a list)",
+                show(stated),
+            )
         return Axis(path, _grid(stated, where, most_values))
-    forms = f"a list of values, a grid (start, stop, count, spacing), or one of {', '.join(_DISTRIBUTIONS)} with two numbers"
+    forms = (
+        "a list of values, a grid (start, stop, count, spacing), or one of "
+        f"{', '.join(_DISTRIBUTIONS)} with two numbers"
+    )
     raise InvalidInput(where, forms, show(stated))
 
 
@@ -166,25 +219,34 @@ def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
     for i, value in enumerate(stated):
         scalars = dict(components("", value))
         if list(scalars) != names or isinstance(value, Mapping):
-            raise InvalidInput((*where, i), "a value of the same shape as in the problem", show(value))
-        if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
+            raise InvalidInput(
+                (*where, i), "a value of the same shape as in the problem", show(value)
+            )
+        if not all(
+            math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)
+        ):
             raise InvalidInput((*where, i), "finite numbers", show(value))
     return stated
 
 
 def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
-    count, spacing = stated["count"], stated.get("spacing", "linear")
+    count = stated["count"]
+    spacing = stated.get("spacing", "linear")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
         raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", show(count))
     if spacing not in _SPACINGS:
         raise unknown_name((*where, "spacing"), spacing, _SPACINGS)
     start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
     if not math.isfinite(stop - start):
-        raise InvalidInput(where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}")
+        raise InvalidInput(
+            where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}"
+        )
     if spacing == "linear":
         return [float(value) for value in np.linspace(start, stop, count)]
     if min(start, stop) <= 0:
-        raise InvalidInput(where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}")
+        raise InvalidInput(
+            where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}"
+        )
     return [float(value) for value in np.geomspace(start, stop, count)]
 
 
@@ -203,11 +265,15 @@ def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
 
 
 def _shape(base: Any, where: Path) -> tuple[int, ...]:
-    """Return the shape of the numbers at a place; raises InvalidInput where it holds something else."""
+    """Return the shape of the numbers at a place; raises InvalidInput where it holds something
+    else.
+    """
     if isinstance(base, list):
         inner = {_shape(item, where) for item in base}
         if len(inner) != 1:
-            raise InvalidInput(where, "a place that holds a number, a vector or a matrix", show(base))
+            raise InvalidInput(
+                where, "a place that holds a number, a vector or a matrix", show(base)
+            )
         return (len(base), *inner.pop())
     exact_number(base, where)
     return ()

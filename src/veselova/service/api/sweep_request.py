@@ -20,7 +20,12 @@ from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_models import SYSTEMS, Times
-from veselova.service.api.request_models import MOST_OUTPUTS, TorusRequest, TrajectoryRequest, read_request
+from veselova.service.api.request_models import (
+    MOST_OUTPUTS,
+    TorusRequest,
+    TrajectoryRequest,
+    read_request,
+)
 from veselova.service.api.sweep_parameters import (
     Axis,
     Draw,
@@ -37,7 +42,12 @@ from veselova.version import __version__
 __all__ = ["SweepPlan", "SweepRequest", "sweep_document"]
 
 _NUMBER = {"type": "number"}
-_PAIR = {"type": "array", "items": {"anyOf": [_NUMBER, {"type": "string"}]}, "minItems": 2, "maxItems": 2}
+_PAIR = {
+    "type": "array",
+    "items": {"anyOf": [_NUMBER, {"type": "string"}]},
+    "minItems": 2,
+    "maxItems": 2,
+}
 _GRID = {
     "type": "object",
     "properties": {
@@ -50,10 +60,19 @@ _GRID = {
     "additionalProperties": False,
 }
 _DRAWS = [
-    {"type": "object", "properties": {name: _PAIR}, "required": [name], "additionalProperties": False}
+    {
+        "type": "object",
+        "properties": {name: _PAIR},
+        "required": [name],
+        "additionalProperties": False,
+    }
     for name in ("uniform", "log_uniform", "normal")
 ]
-_LIST = {"type": "array", "items": {"description": "a value of the same shape as in the problem"}, "minItems": 1}
+_LIST = {
+    "type": "array",
+    "items": {"description": "a value of the same shape as in the problem"},
+    "minItems": 1,
+}
 _VARY = {
     "type": "object",
     "minProperties": 1,
@@ -67,11 +86,12 @@ _MOST_VALUES = 1_000_000
 #: Beyond this many problems no sweep is looked at, whatever the server allows.
 _MOST_PROBLEMS = 1_000_000_000
 
-#: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be valid.
+#: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be
+#: valid.
 _LOOKED_AT = 16
 
-#: Problems in one chunk: about a second of work for small n, by their number (less for tori that are computed together), the
-#: times of their motions and what is kept.
+#: Problems in one chunk: about a second of work for small n, by their number (less for tori that
+#: are computed together), the times of their motions and what is kept.
 _CHUNK_ROWS = 250
 _CHUNK_TORI = 2000
 _CHUNK_TIMES = 20_000
@@ -79,52 +99,95 @@ _CHUNK_VALUES = 1_000_000
 
 
 class SweepRequest(TorusRequest):
-    """Many problems: one base problem with every combination of the values of some of its numbers, or with random ones."""
+    """Many problems: one base problem with every combination of the values of some of its numbers,
+    or with random ones.
+    """
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"problem": BODY4_PROBLEM, "vary": {"/A/0": {"start": 3, "stop": 4, "count": 11}}}]}
+        json_schema_extra={
+            "examples": [
+                {"problem": BODY4_PROBLEM, "vary": {"/A/0": {"start": 3, "stop": 4, "count": 11}}}
+            ]
+        }
     )
 
     vary: Annotated[
         Any,
         WithJsonSchema(_VARY),
         Field(
-            description="JSON pointer into the problem → a list of values, a grid {start, stop, count, spacing}, or a "
-            "distribution {uniform: [low, high]}, {log_uniform: [low, high]}, {normal: [mean, deviation]}, of which each "
+            description="JSON pointer into the problem → a list of values, a grid {start, stop, "
+            "count, spacing}, or a "
+            "distribution {uniform: [low, high]}, {log_uniform: [low, high]}, {normal: "
+            "[mean, deviation]}, of which each "
             "component is drawn; lists and grids are combined with one another"
         ),
     ]
-    samples: Annotated[int, Field(ge=1, le=_MOST_PROBLEMS, description="random draws for each combination")] = 1
-    seed: Annotated[int, Field(ge=0, lt=2**63, description="of the random draws; the same seed gives the same problems")] = 0
+    samples: Annotated[
+        int, Field(ge=1, le=_MOST_PROBLEMS, description="random draws for each combination")
+    ] = 1
+    seed: Annotated[
+        int,
+        Field(
+            ge=0, lt=2**63, description="of the random draws; the same seed gives the same problems"
+        ),
+    ] = 0
     times: Annotated[
         Times | None,
-        Field(description="times of a motion for each problem, with its error, drift and extremes; none when left out"),
+        Field(
+            description="times of a motion for each problem, with its error, drift and extremes; "
+            "none when left out"
+        ),
     ] = None
-    engine: Annotated[Literal["analytic", "numeric"] | None, Field(description="of the motions")] = None
+    engine: Annotated[
+        Literal["analytic", "numeric"] | None, Field(description="of the motions")
+    ] = None
     method: Annotated[str | None, Field(description="of the motions")] = None
     formulation: Annotated[str | None, Field(description="of the motions")] = None
     outputs: Annotated[
         list[str] | None,
-        Field(min_length=1, max_length=MOST_OUTPUTS, description="series whose extremes are asked for; all when left out"),
+        Field(
+            min_length=1,
+            max_length=MOST_OUTPUTS,
+            description="series whose extremes are asked for; all when left out",
+        ),
     ] = None
-    trajectories: Annotated[bool, Field(description="whether the outputs themselves are kept, as a Zarr store")] = False
-    budget_s: Annotated[float, Field(gt=0, allow_inf_nan=False, description="seconds after which one problem is given up")] = 10.0
+    trajectories: Annotated[
+        bool, Field(description="whether the outputs themselves are kept, as a Zarr store")
+    ] = False
+    budget_s: Annotated[
+        float,
+        Field(gt=0, allow_inf_nan=False, description="seconds after which one problem is given up"),
+    ] = 10.0
 
     def faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request beyond its fields; one problem of those looked at must be valid."""
+        """Return what is wrong with the request beyond its fields; one problem of those looked at
+        must be valid.
+        """
         try:
             if not isinstance(self.samples, int) or (self.samples > 1 and not self.draws):
-                raise InvalidInput(("samples",), "1 where nothing is drawn at random", str(self.samples))
+                raise InvalidInput(
+                    ("samples",), "1 where nothing is drawn at random", str(self.samples)
+                )
             if self.total > _MOST_PROBLEMS:
                 raise InvalidInput(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
             kind = SYSTEMS[self.problem.system].problem_class
             if self.times is None and not kind.has_tori:
-                raise InvalidInput(("times",), f"this field, for system {kind.system} has no torus to summarise", "nothing")
+                raise InvalidInput(
+                    ("times",),
+                    f"this field, for system {kind.system} has no torus to summarise",
+                    "nothing",
+                )
             if self.times is None:
                 for name in ("engine", "method", "formulation", "outputs", "trajectories"):
                     if getattr(self, name):
-                        raise InvalidInput((name,), "times as well (without them no motion is computed)", "no times")
-            looked_at = np.unique(np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)).tolist()
+                        raise InvalidInput(
+                            (name,),
+                            "times as well (without them no motion is computed)",
+                            "no times",
+                        )
+            looked_at = np.unique(
+                np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)
+            ).tolist()
             self._require_one_valid(looked_at)
             _ = self.canonical
         except InvalidInput as fault:
@@ -167,7 +230,9 @@ class SweepRequest(TorusRequest):
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Return the numbers of values of the axes, the last axis running fastest, then the samples where there are draws."""
+        """Return the numbers of values of the axes, the last axis running fastest, then the samples
+        where there are draws.
+        """
         return (*(len(axis.values) for axis in self.axes), *((self.samples,) if self.draws else ()))
 
     @property
@@ -176,16 +241,22 @@ class SweepRequest(TorusRequest):
         return math.prod(self.shape)
 
     def values(self, row: int) -> dict[Path, Any]:
-        """Return the values of the parameters in one problem; a draw depends on the seed and the row alone."""
+        """Return the values of the parameters in one problem; a draw depends on the seed and the
+        row alone.
+        """
         position = np.unravel_index(row, self.shape)
         random = np.random.default_rng([self.seed, row]) if self.draws else None
-        found: dict[Path, Any] = {axis.path: axis.values[int(i)] for axis, i in zip(self.axes, position)}
+        found: dict[Path, Any] = {
+            axis.path: axis.values[int(i)] for axis, i in zip(self.axes, position)
+        }
         if random is not None:
             found |= {draw.path: draw.draw(random) for draw in self.draws}
         return {parameter.path: found[parameter.path] for parameter in self.varied}
 
     def columns(self, values: Mapping[Path, Any]) -> Iterator[tuple[str, Any]]:
-        """Yield the values of the parameters in one problem by the names of their columns, component by component."""
+        """Yield the values of the parameters in one problem by the names of their columns,
+        component by component.
+        """
         for path, value in values.items():
             for name, scalar in components(".".join(map(str, path)), value):
                 found = to_table_value(scalar)
@@ -193,35 +264,61 @@ class SweepRequest(TorusRequest):
 
     @cached_property
     def _texts(self) -> frozenset[str]:
-        """Return the columns of which any value states no number: they have texts in every chunk."""
-        scalars = (item for axis in self.axes for value in axis.values for item in components(axis.name, value))
+        """Return the columns of which any value states no number: they have texts in
+        every chunk.
+        """
+        scalars = (
+            item
+            for axis in self.axes
+            for value in axis.values
+            for item in components(axis.name, value)
+        )
         stated = ((name, scalar) for name, scalar in scalars if isinstance(scalar, (str, bool)))
         return frozenset(name for name, scalar in stated if isinstance(to_table_value(scalar), str))
 
     def request_of(self, values: Mapping[Path, Any]) -> TorusRequest | TrajectoryRequest:
-        """Return the request of one problem: for its motion where there are times, for its torus else. Raises InvalidRequest."""
+        """Return the request of one problem: for its motion where there are times, for its torus
+        else. Raises InvalidRequest.
+        """
         problem = replace_values(self.problem.model_dump(exclude_none=True), values)
         if self.times is None:
             return read_request(TorusRequest, {"problem": problem, "budget_s": self.budget_s})
-        asked = {name: getattr(self, name) for name in ("times", "engine", "method", "formulation", "outputs", "budget_s")}
+        asked = {
+            name: getattr(self, name)
+            for name in ("times", "engine", "method", "formulation", "outputs", "budget_s")
+        }
         return read_request(TrajectoryRequest, {"problem": problem, **asked})
 
     @property
     def tori_at_once(self) -> bool:
-        """Return whether tori alone are asked for, of a system whose tori can be computed many at a time."""
+        """Return whether tori alone are asked for, of a system whose tori can be computed many at a
+        time.
+        """
         return self.times is None and self.problem.system == Veselova.system
 
     @property
     def _states_doubles(self) -> bool:
-        """Return whether all numbers of the base problem are doubles, and not rationals that are to be taken exactly."""
+        """Return whether all numbers of the base problem are doubles, and not rationals that are to
+        be taken exactly.
+        """
         stated = self.problem.model_dump(exclude={"system", "normalize"}, exclude_none=True)
-        return all(is_double(scalar) for name, value in stated.items() for _, scalar in components(name, value))
+        return all(
+            is_double(scalar)
+            for name, value in stated.items()
+            for _, scalar in components(name, value)
+        )
 
     @property
     def row_values(self) -> int:
-        """Return how many numbers the answer to one problem has, about: columns of the table, and of the kept trajectories."""
+        """Return how many numbers the answer to one problem has, about: columns of the table, and
+        of the kept trajectories.
+        """
         n = self.problem.dimension
-        outputs = len(self.outputs) if self.outputs else len(SYSTEMS[self.problem.system].problem_class.outputs)
+        outputs = (
+            len(self.outputs)
+            if self.outputs
+            else len(SYSTEMS[self.problem.system].problem_class.outputs)
+        )
         summary = 16 + 8 * n + (2 * outputs * n * n if self.times is not None else 0)
         return summary + (outputs * n * n * self.time_count() if self.trajectories else 0)
 
@@ -234,13 +331,21 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        together = self.tori_at_once and self._states_doubles and "frame" not in self.problem.model_dump(exclude_none=True)
+        together = (
+            self.tori_at_once
+            and self._states_doubles
+            and "frame" not in self.problem.model_dump(exclude_none=True)
+        )
         rows = _CHUNK_TORI if together else _CHUNK_ROWS
-        return max(1, min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values))
+        return max(
+            1,
+            min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values),
+        )
 
     @cached_property
     def canonical(self) -> bytes:
-        """Return the request as JSON, defaults filled in and fields sorted: equal for requests that mean the same.
+        """Return the request as JSON, defaults filled in and fields sorted: equal for requests that
+        mean the same.
 
         The places that vary keep their order, for it is that of the rows.
         """
@@ -262,7 +367,9 @@ class SweepRequest(TorusRequest):
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What the store of jobs is told of a sweep: its hash, its canonical JSON, and how much there is to compute and keep."""
+    """What the store of jobs is told of a sweep: its hash, its canonical JSON, and how much there
+    is to compute and keep.
+    """
 
     id: str
     canonical: bytes
@@ -272,12 +379,20 @@ class SweepPlan:
     trajectories: bool
 
 
-def sweep_document(problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any) -> dict[str, Any]:
+def sweep_document(
+    problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any
+) -> dict[str, Any]:
     """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
     if not isinstance(problem, (Problem, Mapping)):
-        raise InvalidInput(("problem",), "a problem, or a mapping with its JSON fields", show(problem))
+        raise InvalidInput(
+            ("problem",), "a problem, or a mapping with its JSON fields", show(problem)
+        )
     if not isinstance(vary, Mapping):
         raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', show(vary))
     stated = plain(vary)
     times = None if times is None else as_request(times)
-    return {"problem": problem.as_request() if isinstance(problem, Problem) else dict(problem), "vary": stated, "times": times}
+    return {
+        "problem": problem.as_request() if isinstance(problem, Problem) else dict(problem),
+        "vary": stated,
+        "times": times,
+    }

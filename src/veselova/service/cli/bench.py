@@ -1,7 +1,7 @@
 """``veselova bench``: how fast this machine is, in some ten seconds, as a table that can be pasted.
 
-Every line is one question, answered by the closed form and by its peer in the same process; the scripts in ``benchmarks/``
-ask more.
+Every line is one question, answered by the closed form and by its peer in the same process; the
+scripts in ``benchmarks/`` ask more.
 """
 
 from __future__ import annotations
@@ -31,13 +31,15 @@ Array = NDArray[np.float64]
 #: What is looked up by name: the libraries that decide the figures.
 _LIBRARIES = ("numpy", "scipy", "python-flint", "heyoka")
 
-#: Times of the orbit, and how far it goes by either integrator: SciPy's takes a hundred times as long as heyoka.
+#: Times of the orbit, and how far it goes by either integrator: SciPy's takes a hundred times as
+#: long as heyoka.
 _TIMES = 100_000
 _SPANS = {"heyoka": 1000.0, "dop853": 30.0}
 
 _FAR = 1e6
 _SHORT = np.linspace(0.2, 10.0, 50)
-_TOGETHER, _SINGLE = 2000, 20
+_TOGETHER = 2000
+_SINGLE = 20
 
 #: Calls of which the least time counts, where a call takes milliseconds.
 _CALLS = 5
@@ -45,7 +47,9 @@ _CALLS = 5
 
 @dataclass(frozen=True)
 class Measurement:
-    """One question: what the closed form does, and its peer; processor seconds of each, or None; how far their answers differ."""
+    """One question: what the closed form does, and its peer; processor seconds of each, or None;
+    how far their answers differ.
+    """
 
     question: str
     seconds: float
@@ -61,8 +65,12 @@ class Measurement:
     @property
     def row(self) -> str:
         """Return the line of the table."""
-        ours, theirs = _show(self.seconds), _show(self.peer_seconds)
-        return f"| {self.question} | {ours} | {self.peer} | {theirs} | {self.ratio:.3g} | {self.difference:.0e} |"
+        ours = _show(self.seconds)
+        theirs = _show(self.peer_seconds)
+        return (
+            f"| {self.question} | {ours} | {self.peer} | {theirs} | {self.ratio:.3g} | "
+            f"{self.difference:.0e} |"
+        )
 
 
 def machine() -> dict[str, Any]:
@@ -73,13 +81,18 @@ def machine() -> dict[str, Any]:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
-    return {**found, "system": f"{platform.system()} {platform.machine()}", "processors": os.cpu_count()}
+    return {
+        **found,
+        "system": f"{platform.system()} {platform.machine()}",
+        "processors": os.cpu_count(),
+    }
 
 
 def measurements() -> Iterator[Measurement]:
     """Yield the answers one by one.
 
-    The integrator is heyoka where it is installed, called as its users call it; elsewhere it is SciPy's DOP853.
+    The integrator is heyoka where it is installed, called as its users call it; elsewhere it is
+    SciPy's DOP853.
     """
     methods = ["heyoka", "dop853"] if find_spec("heyoka") else ["dop853"]
     method = methods[0]
@@ -101,12 +114,17 @@ def run(show: Callable[[str], None]) -> dict[str, Any]:
     """Show the table line by line, and return it as a JSON document."""
     about = machine()
     show(", ".join(f"{name} {value}" for name, value in about.items()) + "\n")
-    show("| question | closed form | peer | takes | ratio | difference |\n|---|---|---|---|---|---|")
+    show(
+        "| question | closed form | peer | takes | ratio | difference |\n|---|---|---|---|---|---|"
+    )
     found = []
     for measurement in measurements():
         show(measurement.row)
         found.append({**asdict(measurement), "ratio": measurement.ratio})
-    show("\nProcessor time of one core, with the peer in the same process; a ratio above one: the closed form is faster.")
+    show(
+        "\nProcessor time of one core, with the peer in the same process; a ratio above one: "
+        "the closed form is faster."
+    )
     return {"machine": about, "measurements": found}
 
 
@@ -115,46 +133,73 @@ def _orbit(n: int, method: str) -> Measurement:
     seconds, closed = _time(lambda: solve(_body(n, 2), times))
     theirs, frames = _time(lambda: _integrate(_body(n, 2), times, method))
     question = f"n = {n}: {_TIMES} attitudes in [0, {times[-1]:g}]"
-    return Measurement(question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames))
+    return Measurement(
+        question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames)
+    )
 
 
 def _far(n: int, method: str) -> Measurement:
-    """Ask for one attitude far out, after others; integrating there is scaled up from a shorter stretch."""
-    closed, span = solve(_body(n, 3), [_FAR]), _SPANS[method]
+    """Ask for one attitude far out, after others; integrating there is scaled up from a shorter
+    stretch.
+    """
+    closed = solve(_body(n, 3), [_FAR])
+    span = _SPANS[method]
     seconds, _ = _time(lambda: closed.at([_FAR - 1]))
     theirs, frames = _time(lambda: _integrate(_body(n, 3), np.array([span]), method))
     difference = _largest(closed.at([span]).frame - frames)
     question = f"n = {n}: one more attitude at t = {_FAR:.0e}"
-    return Measurement(question, seconds, f"integration ({method}), from t = {span:g}", theirs * _FAR / span, difference)
+    return Measurement(
+        question,
+        seconds,
+        f"integration ({method}), from t = {span:g}",
+        theirs * _FAR / span,
+        difference,
+    )
 
 
 def _short(n: int, method: str) -> Measurement:
     seconds, closed = _time(lambda: solve(_body(n, 4), _SHORT), _CALLS)
     theirs, frames = _time(lambda: _integrate(_body(n, 4), _SHORT, method), _CALLS)
     question = f"n = {n}: a new body, {_SHORT.size} times in [0, {_SHORT[-1]:g}]"
-    return Measurement(question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames))
+    return Measurement(
+        question, seconds, f"integration ({method})", theirs, _largest(closed.frame - frames)
+    )
 
 
 def _integrate(body: Veselova, times: Array, method: str) -> Array:
     """Return the frames by one integrator; DOP853 integrates twice, for its error."""
-    return HeyokaPeer(body)(times)[-1] if method == "heyoka" else solve(body, times, "numeric", method).frame
+    return (
+        HeyokaPeer(body)(times)[-1]
+        if method == "heyoka"
+        else solve(body, times, "numeric", method).frame
+    )
 
 
 def _tori(n: int) -> Measurement:
     rng = np.random.default_rng(n)
-    A, q, q_dot = np.exp(rng.uniform(0, np.log(5), (_TOGETHER, n))), *rng.normal(size=(2, _TOGETHER, n))
+    A, q, q_dot = (
+        np.exp(rng.uniform(0, np.log(5), (_TOGETHER, n))),
+        *rng.normal(size=(2, _TOGETHER, n)),
+    )
     tori(A[:_SINGLE], q[:_SINGLE], q_dot[:_SINGLE])
     together, found = _time(lambda: tori(A, q, q_dot))
-    bodies = [Veselova(A[i], q[i], q_dot[i], normalize=True) for i in np.flatnonzero(found.known)[:_SINGLE]]
+    bodies = [
+        Veselova(A[i], q[i], q_dot[i], normalize=True)
+        for i in np.flatnonzero(found.known)[:_SINGLE]
+    ]
     single, alone = _time(lambda: [torus(body) for body in bodies])
     expected = np.array([one.frequencies_t for one in alone])
     difference = _largest(found.frequencies_t[found.known][:_SINGLE] / expected - 1)
     question = f"n = {n}: a torus, {_TOGETHER} together"
-    return Measurement(question, together / _TOGETHER, "one by one", single / len(bodies), difference)
+    return Measurement(
+        question, together / _TOGETHER, "one by one", single / len(bodies), difference
+    )
 
 
 def _body(n: int, seed: int) -> Veselova:
-    """Return a body that no other call has seen, with A's within a factor of five and unit speed; a seed gives one motion."""
+    """Return a body that no other call has seen, with A's within a factor of five and unit speed; a
+    seed gives one motion.
+    """
     rng = np.random.default_rng([n, seed])
     A, q, q_dot = np.exp(rng.uniform(0, np.log(5), n)), *rng.normal(size=(2, n))
     q /= np.linalg.norm(q)

@@ -25,7 +25,9 @@ _SHOWN_COMPONENTS = 6
 
 
 def terminal() -> Console:
-    """Return standard output. Tables keep their columns when it is a file; a terminal's own width is taken as it is."""
+    """Return standard output. Tables keep their columns when it is a file; a terminal's own width
+    is taken as it is.
+    """
     return Console(width=None if sys.stdout.isatty() else 120)
 
 
@@ -47,10 +49,15 @@ def _heading(console: Console, text: str) -> None:
 
 
 def _describe(trajectory: Trajectory) -> str:
-    problem, provenance = trajectory.problem, trajectory.provenance
-    count, shown = trajectory.times.size, _format_distinct(np.array([trajectory.times.min(), trajectory.times.max()]))
+    problem = trajectory.problem
+    provenance = trajectory.provenance
+    count = trajectory.times.size
+    shown = _format_distinct(np.array([trajectory.times.min(), trajectory.times.max()]))
     span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
-    return f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), {provenance.seconds:.3g} s"
+    return (
+        f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), "
+        f"{provenance.seconds:.3g} s"
+    )
 
 
 def _format_distinct(times: Any) -> list[str]:
@@ -69,7 +76,10 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     problem = trajectory.problem
     series = trajectory.series(problem.portrait)
     rows = series.reshape(series.shape[0], -1)
-    names = [problem.portrait + "".join(f"_{i + 1}" for i in index) for index in np.ndindex(series.shape[1:])]
+    names = [
+        problem.portrait + "".join(f"_{i + 1}" for i in index)
+        for index in np.ndindex(series.shape[1:])
+    ]
     more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
     clock = ["tau1"] if "tau1" in problem.outputs else []
     table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
@@ -95,7 +105,9 @@ def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
-    """Print how the engines agree, quantity by quantity, against their errors and the conditioning floor."""
+    """Print how the engines agree, quantity by quantity, against their errors and the conditioning
+    floor.
+    """
     console.print(_describe(comparison.analytic), highlight=False)
     console.print(_describe(comparison.numeric), highlight=False)
     _heading(console, "Largest difference of the two engines")
@@ -107,19 +119,33 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     table = _table("bound", "largest value")
     table.add_row("error bound, analytic", f"{np.max(comparison.analytic.error):.1e}")
     table.add_row("error bound, numeric", f"{np.max(comparison.numeric.error):.1e}")
-    table.add_row("conditioning floor (one rounding of the data)", f"{np.max(comparison.conditioning_floor):.1e}")
+    table.add_row(
+        "conditioning floor (one rounding of the data)",
+        f"{np.max(comparison.conditioning_floor):.1e}",
+    )
     console.print(table)
     _print_drift(console, {"analytic": comparison.analytic, "numeric": comparison.numeric})
     verdict = (
-        "The engines agree within their error bounds." if comparison.agrees else "The engines DISAGREE beyond their error bounds."
+        "The engines agree within their error bounds."
+        if comparison.agrees
+        else "The engines DISAGREE beyond their error bounds."
     )
     console.print(f"\n{verdict}", highlight=False)
 
 
 def print_torus(console: Console, torus: Torus, time: str) -> None:
-    """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own ``time``, periods."""
-    energy = "energy beyond the range of a float" if torus.energy is None else f"energy {torus.energy:.12g}"
-    console.print(f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}", highlight=False)
+    """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own
+    ``time``, periods.
+    """
+    energy = (
+        "energy beyond the range of a float"
+        if torus.energy is None
+        else f"energy {torus.energy:.12g}"
+    )
+    console.print(
+        f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}",
+        highlight=False,
+    )
     _heading(console, "Branch points")
     table = _table("b", "origin", "value")
     for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
@@ -133,7 +159,11 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     console.print(table)
     if torus.periods is not None:
         _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
-    _print_matrix(console, f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})", torus.riemann_matrix)
+    _print_matrix(
+        console,
+        f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})",
+        torus.riemann_matrix,
+    )
 
 
 def _print_matrix(console: Console, title: str, matrix: Any) -> None:

@@ -16,7 +16,8 @@ _LONGEST = timedelta(days=36_525)
 
 
 def expiry(text: str | None, now: datetime) -> datetime | None:
-    """Return the moment that ``90d``, ``12h``, ``4w`` or a date such as ``2030-01-31`` states (its beginning in UTC).
+    """Return the moment that ``90d``, ``12h``, ``4w`` or a date such as ``2030-01-31`` states (its
+    beginning in UTC).
 
     Raises InvalidInput for another text, and for a moment that is not to come.
     """
@@ -33,4 +34,6 @@ def expiry(text: str | None, now: datetime) -> datetime | None:
             moment = now
         if moment > now:
             return moment
-    raise InvalidInput(("--expires",), "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31", show(text))
+    raise InvalidInput(
+        ("--expires",), "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31", show(text)
+    )

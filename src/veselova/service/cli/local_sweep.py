@@ -1,4 +1,6 @@
-"""Sweeps without a server: the same jobs, run in this process and its workers, and resumed where they were interrupted."""
+"""Sweeps without a server: the same jobs, run in this process and its workers, and resumed where
+they were interrupted.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from typing import TYPE_CHECKING, Any
 import anyio
 from anyio.from_thread import start_blocking_portal
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, install_extra, show
+from veselova.mechanics.core.errors import (
+    BackendMissing,
+    InvalidInput,
+    Unsolved,
+    install_extra,
+    show,
+)
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -30,12 +38,17 @@ __all__ = ["local_settings", "run_sweep", "sweep"]
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], None]
 
-#: So many problems are computed in this process, and more where they take less than so many seconds: starting others takes some.
+#: So many problems are computed in this process, and more where they take less than so many
+#: seconds: starting others takes some.
 _FEW = 50
 _SOON_S = 3.0
 
-#: A new process runs the script of the old one first, up to what is guarded; without the guard it would start others.
-_UNGUARDED = 'a script uses several processors where veselova.sweep is called below `if __name__ == "__main__":`'
+#: A new process runs the script of the old one first, up to what is guarded; without the guard it
+#: would start others.
+_UNGUARDED = (
+    "a script uses several processors where veselova.sweep is called below `if __name__ "
+    '== "__main__":`'
+)
 
 #: How often workers are asked for. A server goes on asking; here somebody waits.
 _TRIES = 3
@@ -63,18 +76,27 @@ def sweep(
 ) -> Any:
     """Return the tori and, with ``times``, the motions of many problems as an xarray Dataset.
 
-    ``vary``: places in the problem's JSON, such as ``"/A/0"`` or ``"/q_dot"``, each with a list or an array of values, a grid
-    ``{"start", "stop", "count", "spacing"}``, or a distribution ``{"uniform": [low, high]}``, ``{"log_uniform": [low, high]}``,
-    ``{"normal": [mean, deviation]}``: ``samples`` draws are taken for each combination of the others, fixed by ``seed``.
-    Without ``times`` each problem gives its torus (constants, frequencies, actions, regime …); with them also the largest error,
-    the drift of the integrals and the extremes of the ``outputs``, and with ``trajectories`` these themselves. A problem that
-    cannot be solved, or not within ``budget_s`` seconds, has its reason in ``outcome`` and ``detail``.
-    What is done is kept in ``folder`` (default: that of the account's state), and a second call with the same arguments goes on
-    from there. ``workers``: processes; all processors when left out. ``progress(done, total)`` is called a few times a second.
-    Raises InvalidInput or InvalidRequest for bad input, BackendMissing without the extra ``sweeps``.
+    ``vary``: places in the problem's JSON, such as ``"/A/0"`` or ``"/q_dot"``, each with a list or
+    an array of values, a grid ``{"start", "stop", "count", "spacing"}``, or a distribution
+    ``{"uniform": [low, high]}``, ``{"log_uniform": [low, high]}``, ``{"normal": [mean,
+    deviation]}``: ``samples`` draws are taken for each combination of the others, fixed by
+    ``seed``. Without ``times`` each problem gives its torus (constants, frequencies, actions,
+    regime …); with them also the largest error, the drift of the integrals and the extremes of the
+    ``outputs``, and with ``trajectories`` these themselves. A problem that cannot be solved, or not
+    within ``budget_s`` seconds, has its reason in ``outcome`` and ``detail``. What is done is kept
+    in ``folder`` (default: that of the account's state), and a second call with the same arguments
+    goes on from there. ``workers``: processes; all processors when left out. ``progress(done,
+    total)`` is called a few times a second. Raises InvalidInput or InvalidRequest for bad input,
+    BackendMissing without the extra ``sweeps``.
     """
     asked = sweep_document(problem, vary, times)
-    options: dict[str, Any] = {"samples": samples, "seed": seed, "engine": engine, "method": method, "formulation": formulation}
+    options: dict[str, Any] = {
+        "samples": samples,
+        "seed": seed,
+        "engine": engine,
+        "method": method,
+        "formulation": formulation,
+    }
     options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
     request = read_request(SweepRequest, {**asked, **options})
     settings = local_settings(folder, workers)
@@ -86,7 +108,9 @@ def sweep(
 
 
 def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
-    """Return the settings of sweeps in this process; those of a server in the environment hold, but for the folder."""
+    """Return the settings of sweeps in this process; those of a server in the environment hold, but
+    for the folder.
+    """
     settings = settings_of_environment()
     home = Path(folder) if folder is not None else settings.data_dir / "local"
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
@@ -100,8 +124,9 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
 def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tuple[Job, Jobs]:
     """Run a sweep to its end and return its job, with the store in which its results are.
 
-    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra ``sweeps``, InvalidInput for a
-    folder that others may write, Refused where its storage fails or is damaged.
+    Raises Unsolved where the job could not be run to its end, BackendMissing without the extra
+    ``sweeps``, InvalidInput for a folder that others may write, Refused where its storage fails or
+    is damaged.
     """
     try:
         from sqlalchemy.exc import SQLAlchemyError
@@ -110,14 +135,18 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         from veselova.service.sweeps.job_store import Jobs
         from veselova.service.sweeps.runner import Sweeps
     except ImportError as error:
-        raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
+        raise BackendMissing(
+            error.name or "distributed", "A sweep", install_extra("sweeps")
+        ) from None
 
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise RuntimeError(f"{_UNGUARDED}; it ran into the sweep of the process that started it")
     try:
         jobs = Jobs(settings)
     except (OSError, SQLAlchemyError) as error:
-        raise Refused("storage-unavailable", f"{settings.data_dir} cannot keep the sweep: {reason_of(error)}.") from error
+        raise Refused(
+            "storage-unavailable", f"{settings.data_dir} cannot keep the sweep: {reason_of(error)}."
+        ) from error
 
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
@@ -129,7 +158,8 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
                 if progress := sweeps.progress(job.id):
                     report(progress.done, request.total)
         finally:
-            with anyio.CancelScope(shield=True):  # a portal cancels again whatever is awaited after it has cancelled
+            # a portal cancels again whatever is awaited after it has cancelled
+            with anyio.CancelScope(shield=True):
                 await sweeps.close()
 
     with closing(jobs):
@@ -139,13 +169,18 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
             _in_a_loop_of_its_own(run)
         job = jobs.get(job.id)
         if job.state != "finished":
-            raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}; another process may be running it")
+            raise Unsolved(
+                "sweep-not-finished",
+                job.detail or f"the sweep is {job.state}; another process may be running it",
+            )
         report(job.total, job.total)
     return job, jobs
 
 
 def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
-    """Return whether others than this process are to compute: only where they save more than it takes to start them."""
+    """Return whether others than this process are to compute: only where they save more than it
+    takes to start them.
+    """
     from veselova.service.sweeps.in_process_cluster import seconds_of
 
     if settings.dask_scheduler:
@@ -165,5 +200,6 @@ def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
     except RuntimeError:
         asyncio.run(run())
         return
-    with start_blocking_portal() as portal:  # an interrupt of this thread cancels what the other one runs
+    # an interrupt of this thread cancels what the other one runs
+    with start_blocking_portal() as portal:
         portal.call(run)

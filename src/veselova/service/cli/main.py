@@ -18,20 +18,35 @@ from veselova.version import __version__
 
 __all__ = ["main"]
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
 
-_File = Annotated[str, typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input")]
+_File = Annotated[
+    str,
+    typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input"),
+]
 _Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
 _Output = Annotated[
-    Path | None, typer.Option(help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet, .arrow or .json")
+    Path | None,
+    typer.Option(
+        help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet, .arrow "
+        "or .json"
+    ),
 ]
-_Plot = Annotated[Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")]
+_Plot = Annotated[
+    Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")
+]
 _Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
 
 def main() -> None:
     """Run the command line; errors are one sentence on standard error."""
-    # As process 1 of a container the default action of SIGTERM would be to ignore it, and 143 is what a shell expects.
+    # As process 1 of a container the default action of SIGTERM would be to ignore it, and 143 is
+    # what a shell expects.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if sys.stdout is None or sys.stderr is None:  # started with a closed stream
         raise SystemExit(1)
@@ -74,7 +89,9 @@ def _give_up_output() -> None:
 
 @contextmanager
 def _within_budget(document: Any) -> Iterator[None]:
-    """Stop the work after the ``budget_s`` that a file states; without one it may take as long as it takes."""
+    """Stop the work after the ``budget_s`` that a file states; without one it may take as long as
+    it takes.
+    """
     stated = document.get("budget_s") if isinstance(document, dict) else None
     if not isinstance(stated, (int, float)) or stated <= 0 or not hasattr(signal, "setitimer"):
         yield
@@ -104,8 +121,12 @@ def _printable(letter: re.Match[str]) -> str:
 
 
 @app.callback(invoke_without_command=True)
-def _root(version: Annotated[bool, typer.Option("--version", help="print the version")] = False) -> None:
-    """Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by integration."""
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="print the version")] = False,
+) -> None:
+    """Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and
+    by integration.
+    """
     if version:
         print(__version__)
         raise typer.Exit
@@ -144,7 +165,13 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
 
 
 @app.command()
-def compare(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None, method: _Method = None) -> None:
+def compare(
+    file: _File,
+    json: _Json = False,
+    output: _Output = None,
+    plot: _Plot = None,
+    method: _Method = None,
+) -> None:
     """Solve a motion with both engines and show how they agree."""
     document = _document(file)
     if method is not None and isinstance(document, dict):
@@ -159,7 +186,8 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     from veselova.service.workers.tasks import compare_request
 
     if isinstance(document, dict):
-        document = {name: value for name, value in document.items() if name != "engine"}  # one file serves solve and compare
+        # one file serves solve and compare
+        document = {name: value for name, value in document.items() if name != "engine"}
     request = read_request(ComparisonRequest, document)
     _check_files(output, plot)
     with _within_budget(document):
@@ -198,13 +226,21 @@ def torus(file: _File, json: _Json = False) -> None:
 def sweep(
     file: _File,
     json: _Json = False,
-    output: Annotated[Path | None, typer.Option(help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr")] = None,
-    folder: Annotated[
-        Path | None, typer.Option(help="where what is done is kept, so that a second start goes on from there")
+    output: Annotated[
+        Path | None,
+        typer.Option(help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr"),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="processes; all processors when left out")] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="where what is done is kept, so that a second start goes on from there"),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="processes; all processors when left out")
+    ] = None,
 ) -> None:
-    """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes on where it was."""
+    """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes
+    on where it was.
+    """
     from veselova.service.cli.sweep_command import run
 
     run(_document(file), json, output, folder, workers)
@@ -212,7 +248,9 @@ def sweep(
 
 @app.command()
 def bench(json: _Json = False) -> None:
-    """Measure the closed form against its peers on this machine, and print a table that can be pasted."""
+    """Measure the closed form against its peers on this machine, and print a table that can be
+    pasted.
+    """
     from veselova.service.cli.bench import run
     from veselova.service.cli.console import print_json
 
@@ -254,7 +292,9 @@ def _check_files(output: Path | None, plot: Path | None) -> None:
             raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
         if path is not None and not path.parent.is_dir():
             raise InvalidInput((option,), "a file in an existing folder", str(path))
-        if path is not None and (path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK)):
+        if path is not None and (
+            path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK)
+        ):
             raise InvalidInput((option,), "a file that can be written", str(path))
 
 

@@ -12,9 +12,11 @@ __all__ = ["unguarded"]
 
 
 def unguarded() -> bool:
-    """Return whether the main script is in a statement that is not below ``if __name__ == "__main__":``.
+    """Return whether the main script is in a statement that is not below ``if __name__ ==
+    "__main__":``.
 
-    A new process runs the script of the old one first. Notebooks, interactive sessions and ``python -c`` have no script.
+    A new process runs the script of the old one first. Notebooks, interactive sessions and ``python
+    -c`` have no script.
     """
     main = sys.modules.get("__main__")
     path = getattr(main, "__file__", None)
@@ -27,8 +29,14 @@ def unguarded() -> bool:
         statements = ast.parse(Path(path).read_bytes()).body
     except (OSError, SyntaxError, ValueError):  # no file of Python: an archive, or compiled
         return False
-    at_work = [node for node in statements if node.lineno <= frame.f_lineno <= (node.end_lineno or node.lineno)]
-    return bool(at_work) and not any(isinstance(node, ast.If) and _is_guard(node.test) for node in at_work)
+    at_work = [
+        node
+        for node in statements
+        if node.lineno <= frame.f_lineno <= (node.end_lineno or node.lineno)
+    ]
+    return bool(at_work) and not any(
+        isinstance(node, ast.If) and _is_guard(node.test) for node in at_work
+    )
 
 
 def _is_of_script(frame: FrameType, main: object) -> bool:
@@ -38,4 +46,6 @@ def _is_of_script(frame: FrameType, main: object) -> bool:
 def _is_guard(test: ast.expr) -> bool:
     """Return whether a condition asks for the name of the main script."""
     names = {node.id for node in ast.walk(test) if isinstance(node, ast.Name)}
-    return "__name__" in names and any(isinstance(node, ast.Constant) and node.value == "__main__" for node in ast.walk(test))
+    return "__name__" in names and any(
+        isinstance(node, ast.Constant) and node.value == "__main__" for node in ast.walk(test)
+    )

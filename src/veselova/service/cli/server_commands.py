@@ -17,15 +17,27 @@ _Json = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 def serve(
     host: Annotated[str, typer.Option(help="address to bind")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")] = 8000,
-    require_keys: Annotated[bool, typer.Option("--require-keys", help="ask clients for an API key on loopback too")] = False,
-    insecure: Annotated[bool, typer.Option("--insecure", help="ask for no API key, whatever the address")] = False,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port to bind; 0 takes a free one")
+    ] = 8000,
+    require_keys: Annotated[
+        bool, typer.Option("--require-keys", help="ask clients for an API key on loopback too")
+    ] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="ask for no API key, whatever the address")
+    ] = False,
     forwarded_allow_ips: Annotated[
-        str | None, typer.Option(metavar="ADDRESSES", help="proxies whose X-Forwarded-For is believed, with commas between them")
+        str | None,
+        typer.Option(
+            metavar="ADDRESSES",
+            help="proxies whose X-Forwarded-For is believed, with commas between them",
+        ),
     ] = None,
     log_format: Annotated[str | None, typer.Option(help="auto, json or text")] = None,
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error")] = None,
-    settings: Annotated[bool, typer.Option("--settings", help="print the limits, and the variables that set them")] = False,
+    settings: Annotated[
+        bool, typer.Option("--settings", help="print the limits, and the variables that set them")
+    ] = False,
 ) -> None:
     """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
     from veselova.mechanics.core.errors import InvalidInput
@@ -34,10 +46,22 @@ def serve(
     if require_keys and insecure:
         raise InvalidInput(("--insecure",), "one of --require-keys and --insecure", "both")
     stated = "required" if require_keys else "off" if insecure else None
-    run_server(host, port, settings, forwarded_allow_ips, keys=stated, log_format=log_format, log_level=log_level)
+    run_server(
+        host,
+        port,
+        settings,
+        forwarded_allow_ips,
+        keys=stated,
+        log_format=log_format,
+        log_level=log_level,
+    )
 
 
-keys = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Create, list and revoke the API keys of the service.")
+keys = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Create, list and revoke the API keys of the service.",
+)
 
 
 @keys.command()
@@ -45,10 +69,16 @@ def create(
     name: Annotated[str, typer.Argument(metavar="NAME", help="whose key it is")],
     scope: Annotated[str, typer.Option(help="read, solve (and read) or admin (all)")] = "solve",
     expires: Annotated[
-        str | None, typer.Option(metavar="WHEN", help="90d, 12h, 4w or a date such as 2030-01-31; never when left out")
+        str | None,
+        typer.Option(
+            metavar="WHEN", help="90d, 12h, 4w or a date such as 2030-01-31; never when left out"
+        ),
     ] = None,
     same_owner_as: Annotated[
-        str | None, typer.Option(metavar="ID", help="a key whose jobs and answers the new one sees, to take its place")
+        str | None,
+        typer.Option(
+            metavar="ID", help="a key whose jobs and answers the new one sees, to take its place"
+        ),
     ] = None,
     json: _Json = False,
 ) -> None:
@@ -64,12 +94,18 @@ def create(
         return
     print(text)
     until = f", until {key.expires_at:%Y-%m-%d %H:%M} UTC" if key.expires_at else ""
-    typer.echo(f"The key of {name}, id {key.id}, scope {key.scope}{until}. Keep it now: only its hash is stored.", err=True)
+    typer.echo(
+        f"The key of {name}, id {key.id}, scope {key.scope}{until}. Keep it now: only its "
+        "hash is stored.",
+        err=True,
+    )
 
 
 @keys.command("list")
 def list_keys(json: _Json = False) -> None:
-    """List the API keys by id, scope, expiry and name; the keys themselves are known to their holders alone."""
+    """List the API keys by id, scope, expiry and name; the keys themselves are known to their
+    holders alone.
+    """
     found = _keys().list()
     if json:
         print(json_text.dumps([key.as_dict() for key in found]))
@@ -78,11 +114,18 @@ def list_keys(json: _Json = False) -> None:
         ends = key.revoked_at or key.expires_at
         state = f"{key.state} {ends:%Y-%m-%d %H:%M}" if key.state != "valid" and ends else "valid"
         until = f"until {key.expires_at:%Y-%m-%d}" if key.expires_at else "no expiry"
-        print(f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {key.scope:5}  {until:16}  {state:24}  {key.name}")
+        print(
+            f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {key.scope:5}  {until:16}  "
+            f"{state:24}  {key.name}"
+        )
 
 
 @keys.command()
-def revoke(key_id: Annotated[str, typer.Argument(metavar="ID", help="the id of the key (veselova keys list)")]) -> None:
+def revoke(
+    key_id: Annotated[
+        str, typer.Argument(metavar="ID", help="the id of the key (veselova keys list)")
+    ],
+) -> None:
     """Revoke an API key; a server that runs refuses it from the next request on."""
     key = _keys().revoke(key_id)
     print(f"The key of {key.name}, id {key.id}, is revoked.")

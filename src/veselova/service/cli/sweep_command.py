@@ -1,4 +1,6 @@
-"""``veselova sweep``: a sweep with a progress bar, its table written to a file or summed up on the terminal."""
+"""``veselova sweep``: a sweep with a progress bar, its table written to a file or summed up on the
+terminal.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +24,37 @@ __all__ = ["run"]
 _WRITERS = (".parquet", ".csv", ".nc", ".zarr")
 
 
-def run(document: Any, json: bool, output: Path | None, folder: Path | None, workers: int | None) -> None:
-    """Run the sweep of a JSON document and write what is asked for; raises as ``veselova.sweep`` does."""
+def run(
+    document: Any, json: bool, output: Path | None, folder: Path | None, workers: int | None
+) -> None:
+    """Run the sweep of a JSON document and write what is asked for; raises as ``veselova.sweep``
+    does.
+    """
     request = read_request(SweepRequest, document)
     if output is not None and (output.suffix.lower() not in _WRITERS or not output.parent.is_dir()):
-        raise InvalidInput(("--output",), f"a file in an existing folder, ending in {', '.join(_WRITERS)}", str(output))
+        raise InvalidInput(
+            ("--output",),
+            f"a file in an existing folder, ending in {', '.join(_WRITERS)}",
+            str(output),
+        )
     progress_line = Console(stderr=True)
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("problems,"), TimeRemainingColumn(), TextColumn("left"))
-    with Progress(*columns, console=progress_line, transient=True, disable=not sys.stderr.isatty()) as bar:
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("problems,"),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+    )
+    with Progress(
+        *columns, console=progress_line, transient=True, disable=not sys.stderr.isatty()
+    ) as bar:
         task = bar.add_task("sweep", total=request.total)
         try:
-            job, jobs = run_sweep(request, local_settings(folder, workers), lambda done, _: bar.update(task, completed=done))
+            job, jobs = run_sweep(
+                request,
+                local_settings(folder, workers),
+                lambda done, _: bar.update(task, completed=done),
+            )
         except KeyboardInterrupt:
             progress_line.print("What is done is kept; the same command goes on from there.")
             raise
@@ -54,7 +76,9 @@ def _write(request: SweepRequest, table: Path, packed: Path, output: Path) -> No
         from veselova.service.api.sweep_dataset import sweep_dataset
 
         dataset = sweep_dataset(request, table, packed if packed.exists() else None)
-        dataset.to_zarr(output, mode="w", consolidated=False) if suffix == ".zarr" else dataset.to_netcdf(output, engine="scipy")
+        dataset.to_zarr(
+            output, mode="w", consolidated=False
+        ) if suffix == ".zarr" else dataset.to_netcdf(output, engine="scipy")
 
 
 def _say(request: SweepRequest, table: Path, json: bool, output: Path | None) -> None:
@@ -64,7 +88,12 @@ def _say(request: SweepRequest, table: Path, json: bool, output: Path | None) ->
     outcomes = Counter(parquet.read_table(table, columns=["outcome"])["outcome"].to_pylist())
     where = str(output or table)
     if json:
-        summary = {"id": request.id, "total": request.total, "outcomes": dict(outcomes), "table": where}
+        summary = {
+            "id": request.id,
+            "total": request.total,
+            "outcomes": dict(outcomes),
+            "table": where,
+        }
         print_json(summary)
         return
     rows = Table("outcome", "problems", box=None)

@@ -20,17 +20,30 @@ import httpx2 as httpx
 import orjson
 from anyio import to_thread
 
-from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, ServiceUnreachable, show
+from veselova.mechanics.core.errors import (
+    InvalidInput,
+    ProblemResponse,
+    ServiceError,
+    ServiceUnreachable,
+    show,
+)
 from veselova.mechanics.core.problem import Problem
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
-from veselova.service.client.requests import Call, compare_call, download_call, torus_call, trajectory_call
+from veselova.service.client.requests import (
+    Call,
+    compare_call,
+    download_call,
+    torus_call,
+    trajectory_call,
+)
 
 __all__ = ["AsyncClient", "Client"]
 
 T = TypeVar("T")
 P = ParamSpec("P")
 
-#: Statuses that may pass if the same request is sent again: too many requests, overload or a lost worker.
+#: Statuses that may pass if the same request is sent again: too many requests, overload or a lost
+#: worker.
 _RETRIED_STATUSES = frozenset({429, 503})
 
 #: Seconds that the answer may take on its way beyond the budget of the work itself.
@@ -38,17 +51,22 @@ _TRANSFER_S = 10.0
 
 
 #: Seconds before the second attempt and, at most, before a further one; a random part comes on top.
-_FIRST_WAIT_S, _LONGEST_WAIT_S, _JITTER_S = 0.2, 5.0, 0.2
+_FIRST_WAIT_S = 0.2
+_LONGEST_WAIT_S = 5.0
+_JITTER_S = 0.2
 _LOG = logging.getLogger("veselova.client")
 
 #: Longest pause that a server can ask for.
 _LONGEST_PAUSE_S = 30.0
-#: Failures of the connection. An answer that did not come in time is not among them: asking again would double the load.
+#: Failures of the connection. An answer that did not come in time is not among them: asking again
+#: would double the load.
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 
 
 class _Retry(Exception):
-    """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may ask for a pause in seconds."""
+    """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may
+    ask for a pause in seconds.
+    """
 
     def __init__(self, cause: Exception, pause: float | None = None) -> None:
         self.cause = cause
@@ -56,9 +74,13 @@ class _Retry(Exception):
 
 
 def _credentials(api_key: str) -> dict[str, str]:
-    """Return the header that shows a key; none for an empty one. The refusal does not quote what may be a secret."""
+    """Return the header that shows a key; none for an empty one. The refusal does not quote what
+    may be a secret.
+    """
     if not re.fullmatch(r"[\x21-\x7e]*", api_key):
-        raise InvalidInput(("api_key",), "a key of the server (printable ASCII, no spaces)", "other characters")
+        raise InvalidInput(
+            ("api_key",), "a key of the server (printable ASCII, no spaces)", "other characters"
+        )
     return {"authorization": f"Bearer {api_key}"} if api_key else {}
 
 
@@ -68,19 +90,27 @@ class _Core:
     def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
         self._base_url = base_url
         self._attempts = attempts
-        self._credentials = _credentials(os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key)
+        self._credentials = _credentials(
+            os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
+        )
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
         return RemoteJob(self, job_id)  # type: ignore[arg-type]
 
     def _pause(self, call: Call[Any], retry: _Retry, attempt: int) -> float:
-        """Return the seconds after a failed attempt, doubled each time, and log them; raises the cause after the last."""
+        """Return the seconds after a failed attempt, doubled each time, and log them; raises the
+        cause after the last.
+        """
         if attempt >= self._attempts:
             raise retry.cause from None
-        pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(0.0, _JITTER_S)
+        pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(
+            0.0, _JITTER_S
+        )
         pause = pause if retry.pause is None else retry.pause
-        _LOG.info("%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause)
+        _LOG.info(
+            "%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause
+        )
         return pause
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
@@ -93,18 +123,30 @@ class _Core:
         return request
 
     def _result(self, call: Call[T], response: httpx.Response) -> T:
-        """Return the result of an answer; raises _Retry for a refusal that may pass, ProblemResponse for any other."""
+        """Return the result of an answer; raises _Retry for a refusal that may pass,
+        ProblemResponse for any other.
+        """
         if response.is_success:
             try:
-                return call.result(orjson.loads(response.content or b"null") if call.sink is None else response.headers)
+                return call.result(
+                    orjson.loads(response.content or b"null")
+                    if call.sink is None
+                    else response.headers
+                )
             except (ValueError, KeyError, TypeError):
-                raise ServiceError(f"{self._base_url}{call.path} answered with something else than a result") from None
+                raise ServiceError(
+                    f"{self._base_url}{call.path} answered with something else than a result"
+                ) from None
         try:
             document = orjson.loads(response.content)
         except orjson.JSONDecodeError:
             document = None
         if not isinstance(document, dict):
-            document = {"title": response.reason_phrase, "status": response.status_code, "detail": show(response.text)}
+            document = {
+                "title": response.reason_phrase,
+                "status": response.status_code,
+                "detail": show(response.text),
+            }
         failure = ProblemResponse(response.status_code, document)
         if response.status_code not in _RETRIED_STATUSES:
             raise failure
@@ -112,8 +154,12 @@ class _Core:
         raise _Retry(failure, min(float(pause), _LONGEST_PAUSE_S) if pause.isdigit() else None)
 
     def _unreachable(self, call: Call[Any], error: httpx.TransportError) -> Exception:
-        """Return the failure behind a transport error, to be retried where the connection itself failed."""
-        failure = ServiceUnreachable(f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}")
+        """Return the failure behind a transport error, to be retried where the connection itself
+        failed.
+        """
+        failure = ServiceUnreachable(
+            f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}"
+        )
         failure.__cause__ = error
         passing = isinstance(error, _PASSING) and (call.sink is None or call.sink.untouched)
         return _Retry(failure) if passing else failure
@@ -122,9 +168,11 @@ class _Core:
 class Client(_Core):
     """A synchronous client. Every method answers with the same types as the library itself.
 
-    ``api_key`` is shown with every request; left out, that of the environment variable VESELOVA_API_KEY.
-    ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before anything is sent,
-    ProblemResponse with the server's problem document, ServiceUnreachable when no answer comes.
+    ``api_key`` is shown with every request; left out, that of the environment variable
+    VESELOVA_API_KEY.
+    ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before
+    anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
+    answer comes.
     """
 
     def __init__(
@@ -193,11 +241,18 @@ class Client(_Core):
                 answer = self._send(step)
 
     def sweep(
-        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+        self,
+        problem: Problem | Mapping[str, Any],
+        vary: Mapping[str, Any],
+        *,
+        times: Any = None,
+        **options: Any,
     ) -> RemoteJob:
-        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what is asked for.
+        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what
+        is asked for.
 
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an AsyncClient's job are awaited.
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an
+        AsyncClient's job are awaited.
         """
         job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
         return job
@@ -282,7 +337,12 @@ class AsyncClient(_Core):
                 answer = await self._send(step)
 
     async def sweep(
-        self, problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], *, times: Any = None, **options: Any
+        self,
+        problem: Problem | Mapping[str, Any],
+        vary: Mapping[str, Any],
+        *,
+        times: Any = None,
+        **options: Any,
     ) -> RemoteJob:
         job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
         return job

@@ -1,4 +1,6 @@
-"""What a download is: one call of the client whose answer goes to a file as it comes, in a format of the server."""
+"""What a download is: one call of the client whose answer goes to a file as it comes, in a format
+of the server.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,8 @@ from typing import Any, BinaryIO
 import orjson
 
 from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
+from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target
-from veselova.mechanics.results.trajectory import Provenance
 from veselova.service.api.atomic_file import atomic_file
 
 __all__ = ["MEDIA_TYPES", "DownloadTarget", "media_type_of", "provenance_of", "sink_of"]
@@ -35,13 +37,17 @@ def media_type_of(name: Any) -> str:
 
 
 def provenance_of(headers: Mapping[str, str]) -> Provenance:
-    """Return the provenance that the header of an answer states; raises KeyError or ValueError where it states none."""
+    """Return the provenance that the header of an answer states; raises KeyError or ValueError
+    where it states none.
+    """
     return Provenance(**orjson.loads(headers["veselova-provenance"]))
 
 
 @dataclass
 class DownloadTarget:
-    """Where a download goes: a file that takes its name when it is whole, or an open stream, which can be written to once."""
+    """Where a download goes: a file that takes its name when it is whole, or an open stream, which
+    can be written to once.
+    """
 
     path: Path | None
     stream: BinaryIO | None
@@ -50,7 +56,9 @@ class DownloadTarget:
 
     @contextmanager
     def open(self) -> Iterator[Callable[[bytes], Any]]:
-        """Give what takes the chunks; the file appears, or replaces another, at the end of the block and not before."""
+        """Give what takes the chunks; the file appears, or replaces another, at the end of the
+        block and not before.
+        """
         if self.stream is not None:
             self.untouched = False
             yield self.stream.write
@@ -61,12 +69,16 @@ class DownloadTarget:
 
 
 def sink_of(target: Target) -> DownloadTarget:
-    """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, or a folder that is not there."""
+    """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, or a
+    folder that is not there.
+    """
     if isinstance(target, (str, Path)):
         path = Path(target)
         if not path.parent.is_dir() or path.is_dir():
             raise InvalidInput(("target",), "a file in an existing folder", show(str(target)))
         return DownloadTarget(path, None)
     if not callable(getattr(target, "write", None)):
-        raise InvalidInput(("target",), "a path, or a binary stream that is open for writing", show(target))
+        raise InvalidInput(
+            ("target",), "a path, or a binary stream that is open for writing", show(target)
+        )
     return DownloadTarget(None, target)

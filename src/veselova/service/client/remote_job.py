@@ -1,4 +1,6 @@
-"""A sweep on a server, for both clients: what is done is said once, as flows of calls and pauses that a client carries out."""
+"""A sweep on a server, for both clients: what is done is said once, as flows of calls and pauses
+that a client carries out.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +25,13 @@ __all__ = ["Flow", "Pause", "RemoteJob", "sweep_flow"]
 #: Seconds that a finished table may be prepared before its first byte.
 _PREPARATION_S = 60.0
 
-#: Seconds that a server may take to end what its workers are in the midst of: a worker that does not say where it is has 20.
+#: Seconds that a server may take to end what its workers are in the midst of: a worker that does
+#: not say where it is has 20.
 _ENDING_S = 60.0
 
 #: Seconds between two questions how far a job is, from the first to the longest.
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 2.0
+_FIRST_PAUSE_S = 0.1
+_LONGEST_PAUSE_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -45,17 +49,21 @@ class Runner(Protocol):
     """A client: it carries out a flow of calls and pauses."""
 
     def run(self, flow: Flow) -> Any:
-        """Carry out a flow, and return what it ends with: at once, or as something to be awaited."""
+        """Carry out a flow, and return what it ends with: at once, or as something to
+        be awaited.
+        """
 
 
 class RemoteJob:
-    """A sweep on a server. Every method of an AsyncClient's job is to be awaited; those of a Client's job return at once.
+    """A sweep on a server. Every method of an AsyncClient's job is to be awaited; those of a
+    Client's job return at once.
 
     ``id``: the same request has the same, so that ``client.job(id)`` finds it again.
     """
 
     def __init__(self, client: Runner, job_id: str) -> None:
-        if not isinstance(job_id, str) or not job_id.strip("."):  # no part of an address is empty, or dots alone
+        # no part of an address is empty, or dots alone
+        if not isinstance(job_id, str) or not job_id.strip("."):
             raise InvalidInput(("job_id",), "the id of a job", show(job_id))
         self._client = client
         self.id = job_id
@@ -68,26 +76,37 @@ class RemoteJob:
         return self._client.run(self._one(self._get()))
 
     def wait(self, progress: Callable[[int, int], object] | None = None) -> Any:
-        """Return the document of the job when it has finished; ``progress(done, total)`` is told on the way.
+        """Return the document of the job when it has finished; ``progress(done, total)`` is told on
+        the way.
 
         Raises ServiceError where it has failed or was cancelled.
         """
         return self._client.run(self._finish(progress))
 
     def cancel(self) -> Any:
-        """Stop the job, keeping what is done, and return its document; the same sweep asked for again goes on from there."""
-        return self._client.run(self._one(Call(self._link(), None, _ENDING_S, dict, method="DELETE")))
+        """Stop the job, keeping what is done, and return its document; the same sweep asked for
+        again goes on from there.
+        """
+        return self._client.run(
+            self._one(Call(self._link(), None, _ENDING_S, dict, method="DELETE"))
+        )
 
     def remove(self) -> Any:
         """Stop the job and forget it, with its results."""
-        return self._client.run(self._one(Call(self._link("?remove=true"), None, _ENDING_S, lambda _: None, method="DELETE")))
+        return self._client.run(
+            self._one(
+                Call(self._link("?remove=true"), None, _ENDING_S, lambda _: None, method="DELETE")
+            )
+        )
 
     def download(self, target: Target) -> Any:
         """Write the table, as Parquet, to a path or a binary stream when the job has finished."""
         return self._client.run(self._download(target))
 
     def dataset(self, progress: Callable[[int, int], object] | None = None) -> Any:
-        """Return the results as an xarray Dataset (see ``veselova.sweep``) when the job has finished."""
+        """Return the results as an xarray Dataset (see ``veselova.sweep``) when the job has
+        finished.
+        """
         return self._client.run(self._dataset(progress))
 
     def _link(self, more: str = "") -> str:
@@ -109,12 +128,23 @@ class RemoteJob:
             if document["state"] == "finished":
                 return document
             if document["finished_at"] is not None:
-                raise ServiceError(f"job {self.id} is {document['state']}: {document['detail'] or 'no detail given'}")
+                raise ServiceError(
+                    f"job {self.id} is {document['state']}: "
+                    f"{document['detail'] or 'no detail given'}"
+                )
             yield Pause(pause)
             pause = min(2 * pause, _LONGEST_PAUSE_S)
 
     def _fetch(self, part: str, media_type: str, target: Target) -> Call[None]:
-        return Call(self._link(part), None, _PREPARATION_S, lambda _: None, media_type, sink_of(target), "GET")
+        return Call(
+            self._link(part),
+            None,
+            _PREPARATION_S,
+            lambda _: None,
+            media_type,
+            sink_of(target),
+            "GET",
+        )
 
     def _download(self, target: Target) -> Flow:
         yield from self._finish(None)
@@ -124,7 +154,8 @@ class RemoteJob:
         from veselova.service.api.sweep_dataset import sweep_dataset
 
         document = yield from self._finish(progress)
-        sweep, table = read_request(SweepRequest, document["request"]), io.BytesIO()
+        sweep = read_request(SweepRequest, document["request"])
+        table = io.BytesIO()
         yield self._fetch("/result", MEDIA_TYPES["parquet"], table)
         with tempfile.TemporaryDirectory() as folder:
             packed = None
@@ -141,7 +172,9 @@ def sweep_flow(
     times: Any,
     options: dict[str, Any],
 ) -> Flow:
-    """Return the flow that asks for a sweep and gives its RemoteJob; the request is validated before anything is sent."""
+    """Return the flow that asks for a sweep and gives its RemoteJob; the request is validated
+    before anything is sent.
+    """
     asked = sweep_document(problem, vary, times)
     body = read_request(SweepRequest, {**asked, **options}).model_dump()
     document = yield Call("/v1/sweeps", body, _PREPARATION_S, dict)

@@ -1,4 +1,6 @@
-"""What the client asks: a call is one request, and what its answer becomes. Loads neither engine."""
+"""What the client asks: a call is one request, and what its answer becomes. Loads
+neither engine.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,10 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.torus import Torus
-from veselova.mechanics.results.trajectory import Provenance, Trajectory
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import comparison_of, torus_of, trajectory_of
 from veselova.service.client.download import DownloadTarget, media_type_of, provenance_of, sink_of
 
@@ -27,7 +30,8 @@ T = TypeVar("T")
 class Call(Generic[T]):
     """One request: where it goes, its body, how long it may take, and what its answer becomes.
 
-    A call with a sink writes the body of its answer there, and ``result`` is given the header instead.
+    A call with a sink writes the body of its answer there, and ``result`` is given the header
+    instead.
     """
 
     path: str
@@ -40,12 +44,16 @@ class Call(Generic[T]):
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
-    """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated here already."""
+    """Return the problem of a call; a mapping is the JSON of the HTTP request, and is validated
+    here already.
+    """
     if isinstance(problem, Problem):
         return problem
     if not isinstance(problem, Mapping):
         raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields", show(problem)
+            ("problem",),
+            "a problem, such as veselova.Veselova(A, q, q_dot), or a mapping with its JSON fields",
+            show(problem),
         )
     from veselova.service.api.request_models import TorusRequest, read_request
 
@@ -63,9 +71,16 @@ def trajectory_call(
     formulation: str | None = None,
     budget_s: float = 10.0,
 ) -> Call[Trajectory]:
-    """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s`` bounds the server's work."""
+    """Return the motion at the given times by one engine (see ``veselova.solve``); ``budget_s``
+    bounds the server's work.
+    """
     asked = _problem(problem)
-    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
+    chosen = {
+        "engine": engine,
+        "digits": digits,
+        "certified": certified,
+        "formulation": formulation,
+    }
     body = {**chosen, **_motion(asked, times, method, budget_s)}
     return Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
 
@@ -84,25 +99,50 @@ def download_call(
     formulation: str | None = None,
     budget_s: float = 10.0,
 ) -> Call[Provenance]:
-    """Write the motion to a path or a binary stream as it comes, as ``json``, ``csv``, ``npz``, ``arrow`` or ``parquet``, and
-    return its provenance; ``outputs`` names the series, all of the system when left out. A file appears when it is whole."""
-    chosen = {"engine": engine, "digits": digits, "certified": certified, "formulation": formulation}
-    motion = {**_motion(_problem(problem), times, method, budget_s), "outputs": None if outputs is None else list(outputs)}
-    accept, sink = media_type_of(format), sink_of(target)
+    """Write the motion to a path or a binary stream as it comes, as ``json``, ``csv``, ``npz``,
+    ``arrow`` or ``parquet``, and return its provenance; ``outputs`` names the series, all of the
+    system when left out. A file appears when it is whole.
+    """
+    chosen = {
+        "engine": engine,
+        "digits": digits,
+        "certified": certified,
+        "formulation": formulation,
+    }
+    motion = {
+        **_motion(_problem(problem), times, method, budget_s),
+        "outputs": None if outputs is None else list(outputs),
+    }
+    accept = media_type_of(format)
+    sink = sink_of(target)
     return Call("/v1/trajectories", {**chosen, **motion}, budget_s, provenance_of, accept, sink)
 
 
 def compare_call(
-    problem: Problem | Mapping[str, Any], times: Any, method: str | None = None, *, budget_s: float = 10.0
+    problem: Problem | Mapping[str, Any],
+    times: Any,
+    method: str | None = None,
+    *,
+    budget_s: float = 10.0,
 ) -> Call[Comparison]:
     """Return both engines' motions and how they agree (see ``veselova.compare``)."""
     asked = _problem(problem)
-    return Call("/v1/comparisons", _motion(asked, times, method, budget_s), budget_s, partial(comparison_of, asked))
+    return Call(
+        "/v1/comparisons",
+        _motion(asked, times, method, budget_s),
+        budget_s,
+        partial(comparison_of, asked),
+    )
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
     """Return the invariant torus of a motion (see ``veselova.torus``)."""
-    return Call("/v1/tori", {"problem": _problem(problem).as_request(), "budget_s": budget_s}, budget_s, torus_of)
+    return Call(
+        "/v1/tori",
+        {"problem": _problem(problem).as_request(), "budget_s": budget_s},
+        budget_s,
+        torus_of,
+    )
 
 
 def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:

@@ -1,4 +1,6 @@
-"""The ASGI application: routes, workers for its life, problem documents for every failure, and what stands around them."""
+"""The ASGI application: routes, workers for its life, problem documents for every failure, and what
+stands around them.
+"""
 
 from __future__ import annotations
 
@@ -44,14 +46,23 @@ _LOG = logging.getLogger("veselova.service")
 
 #: What a page of another origin may send, and see of an answer.
 _CORS_SENT = ("Authorization", "Content-Type", "Idempotency-Key", "If-None-Match", "X-Request-ID")
-_CORS_SEEN = ("Content-Location", "ETag", "Location", "RateLimit", "RateLimit-Policy", "Retry-After", "X-Request-ID")
+_CORS_SEEN = (
+    "Content-Location",
+    "ETag",
+    "Location",
+    "RateLimit",
+    "RateLimit-Policy",
+    "Retry-After",
+    "X-Request-ID",
+)
 
 
 def create_app(settings: Settings | None = None, *, loopback: bool = False) -> FastAPI:
     """Return the application; settings come from the environment when none are given.
 
-    ``loopback`` says that nobody but this machine can connect; clients need no API key then, unless the settings require one.
-    Raises Refused where keys are required and their database cannot be opened, InvalidInput for a folder that others may write.
+    ``loopback`` says that nobody but this machine can connect; clients need no API key then, unless
+    the settings require one. Raises Refused where keys are required and their database cannot be
+    opened, InvalidInput for a folder that others may write.
     """
     limits = settings or Settings()
     metrics = Metrics()
@@ -83,19 +94,31 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         redirect_slashes=False,  # its address would be made of the request's Host
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
-    routers = (router(limits, answers, partial(missing_parts, workers, jobs, keys)), job_router(reader, jobs))
+    routers = (
+        router(limits, answers, partial(missing_parts, workers, jobs, keys)),
+        job_router(reader, jobs),
+    )
     for part in routers:
         app.router.routes.extend(part.routes)
     add_documentation(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
-        app.add_exception_handler(kind, partial(_answer_problem, metrics, [route for part in routers for route in part.routes]))
+        app.add_exception_handler(
+            kind,
+            partial(_answer_problem, metrics, [route for part in routers for route in part.routes]),
+        )
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
-    _surround(app, limits, Policy.of(limits, loopback, keys), allowed_hosts(limits, loopback), metrics)
+    _surround(
+        app, limits, Policy.of(limits, loopback, keys), allowed_hosts(limits, loopback), metrics
+    )
     return app
 
 
-def _surround(app: FastAPI, settings: Settings, policy: Policy, hosts: frozenset[str] | None, metrics: Metrics) -> None:
-    """Put what looks at every request around an application: each of these stands around those before it."""
+def _surround(
+    app: FastAPI, settings: Settings, policy: Policy, hosts: frozenset[str] | None, metrics: Metrics
+) -> None:
+    """Put what looks at every request around an application: each of these stands around those
+    before it.
+    """
     metrics.serve(app)
     app.add_middleware(Access, policy=policy, refused=metrics.count_refused)
     app.add_middleware(Failures)
@@ -119,13 +142,22 @@ def _is_request_id(text: str) -> bool:
     return re.fullmatch(r"[A-Za-z0-9._-]{1,64}", text) is not None
 
 
-async def _answer_problem(metrics: Metrics, routes: list[BaseRoute], request: Request, error: Exception) -> Response:
-    if isinstance(error, RequestValidationError):  # parameters and headers, which the framework reads
-        faults = [InvalidInput(item["loc"][1:], item["msg"].lower(), show(item.get("input"))) for item in error.errors()]
+async def _answer_problem(
+    metrics: Metrics, routes: list[BaseRoute], request: Request, error: Exception
+) -> Response:
+    # parameters and headers, which the framework reads
+    if isinstance(error, RequestValidationError):
+        faults = [
+            InvalidInput(item["loc"][1:], item["msg"].lower(), show(item.get("input")))
+            for item in error.errors()
+        ]
         error = InvalidRequest(faults)
     response = problem_response(error)
-    if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED and (methods := _methods(routes, request)):
-        response.headers["Allow"] = ", ".join(sorted(methods))  # the framework names those of one route alone
+    if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED and (
+        methods := _methods(routes, request)
+    ):
+        # the framework names those of one route alone
+        response.headers["Allow"] = ", ".join(sorted(methods))
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
         metrics.count_refused(error.code)
@@ -136,5 +168,9 @@ async def _answer_problem(metrics: Metrics, routes: list[BaseRoute], request: Re
 
 def _methods(routes: list[BaseRoute], request: Request) -> set[str]:
     """Return the methods that some route has for the path of a request."""
-    found = (route for route in routes if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE)
+    found = (
+        route
+        for route in routes
+        if isinstance(route, Route) and route.matches(request.scope)[0] is not Match.NONE
+    )
     return {method for route in found for method in route.methods or ()}

@@ -33,18 +33,28 @@ class Connections:
     """The connections of one server, by address; in IPv6 by its /64 network."""
 
     def __init__(self, settings: Settings) -> None:
-        self._most = min(settings.max_connections, max(_FEWEST, _descriptors() - _OTHER_DESCRIPTORS))
+        self._most = min(
+            settings.max_connections, max(_FEWEST, _descriptors() - _OTHER_DESCRIPTORS)
+        )
         self._most_of_one = settings.max_connections_per_address
         self._of: Counter[str] = Counter()
         self._total = 0
 
     def enter(self, address: str | None) -> None:
-        """Count a connection; raises Refused (``too-many-connections``) beyond a limit, and counts nothing then."""
+        """Count a connection; raises Refused (``too-many-connections``) beyond a limit, and counts
+        nothing then.
+        """
         network = network_of(address)
         if self._total >= self._most:
-            raise Refused("too-many-connections", f"The server has {self._most} connections, the most it takes.", retry_after=5)
+            raise Refused(
+                "too-many-connections",
+                f"The server has {self._most} connections, the most it takes.",
+                retry_after=5,
+            )
         if self._most_of_one and self._of[network] >= self._most_of_one:
-            detail = f"This address has {self._most_of_one} connections, the most that one may have."
+            detail = (
+                f"This address has {self._most_of_one} connections, the most that one may have."
+            )
             raise Refused("too-many-connections", detail, retry_after=5)
         self._total += 1
         self._of[network] += 1
@@ -91,10 +101,18 @@ def report_exhaustion() -> None:
     def report(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         nonlocal reported
         error = context.get("exception")
-        if not isinstance(error, OSError) or error.errno not in _EXHAUSTED or "socket" not in context:
+        if (
+            not isinstance(error, OSError)
+            or error.errno not in _EXHAUSTED
+            or "socket" not in context
+        ):
             loop.default_exception_handler(context)
         elif time.monotonic() - reported >= _QUIET_S:
             reported = time.monotonic()
-            _LOG.error("connections wait to be accepted: %s (a process may have %d descriptors)", error.strerror, _descriptors())
+            _LOG.error(
+                "connections wait to be accepted: %s (a process may have %d descriptors)",
+                error.strerror,
+                _descriptors(),
+            )
 
     loop.set_exception_handler(report)

@@ -1,4 +1,6 @@
-"""HTTP/1.1 on one connection: uvicorn's protocol on h11, with limits in time, and problem documents for what is no request."""
+"""HTTP/1.1 on one connection: uvicorn's protocol on h11, with limits in time, and problem documents
+for what is no request.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,12 @@ import orjson
 from starlette.types import Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from veselova.service.api.problem_details import MEDIA_TYPE, Refused, problem_document, problem_response
+from veselova.service.api.problem_details import (
+    MEDIA_TYPE,
+    Refused,
+    problem_document,
+    problem_response,
+)
 from veselova.service.api.settings import Settings
 from veselova.service.http.connections import Connections
 
@@ -20,10 +27,12 @@ __all__ = ["Http"]
 #: Seconds between two looks at how far a connection is.
 _LOOK_S = 0.25
 
-#: Bytes that are read at once: h11 takes some 10 µs for each of the smallest chunks, and other connections wait meanwhile.
+#: Bytes that are read at once: h11 takes some 10 µs for each of the smallest chunks, and other
+#: connections wait meanwhile.
 _READ_BYTES = 16_384
 
-#: Seconds for which a client may go on sending what nobody reads, so that it comes to read the answer.
+#: Seconds for which a client may go on sending what nobody reads, so that it comes to read the
+#: answer.
 _LINGER_S = 2.0
 
 #: Bytes that it may send so.
@@ -36,15 +45,18 @@ _CLOSE = (b"connection", b"close")
 
 
 class Http(H11Protocol):
-    """A connection. h11 bounds what it holds of a head that does not end, and reads one request after the other.
+    """A connection. h11 bounds what it holds of a head that does not end, and reads one request
+    after the other.
 
-    httptools, which uvicorn would take where it is installed, saves 0.3 ms a request, but takes fields of trailers for fields of
-    heads, leaves aside the bodies of requests to upgrade, and has no bounds.
+    httptools, which uvicorn would take where it is installed, saves 0.3 ms a request, but takes
+    fields of trailers for fields of heads, leaves aside the bodies of requests to upgrade, and has
+    no bounds.
     """
 
     def __init__(self, settings: Settings, connections: Connections, **uvicorn: Any) -> None:
         super().__init__(**uvicorn)
-        self._settings, self._connections = settings, connections
+        self._settings = settings
+        self._connections = connections
         self._application, self.app = self.app, self._answer
         self._counted = self._lingers = False
         self._fault = ""
@@ -104,9 +116,13 @@ class Http(H11Protocol):
         return self.cycle is not None and self.cycle.more_body and not self.cycle.response_started
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Run the application on a request, which is told where no more of the body comes; ends the connection after that."""
-        cycle, names = self.cycle, {name for name, _ in scope["headers"]}
-        if b"content-length" in names and b"transfer-encoding" in names:  # RFC 9112, 6.3: an attempt at smuggling
+        """Run the application on a request, which is told where no more of the body comes; ends the
+        connection after that.
+        """
+        cycle = self.cycle
+        names = {name for name, _ in scope["headers"]}
+        # RFC 9112, 6.3: an attempt at smuggling
+        if b"content-length" in names and b"transfer-encoding" in names:
             self._fault = scope["state"]["unfinished"] = "malformed-http"
         started = False
 
@@ -136,7 +152,9 @@ class Http(H11Protocol):
         self.cycle.message_event.set()
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what is no HTTP with a problem document, unless another answer is under way, and end the connection."""
+        """Answer what is no HTTP with a problem document, unless another answer is under way, and
+        end the connection.
+        """
         if self.cycle is not None and not self.cycle.response_complete:
             if self._reads_body:
                 self._fail("malformed-http")
@@ -144,38 +162,57 @@ class Http(H11Protocol):
                 self.transport.close()
             return
         self._refuse(
-            Refused("malformed-http", "The request: required HTTP/1.1, with a head of at most 64 kB; given something else.")
+            Refused(
+                "malformed-http",
+                "The request: required HTTP/1.1, with a head of at most 64 kB; given "
+                "something else.",
+            )
         )
 
     def _refuse(self, error: Refused) -> None:
         """Write a problem document where no request is, and end the connection."""
         document = problem_document(error)
-        body, status = orjson.dumps(document), document["status"]
-        fields = b"content-type: %b\r\ncontent-length: %d\r\nconnection: close\r\n" % (MEDIA_TYPE.encode(), len(body))
+        body = orjson.dumps(document)
+        status = document["status"]
+        fields = b"content-type: %b\r\ncontent-length: %d\r\nconnection: close\r\n" % (
+            MEDIA_TYPE.encode(),
+            len(body),
+        )
         if error.retry_after is not None:
             fields += b"retry-after: %d\r\n" % error.retry_after
-        self.transport.write(b"HTTP/1.1 %d %b\r\n%b\r\n%b" % (status, _PHRASES[status], fields, body))
+        self.transport.write(
+            b"HTTP/1.1 %d %b\r\n%b\r\n%b" % (status, _PHRASES[status], fields, body)
+        )
         self._fault = error.code
         self.transport.close()
 
     def _look(self) -> None:
         """Look whether the client sends and reads as fast as it must, and again in a moment."""
         self._looking = self.loop.call_later(_LOOK_S, self._look)
-        now, limits = self.loop.time(), self._settings
+        now = self.loop.time()
+        limits = self._settings
         if (taken := self._own.taken) != self._taken or not self._own.waiting:
-            self._taken, self._taken_at = taken, now
+            self._taken = taken
+            self._taken_at = now
         elif now - self._taken_at > limits.send_timeout_s:
             self._own.abort()
             return
         watched = (self.cycle, self._stage())
         if watched != self._watched:
-            self._watched, self._since, self._received = watched, now, 0
+            self._watched = watched
+            self._since = now
+            self._received = 0
         passed = now - self._since
         if self._stage() == "end" and passed > _LINGER_S and not self._own.waiting:
             self._own.abort()
         elif self._stage() == "head" and passed > limits.head_timeout_s:
             if self.conn.trailing_data[0]:
-                self._refuse(Refused("request-timeout", f"The head: required within {limits.head_timeout_s:g} s; given a part."))
+                self._refuse(
+                    Refused(
+                        "request-timeout",
+                        f"The head: required within {limits.head_timeout_s:g} s; given a part.",
+                    )
+                )
             else:
                 self.transport.close()
         elif self._stage() == "body" and not self.flow.read_paused:
@@ -184,7 +221,9 @@ class Http(H11Protocol):
                 self._fail("request-timeout")
 
     def _stage(self) -> str:
-        """Return what is awaited of the client: a head, a body, the end, or nothing (while it is answered, say)."""
+        """Return what is awaited of the client: a head, a body, the end, or nothing (while it is
+        answered, say).
+        """
         if self._lingers:
             return "end"
         if self._fault or self.transport.is_closing():
@@ -194,7 +233,9 @@ class Http(H11Protocol):
         return "body" if self._reads_body else ""
 
     def linger(self) -> bool:
-        """Return whether the client may still be sending what nobody reads, so that the connection must not end at once."""
+        """Return whether the client may still be sending what nobody reads, so that the connection
+        must not end at once.
+        """
         unread = self.cycle is not None and self.cycle.more_body
         self._lingers = bool(self._fault) or unread
         if self._lingers:
@@ -203,13 +244,16 @@ class Http(H11Protocol):
 
 
 class _Ending:
-    """The transport of a connection, which tells how much of what was written has been taken, and ends so that it is read.
+    """The transport of a connection, which tells how much of what was written has been taken, and
+    ends so that it is read.
 
-    A socket that is closed while there is something to read resets the connection, and the client may never see its answer.
+    A socket that is closed while there is something to read resets the connection, and the client
+    may never see its answer.
     """
 
     def __init__(self, transport: asyncio.Transport, protocol: Http) -> None:
-        self._transport, self._protocol = transport, protocol
+        self._transport = transport
+        self._protocol = protocol
         self._written = 0
         self._closing = False
 
@@ -237,7 +281,9 @@ class _Ending:
         return self._closing or self._transport.is_closing()
 
     def close(self) -> None:
-        """Send what was written, and end; where the client still sends, when it has heard that, or has had the time to."""
+        """Send what was written, and end; where the client still sends, when it has heard that, or
+        has had the time to.
+        """
         if self.is_closing():
             return
         self._closing = True
@@ -253,4 +299,6 @@ _PHRASES = {400: b"Bad Request", 408: b"Request Timeout", 503: b"Service Unavail
 
 
 def _shutting_down() -> Refused:
-    return Refused("shutting-down", "The server is shutting down and stopped this work.", retry_after=5)
+    return Refused(
+        "shutting-down", "The server is shutting down and stopped this work.", retry_after=5
+    )

@@ -1,7 +1,8 @@
 """The names by which a server may be called.
 
-A page of the web can make the browser that shows it call any server of its machine, under a name of the page's own that it lets
-point to 127.0.0.1 (DNS rebinding). Such calls name that host, which no server on loopback goes by.
+A page of the web can make the browser that shows it call any server of its machine, under a name of
+the page's own that it lets point to 127.0.0.1 (DNS rebinding). Such calls name that host, which no
+server on loopback goes by.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ __all__ = ["Hosts", "allowed_hosts"]
 
 
 def allowed_hosts(settings: Settings, loopback: bool) -> frozenset[str] | None:
-    """Return the hosts that requests may name besides those of loopback, or None where they may name any."""
+    """Return the hosts that requests may name besides those of loopback, or None where they may
+    name any.
+    """
     stated = settings.allowed_hosts.strip()
     if stated == "auto":
         return frozenset() if loopback else None
@@ -27,7 +30,9 @@ def allowed_hosts(settings: Settings, loopback: bool) -> frozenset[str] | None:
 
 
 class Hosts:
-    """ASGI middleware: refuses requests to another host than the allowed ones and this machine itself."""
+    """ASGI middleware: refuses requests to another host than the allowed ones and this machine
+    itself.
+    """
 
     def __init__(self, app: ASGIApp, allowed: frozenset[str]) -> None:
         self._app = app
@@ -35,9 +40,15 @@ class Hosts:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with 421."""
-        reached = (scope.get("server") or ("",))[0]  # the address of the socket, which is no name that a page could choose
-        if scope["type"] == "http" and not all(self._is_allowed(name, reached) for name in _stated_host(scope)):
-            error = Refused("unknown-host", "Host: required a name of this server (VESELOVA_ALLOWED_HOSTS); given another.")
+        # the address of the socket, which is no name that a page could choose
+        reached = (scope.get("server") or ("",))[0]
+        if scope["type"] == "http" and not all(
+            self._is_allowed(name, reached) for name in _stated_host(scope)
+        ):
+            error = Refused(
+                "unknown-host",
+                "Host: required a name of this server (VESELOVA_ALLOWED_HOSTS); given another.",
+            )
             note(outcome=error.code)
             await problem_response(error)(scope, receive, send)
             return
@@ -45,7 +56,12 @@ class Hosts:
 
     def _is_allowed(self, field: str, reached: str) -> bool:
         host = _bare(field)
-        if host in self._allowed or host == reached or host == "localhost" or host.endswith(".localhost"):
+        if (
+            host in self._allowed
+            or host == reached
+            or host == "localhost"
+            or host.endswith(".localhost")
+        ):
             return True
         try:
             return ipaddress.ip_address(host).is_loopback

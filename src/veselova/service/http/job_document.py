@@ -22,12 +22,20 @@ class JobDocument(BaseModel):
     detail: str = Field(description="why a job failed, or what a running one waits for; empty else")
     total: int = Field(description="problems")
     done: int = Field(description="of them solved, or found to have no solution")
-    rate: float | None = Field(description="problems per second since the server took the job; null unless it is running")
-    eta_s: float | None = Field(description="seconds to the end at this rate; null where it is unknown")
+    rate: float | None = Field(
+        description="problems per second since the server took the job; null unless it is running"
+    )
+    eta_s: float | None = Field(
+        description="seconds to the end at this rate; null where it is unknown"
+    )
     created_at: str
     finished_at: str | None
-    request: dict[str, Any] | None = Field(description="the request, its defaults filled in; null in listings and events")
-    owner: str | None = Field(description="of the key that asked for it; null where no key is shown")
+    request: dict[str, Any] | None = Field(
+        description="the request, its defaults filled in; null in listings and events"
+    )
+    owner: str | None = Field(
+        description="of the key that asked for it; null where no key is shown"
+    )
     links: dict[str, str]
 
 
@@ -38,9 +46,11 @@ class JobList(BaseModel):
 
 
 def job_document(job: JobStatus, progress: Progress | None, trajectories: bool) -> dict[str, Any]:
-    """Return the document of a job, with its request where ``job`` has it; the request is JSON as it was stored.
+    """Return the document of a job, with its request where ``job`` has it; the request is JSON as
+    it was stored.
 
-    ``progress`` is what the process that runs it knows beyond the database; ``trajectories``: whether there are some to be had.
+    ``progress`` is what the process that runs it knows beyond the database; ``trajectories``:
+    whether there are some to be had.
     """
     here = f"/v1/jobs/{job.id}"
     rate = progress.rate if progress else None

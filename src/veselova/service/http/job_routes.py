@@ -1,4 +1,6 @@
-"""The resources of sweeps: POST makes a job, and the job tells how far it is, gives its results, and is cancelled or removed."""
+"""The resources of sweeps: POST makes a job, and the job tells how far it is, gives its results,
+and is cancelled or removed.
+"""
 
 from __future__ import annotations
 
@@ -45,13 +47,18 @@ _BODY = {
 }
 _JOB: dict[int | str, dict[str, Any]] = {200: {"model": JobDocument, "description": "The job"}}
 _LIST: dict[int | str, dict[str, Any]] = {200: {"model": JobList, "description": "The jobs"}}
-_ACCEPTED: dict[int | str, dict[str, Any]] = {202: {"model": JobDocument, "description": "The job, at Location"}}
+_ACCEPTED: dict[int | str, dict[str, Any]] = {
+    202: {"model": JobDocument, "description": "The job, at Location"}
+}
 _REMOVED: dict[int | str, dict[str, Any]] = {204: {"description": "The job is forgotten"}}
 
 #: Formats of a table: media type → how its file ends.
 _TABLES = {MEDIA_TYPES[name]: name for name in ("parquet", "csv", "arrow")}
 _TABLE: dict[int | str, dict[str, Any]] = {
-    200: {"description": "The table", "content": {name: {"schema": {"type": "string", "format": "binary"}} for name in _TABLES}}
+    200: {
+        "description": "The table",
+        "content": {name: {"schema": {"type": "string", "format": "binary"}} for name in _TABLES},
+    }
 }
 _ARCHIVE: dict[int | str, dict[str, Any]] = {
     200: {
@@ -60,20 +67,42 @@ _ARCHIVE: dict[int | str, dict[str, Any]] = {
     }
 }
 
-_Key = Annotated[str | None, Header(description="a request that comes again with its key never makes a second job")]
-_All = Annotated[bool, Query(alias="all", description="those of everybody; for keys of scope admin")]
+_Key = Annotated[
+    str | None,
+    Header(description="a request that comes again with its key never makes a second job"),
+]
+_All = Annotated[
+    bool, Query(alias="all", description="those of everybody; for keys of scope admin")
+]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
 
 def job_router(reader: Reader, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
-    routes, jobs = APIRouter(tags=["sweeps"]), _JobRoutes(reader, service)
+    routes = APIRouter(tags=["sweeps"])
+    jobs = _JobRoutes(reader, service)
     accepted: dict[str, Any] = {"status_code": 202, "openapi_extra": _BODY}
     table: tuple[tuple[str, str, Any, str, str, dict[str, Any], dict[int | str, Any]], ...] = (
-        ("POST", "/v1/sweeps", jobs.sweep, "create_sweep", "Solve many problems", accepted, _ACCEPTED),
+        (
+            "POST",
+            "/v1/sweeps",
+            jobs.sweep,
+            "create_sweep",
+            "Solve many problems",
+            accepted,
+            _ACCEPTED,
+        ),
         ("GET", "/v1/jobs", jobs.list_jobs, "list_jobs", "List the jobs, newest first", {}, _LIST),
         ("GET", _ONE, jobs.job, "get_job", "Tell how far a job is", {}, _JOB),
-        ("GET", f"{_ONE}/result", jobs.result, "get_job_result", "Give the table of a finished job", {}, _TABLE),
+        (
+            "GET",
+            f"{_ONE}/result",
+            jobs.result,
+            "get_job_result",
+            "Give the table of a finished job",
+            {},
+            _TABLE,
+        ),
         (
             "GET",
             f"{_ONE}/trajectories",
@@ -83,11 +112,29 @@ def job_router(reader: Reader, service: JobService) -> APIRouter:
             {},
             _ARCHIVE,
         ),
-        ("DELETE", _ONE, jobs.end, "cancel_job", "Cancel a job, or remove it", {}, {**_JOB, **_REMOVED}),
+        (
+            "DELETE",
+            _ONE,
+            jobs.end,
+            "cancel_job",
+            "Cancel a job, or remove it",
+            {},
+            {**_JOB, **_REMOVED},
+        ),
     )
     for method, path, endpoint, operation, summary, options, responses in table:
-        described: dict[str, Any] = {"operation_id": operation, "summary": summary, "responses": responses, **options}
+        described: dict[str, Any] = {
+            "operation_id": operation,
+            "summary": summary,
+            "responses": responses,
+            **options,
+        }
         routes.add_api_route(path, endpoint, methods=[method], **described)
+    _add_events(routes, jobs)
+    return routes
+
+
+def _add_events(routes: APIRouter, jobs: _JobRoutes) -> None:
     # The check comes before the stream: an event stream that has begun can no longer be refused.
     routes.add_api_route(
         f"{_ONE}/events",
@@ -97,7 +144,6 @@ def job_router(reader: Reader, service: JobService) -> APIRouter:
         response_class=EventSourceResponse,
         dependencies=[Depends(jobs.require)],
     )
-    return routes
 
 
 class _JobRoutes:
@@ -111,23 +157,38 @@ class _JobRoutes:
         """Make a job, or find the one that the same request made."""
         require_acceptable(request.headers.get("accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
-            raise InvalidInput(("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}")
+            raise InvalidInput(
+                ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"
+            )
         asked = await self._reader.parse_body("sweep", request)
         owner = caller_of(request).owner
-        job = await self._service.ask(lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key, owner))
+        job = await self._service.ask(
+            lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key, owner)
+        )
         if not job.ended:
             (await self._service.sweeps()).begin(job.id)
-        return _json(await self._document(job.id, request, whole=False), 202, {"Location": f"/v1/jobs/{job.id}"})
+        return _json(
+            await self._document(job.id, request, whole=False),
+            202,
+            {"Location": f"/v1/jobs/{job.id}"},
+        )
 
     async def list_jobs(self, request: Request, everybody: _All = False) -> Response:
         """List the last jobs of the caller, or of all."""
         caller = caller_of(request)
         if everybody and not caller.may(ADMIN):
-            raise Refused("insufficient-scope", f"The jobs of all: required a key of scope {ADMIN}; given {caller.scope}.")
+            raise Refused(
+                "insufficient-scope",
+                f"The jobs of all: required a key of scope {ADMIN}; given {caller.scope}.",
+            )
         owner = None if everybody else caller.owner
-        found = await self._service.ask(lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest(owner)])
+        found = await self._service.ask(
+            lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest(owner)]
+        )
         sweeps = await self._service.sweeps()
-        return _json({"jobs": [job_document(job, sweeps.progress(job.id), kept) for job, kept in found]})
+        return _json(
+            {"jobs": [job_document(job, sweeps.progress(job.id), kept) for job, kept in found]}
+        )
 
     async def job(self, job_id: str, request: Request) -> Response:
         """Tell all of a job, its request included."""
@@ -152,21 +213,28 @@ class _JobRoutes:
         await self._require_finished(job_id, request)
         path: Path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
         if not path.is_file():
-            raise Refused("no-such-resource", "The files of this job are gone; POST its request again.")
+            raise Refused(
+                "no-such-resource", "The files of this job are gone; POST its request again."
+            )
         name = f"{job_id}.{_TABLES[media_type]}"
         if _TABLES[media_type] == "parquet":
             return FileResponse(path, media_type=media_type, filename=name)
         from veselova.service.sweeps.result_files import table_stream
 
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-        return StreamingResponse(table_stream(path, _TABLES[media_type]), media_type=media_type, headers=headers)
+        return StreamingResponse(
+            table_stream(path, _TABLES[media_type]), media_type=media_type, headers=headers
+        )
 
     async def trajectories(self, job_id: str, request: Request) -> Response:
         """Give the Zarr store of a finished job in one file."""
         await self._require_finished(job_id, request)
         path: Path = await self._service.ask(lambda jobs: jobs.packed_path(job_id))
         if not path.is_file():
-            raise Refused("no-such-resource", "The sweep did not ask for its trajectories to be kept, or none could be computed.")
+            raise Refused(
+                "no-such-resource",
+                "The sweep did not ask for its trajectories to be kept, or none could be computed.",
+            )
         return FileResponse(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
 
     async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
@@ -186,7 +254,9 @@ class _JobRoutes:
         owner = caller_of(request).seen
 
         def parse(jobs: Jobs) -> tuple[JobStatus, bool]:
-            return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(job_id).exists()
+            return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(
+                job_id
+            ).exists()
 
         job, kept = await self._service.ask(parse)
         return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
@@ -194,8 +264,14 @@ class _JobRoutes:
     async def _require_finished(self, job_id: str, request: Request) -> None:
         found = await self._status(job_id, request)
         if found.state != "finished":
-            raise Refused("not-finished", f"The job is {found.state}; its result is there when it has finished.", retry_after=2)
+            raise Refused(
+                "not-finished",
+                f"The job is {found.state}; its result is there when it has finished.",
+                retry_after=2,
+            )
 
 
-def _json(document: dict[str, Any], status: int = 200, headers: dict[str, str] | None = None) -> Response:
+def _json(
+    document: dict[str, Any], status: int = 200, headers: dict[str, str] | None = None
+) -> Response:
     return Response(orjson.dumps(document), status, headers, "application/json")

@@ -1,4 +1,6 @@
-"""The jobs of one server: the store and the runner, opened with the server and again when the storage has come back."""
+"""The jobs of one server: the store and the runner, opened with the server and again when the
+storage has come back.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ __all__ = ["JobService"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
-#: Interactive requests go before sweeps where both want the processors: three times as much of them.
+#: Interactive requests go before sweeps where both want the processors: three times as much of
+#: them.
 _NICENESS = 5
 
 T = TypeVar("T")
@@ -43,7 +46,9 @@ class JobService:
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Run the jobs until the context ends; those that another server left unfinished are taken up."""
+        """Run the jobs until the context ends; those that another server left unfinished are taken
+        up.
+        """
         try:
             await self.sweeps()
         except (Refused, BackendMissing) as error:
@@ -57,7 +62,9 @@ class JobService:
                 self._sweeps.jobs.close()
 
     async def sweeps(self) -> Sweeps:
-        """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without the extra ``sweeps``."""
+        """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without
+        the extra ``sweeps``.
+        """
         async with self._opening:
             if self._sweeps is None:
                 self._sweeps = await self._open()
@@ -69,13 +76,18 @@ class JobService:
             from veselova.service.sweeps.runner import Sweeps
         except ImportError as error:
             self.failure = f"{error.name} is not installed"
-            raise BackendMissing(error.name or "distributed", "A sweep", install_extra("sweeps")) from None
+            raise BackendMissing(
+                error.name or "distributed", "A sweep", install_extra("sweeps")
+            ) from None
         try:
             jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
             sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
             await sweeps.resume()
             self._watching = asyncio.create_task(sweeps.watch())
-        except (Refused, InvalidInput) as error:  # which names a file, and what is to be done by whoever runs the server
+        except (
+            Refused,
+            InvalidInput,
+        ) as error:  # which names a file, and what is to be done by whoever runs the server
             if self.failure != str(error):
                 _LOG.error("no sweeps: %s", error)
             self.failure = str(error)
@@ -85,14 +97,20 @@ class JobService:
             if not is_outage(error):
                 raise
             self.failure = reason_of(error)
-            raise Refused("storage-unavailable", f"Jobs cannot be stored at present: {self.failure}.", retry_after=30) from None
+            raise Refused(
+                "storage-unavailable",
+                f"Jobs cannot be stored at present: {self.failure}.",
+                retry_after=30,
+            ) from None
         self.failure = ""
         return sweeps
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
-        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or the database refuse.
+        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or
+        the database refuse.
 
-        Values that the database cannot hold are InvalidInput. What it says of our statements is no outage, and is raised.
+        Values that the database cannot hold are InvalidInput. What it says of our statements is no
+        outage, and is raised.
         """
         sweeps = await self.sweeps()
         try:
@@ -107,7 +125,9 @@ class JobService:
             raise Refused("storage-unavailable", detail, retry_after=30) from None
 
     def counts(self) -> dict[str, int]:
-        """Return how many jobs are in each state, nothing while the store does not answer. Blocks."""
+        """Return how many jobs are in each state, nothing while the store does not
+        answer. Blocks.
+        """
         if self._sweeps is None:
             return {}
         try:

@@ -1,4 +1,6 @@
-"""JSON schemas of all requests and answers: for the OpenAPI document, and for /v1/schemas, where each stands alone."""
+"""JSON schemas of all requests and answers: for the OpenAPI document, and for /v1/schemas, where
+each stands alone.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,11 @@ _BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 
 
 def _object(properties: dict[str, Any], required: list[str] | None = None) -> dict[str, Any]:
-    return {"type": "object", "properties": properties, "required": list(properties) if required is None else required}
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties) if required is None else required,
+    }
 
 
 _PROVENANCE = _object(
@@ -62,26 +68,38 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     "Trajectory": _object(
         {
             "engine": {"type": "string"},
-            "times": {**_NUMBERS, "description": "the doubles nearest to the times asked for, in their order"},
+            "times": {
+                **_NUMBERS,
+                "description": "the doubles nearest to the times asked for, in their order",
+            },
             "remainders": {
                 **_NUMBERS,
-                "description": "what the exact times are beyond these doubles; left out where that is nothing",
+                "description": "what the exact times are beyond these doubles; left out where that "
+                "is nothing",
             },
             "series": {
                 **_object(_series(_NUMBER_OR_DECIMAL), required=[]),
-                "description": f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for",
+                "description": f"decimals where more than {FEWEST_DIGITS} digits, or certified "
+                "errors, were asked for",
             },
-            "radii": {**_object(_series(_DECIMAL), required=[]), "description": "the error of every decimal"},
+            "radii": {
+                **_object(_series(_DECIMAL), required=[]),
+                "description": "the error of every decimal",
+            },
             "integrals": {
                 "type": "object",
                 "additionalProperties": _object(
-                    {"initial": {"anyOf": [{"type": "number"}, _NUMBERS]}, "drift": {"type": "number"}}
+                    {
+                        "initial": {"anyOf": [{"type": "number"}, _NUMBERS]},
+                        "drift": {"type": "number"},
+                    }
                 ),
             },
             "error": {
                 "type": "array",
                 "items": _NUMBER_OR_DECIMAL,
-                "description": "bounds the true error of every component of the bounded series at each time: true ≤ error; "
+                "description": "bounds the true error of every component of the bounded series at "
+                "each time: true ≤ error; "
                 "bounded series of system veselova: q and frame",
             },
             "provenance": _PROVENANCE,
@@ -90,9 +108,18 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     ),
     "Comparison": _object(
         {
-            "deviation": {**_BY_NAME, "description": "largest difference of the engines, per output"},
-            "agrees": {"type": "boolean", "description": "whether they differ by no more than the sum of both errors"},
-            "conditioning_floor": {"type": "number", "description": "what one rounding of the data moves at the last time"},
+            "deviation": {
+                **_BY_NAME,
+                "description": "largest difference of the engines, per output",
+            },
+            "agrees": {
+                "type": "boolean",
+                "description": "whether they differ by no more than the sum of both errors",
+            },
+            "conditioning_floor": {
+                "type": "number",
+                "description": "what one rounding of the data moves at the last time",
+            },
             "error": _BY_NAME,
             "drift": {"type": "object", "additionalProperties": _BY_NAME},
             "seconds": _BY_NAME,
@@ -104,11 +131,17 @@ _ANSWERS: dict[str, dict[str, Any]] = {
     "Torus": _object(
         {
             "n": {"type": "integer"},
-            "energy": {"anyOf": [{"type": "number"}, {"type": "null"}], "description": "null beyond the range of a double"},
+            "energy": {
+                "anyOf": [{"type": "number"}, {"type": "null"}],
+                "description": "null beyond the range of a double",
+            },
             "constants": _NUMBERS,
             "branch_points": _NUMBERS,
             "origins": {"type": "array", "items": {"type": "string"}},
-            "periods": {"anyOf": [_MATRIX, {"type": "null"}], "description": "null beyond the range of a double"},
+            "periods": {
+                "anyOf": [_MATRIX, {"type": "null"}],
+                "description": "null beyond the range of a double",
+            },
             "riemann_matrix": _MATRIX,
             "riemann_matrix_residual": {"type": "number"},
             "frequencies_tau1": _NUMBERS,
@@ -124,8 +157,14 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "title": {"type": "string"},
             "status": {"type": "integer"},
             "detail": {"type": "string"},
-            "outcome": {"type": "string", "description": "the named outcome of an engine that cannot serve the problem"},
-            "errors": {"type": "array", "items": _object({"pointer": {"type": "string"}, "detail": {"type": "string"}})},
+            "outcome": {
+                "type": "string",
+                "description": "the named outcome of an engine that cannot serve the problem",
+            },
+            "errors": {
+                "type": "array",
+                "items": _object({"pointer": {"type": "string"}, "detail": {"type": "string"}}),
+            },
         },
         required=["type", "title", "status", "detail"],
     ),
@@ -137,7 +176,11 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                     {
                         **dict.fromkeys(("system", "title", "schema", "time"), _TEXT),
                         **dict.fromkeys(("fields", "formulations", "outputs"), _TEXTS),
-                        "engines": {"type": "object", "additionalProperties": _TEXTS, "description": "engine → its methods"},
+                        "engines": {
+                            "type": "object",
+                            "additionalProperties": _TEXTS,
+                            "description": "engine → its methods",
+                        },
                     }
                 ),
             },
@@ -145,7 +188,14 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "limits": {**_BY_NAME, "description": "largest dimension, most times, longest budget"},
         }
     ),
-    "SchemaList": _object({"schemas": {"type": "array", "items": _object(dict.fromkeys(("name", "title", "link"), _TEXT))}}),
+    "SchemaList": _object(
+        {
+            "schemas": {
+                "type": "array",
+                "items": _object(dict.fromkeys(("name", "title", "link"), _TEXT)),
+            }
+        }
+    ),
     "Health": _object({"status": _TEXT, "version": _TEXT}, required=["status"]),
 }
 
@@ -153,26 +203,39 @@ _ANSWERS: dict[str, dict[str, Any]] = {
 @cache
 def _components() -> bytes:
     """Return all schemas by their names, as JSON."""
-    requests: list[tuple[Any, Any]] = [(model, "validation") for model in (*(model for model, _ in TASKS.values()), SweepRequest)]
+    requests: list[tuple[Any, Any]] = [
+        (model, "validation") for model in (*(model for model, _ in TASKS.values()), SweepRequest)
+    ]
     jobs: list[tuple[Any, Any]] = [(model, "serialization") for model in (JobDocument, JobList)]
     _, definitions = models_json_schema([*requests, *jobs], ref_template=PREFIX + "{model}")
     return orjson.dumps({**definitions["$defs"], **_ANSWERS})
 
 
 def component_schemas() -> dict[str, Any]:
-    """Return the schemas of all requests and answers by their names, which refer to one another below ``PREFIX``."""
+    """Return the schemas of all requests and answers by their names, which refer to one another
+    below ``PREFIX``.
+    """
     return dict(orjson.loads(_components()))
 
 
 def schema_names() -> dict[str, str]:
-    """Return the names of all schemas, and what each is of, in a sentence (of an answer, its name)."""
-    return {name: schema.get("description", name).split("\n")[0] for name, schema in component_schemas().items()}
+    """Return the names of all schemas, and what each is of, in a sentence (of an
+    answer, its name).
+    """
+    return {
+        name: schema.get("description", name).split("\n")[0]
+        for name, schema in component_schemas().items()
+    }
 
 
 def schema_document(name: str) -> dict[str, Any]:
-    """Return one schema by its name, those that it refers to among its ``$defs``; raises KeyError."""
+    """Return one schema by its name, those that it refers to among its ``$defs``;
+    raises KeyError.
+    """
     schemas = component_schemas()
-    schema, needed, found = schemas[name], {name}, set[str]()
+    schema = schemas[name]
+    needed = {name}
+    found = set[str]()
     while needed := {other for known in needed for other in _references(schemas[known])} - found:
         found |= needed
     definitions = {other: schemas[other] for other in schemas if other in found}

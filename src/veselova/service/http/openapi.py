@@ -1,4 +1,6 @@
-"""The OpenAPI document: routes read their bodies themselves, so the models are put in here, with worked examples."""
+"""The OpenAPI document: routes read their bodies themselves, so the models are put in here, with
+worked examples.
+"""
 
 from __future__ import annotations
 
@@ -49,15 +51,25 @@ _JOB_REFUSALS = {
     409: "The job has not finished",
     503: "Jobs cannot be stored or read at present; see Retry-After",
 }
-_SWEEP_REFUSALS = {status: _REFUSALS[status] for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)}
+_SWEEP_REFUSALS = {
+    status: _REFUSALS[status]
+    for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)
+}
 _COMMON_REFUSALS = {status: _REFUSALS[status] for status in (401, 403, 429, 500, 503)}
 _SCHEMA_REFUSALS = {404: "No schema of this name", **_COMMON_REFUSALS}
 
 _TEXT = {"schema": {"type": "string"}}
 #: Header fields of a trajectory, in every format.
 _FIELDS: dict[str, dict[str, Any]] = {
-    "ETag": {"description": "hash of the request, its defaults filled in and its budget left out, and the format", **_TEXT},
-    "Content-Location": {"description": "where a GET gives this trajectory, in any format, while it is kept", **_TEXT},
+    "ETag": {
+        "description": "hash of the request, its defaults filled in and its budget left out, and "
+        "the format",
+        **_TEXT,
+    },
+    "Content-Location": {
+        "description": "where a GET gives this trajectory, in any format, while it is kept",
+        **_TEXT,
+    },
     PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
 }
 _NAME = {
@@ -83,7 +95,8 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             title="veselova",
             version=__version__,
             summary="Motions of an n-dimensional rigid body under the Veselova constraint",
-            description="POST a problem and times; receive the motion in theta functions or by integration, with its error.",
+            description="POST a problem and times; receive the motion in theta functions or by "
+            "integration, with its error.",
             routes=app.routes,
         )
         document.setdefault("components", {})["schemas"] = component_schemas()
@@ -92,7 +105,8 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         for path, operations in document["paths"].items():
             for operation in operations.values():
                 if path not in RESOURCES:
-                    operation["responses"].pop("422", None)  # the framework's: all refusals are problem documents here
+                    # the framework's: all refusals are problem documents here
+                    operation["responses"].pop("422", None)
                     _refuse(operation, _refusals(path))
         document["paths"][KEPT] = {"get": _get_kept_operation(), "head": _head_kept_operation()}
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
@@ -112,7 +126,9 @@ def _refusals(path: str) -> dict[int, str]:
 def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     """Put the body, the answer and the refusals of one resource into its operation."""
     example = (
-        {"problem": BODY4_PROBLEM} if kind == "torus" else {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}
+        {"problem": BODY4_PROBLEM}
+        if kind == "torus"
+        else {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}
     )
     body = {"schema": {"$ref": f"{PREFIX}{TASKS[kind][0].__name__}"}, "example": example}
     operation["requestBody"] = {"required": True, "content": {"application/json": body}}
@@ -120,7 +136,9 @@ def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     if kind in ANSWERS:
         answer["example"] = ANSWERS[kind]
     refusals = _REFUSALS
-    operation["responses"] = {"200": {"description": content, "content": {"application/json": answer}}}
+    operation["responses"] = {
+        "200": {"description": content, "content": {"application/json": answer}}
+    }
     if kind == "trajectory":
         operation["parameters"], refusals = [_CONDITION], {**_REFUSALS, **_PRECONDITION}
         operation["responses"]["200"] = _trajectory(content, answer)
@@ -137,7 +155,10 @@ def _get_kept_operation() -> dict[str, Any]:
         "parameters": [_NAME, _CONDITION],
         "responses": {
             "200": _trajectory("The trajectory", answer),
-            "304": {"description": "The client has it already", "headers": {"ETag": _FIELDS["ETag"]}},
+            "304": {
+                "description": "The client has it already",
+                "headers": {"ETag": _FIELDS["ETag"]},
+            },
         },
     }
     _refuse(operation, _KEPT_REFUSALS)
@@ -146,9 +167,20 @@ def _get_kept_operation() -> dict[str, Any]:
 
 def _head_kept_operation() -> dict[str, Any]:
     """Return the operation that gives the header of a kept trajectory alone."""
-    statuses = {200: "It is kept", 304: "The client has it already", 404: "Not kept, or not any more", 406: _REFUSALS[406]}
-    responses = {str(status): {"description": description} for status, description in statuses.items()}
-    named = {"tags": ["motions"], "summary": "Tell whether a trajectory is kept", "operationId": "head_trajectory"}
+    statuses = {
+        200: "It is kept",
+        304: "The client has it already",
+        404: "Not kept, or not any more",
+        406: _REFUSALS[406],
+    }
+    responses = {
+        str(status): {"description": description} for status, description in statuses.items()
+    }
+    named = {
+        "tags": ["motions"],
+        "summary": "Tell whether a trajectory is kept",
+        "operationId": "head_trajectory",
+    }
     return {**named, "parameters": [_NAME, _CONDITION], "responses": responses}
 
 
@@ -157,7 +189,11 @@ def _trajectory(description: str, answer: dict[str, Any]) -> dict[str, Any]:
     table = {"text/csv": _TEXT}
     binary = {"schema": {"type": "string", "format": "binary"}}
     content = {form.media_type: table.get(form.media_type, binary) for form in FORMATS.values()}
-    return {"description": description, "headers": _FIELDS, "content": {**content, "application/json": answer}}
+    return {
+        "description": description,
+        "headers": _FIELDS,
+        "content": {**content, "application/json": answer},
+    }
 
 
 def _refuse(operation: dict[str, Any], refusals: dict[int, str]) -> None:

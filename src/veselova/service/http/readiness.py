@@ -14,7 +14,8 @@ __all__ = ["missing_parts"]
 
 
 async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -> list[str]:
-    """Return what keeps a server from answering, in words: a warm worker, the store of its jobs, its keys where it asks for them.
+    """Return what keeps a server from answering, in words: a warm worker, the store of its jobs,
+    its keys where it asks for them.
 
     Anyone may read it, so it names no address, file or role: the log has those.
     A server without the libraries of jobs is complete without their store.

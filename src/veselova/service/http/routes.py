@@ -22,7 +22,8 @@ from veselova.version import __version__
 __all__ = ["KEPT", "RESOURCES", "SCHEMA", "router"]
 
 #: The path of trajectories, and that of those which are kept.
-TRAJECTORIES, KEPT = "/v1/trajectories", "/v1/trajectories/{name}"
+TRAJECTORIES = "/v1/trajectories"
+KEPT = "/v1/trajectories/{name}"
 
 #: The path of one JSON schema.
 SCHEMA = "/v1/schemas/{name}"
@@ -33,12 +34,24 @@ _SCHEMA_TYPE = "application/schema+json"
 #: Path → (kind of answer, summary, what the answer holds).
 RESOURCES = {
     TRAJECTORIES: ("trajectory", "Solve a motion with one engine", "The motion at the given times"),
-    "/v1/comparisons": ("comparison", "Solve a motion with both engines", "Both motions and how they agree"),
-    "/v1/tori": ("torus", "Describe the invariant torus of a motion", "Curve, periods, frequencies, phases"),
+    "/v1/comparisons": (
+        "comparison",
+        "Solve a motion with both engines",
+        "Both motions and how they agree",
+    ),
+    "/v1/tori": (
+        "torus",
+        "Describe the invariant torus of a motion",
+        "Curve, periods, frequencies, phases",
+    ),
 }
 
 #: Kind of answer → operation id: names of functions in generated clients, which never change.
-_OPERATIONS = {"trajectory": "solve_trajectory", "comparison": "compare_engines", "torus": "compute_torus"}
+_OPERATIONS = {
+    "trajectory": "solve_trajectory",
+    "comparison": "compare_engines",
+    "torus": "compute_torus",
+}
 
 
 def _systems() -> list[dict[str, Any]]:
@@ -49,7 +62,9 @@ def _systems() -> list[dict[str, Any]]:
             "title": (model.__doc__ or "").strip().splitlines()[0],
             "schema": SCHEMA.format(name=model.__name__),
             "fields": [field for field in model.model_fields if field != "system"],
-            "engines": {engine: list(methods) for engine, methods in model.problem_class.engines.items()},
+            "engines": {
+                engine: list(methods) for engine, methods in model.problem_class.engines.items()
+            },
             "formulations": list(model.problem_class.formulations),
             "outputs": list(model.problem_class.outputs),
             "time": model.problem_class.time,
@@ -58,13 +73,24 @@ def _systems() -> list[dict[str, Any]]:
     ]
 
 
-def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable[list[str]]]) -> APIRouter:
-    """Return the routes of one server, over its settings, its answers, and what says which of its parts are missing."""
+def router(
+    settings: Settings, answers: Answers, missing: Callable[[], Awaitable[list[str]]]
+) -> APIRouter:
+    """Return the routes of one server, over its settings, its answers, and what says which of its
+    parts are missing.
+    """
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
         answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
-        described: dict[str, Any] = {"operation_id": _OPERATIONS[kind], "summary": summary, "name": kind, "tags": ["motions"]}
-        routes.add_api_route(path, answer, methods=["POST"], route_class_override=_Direct, **described)
+        described: dict[str, Any] = {
+            "operation_id": _OPERATIONS[kind],
+            "summary": summary,
+            "name": kind,
+            "tags": ["motions"],
+        }
+        routes.add_api_route(
+            path, answer, methods=["POST"], route_class_override=_Direct, **described
+        )
 
     async def get_kept(request: Request) -> Response:
         return await answers.get_kept(request.path_params["name"], request)
@@ -72,35 +98,78 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
     # A route of Starlette, for GET and HEAD at once; openapi describes it.
     routes.add_route(KEPT, get_kept, methods=["GET"], name="kept")
 
-    async def systems() -> Response:
-        return _json({"systems": _systems(), "version": __version__, "limits": settings.limits})
+    _add_service_routes(routes, _ServiceEndpoints(settings, missing))
+    return routes
 
-    async def schemas() -> Response:
-        listed = [{"name": name, "title": title, "link": SCHEMA.format(name=name)} for name, title in schema_names().items()]
+
+class _ServiceEndpoints:
+    """What tells of a server itself: systems, schemas, health."""
+
+    def __init__(self, settings: Settings, missing: Callable[[], Awaitable[list[str]]]) -> None:
+        self._settings = settings
+        self._missing = missing
+
+    async def systems(self) -> Response:
+        """Return the systems, the version and the limits."""
+        return _json(
+            {"systems": _systems(), "version": __version__, "limits": self._settings.limits}
+        )
+
+    async def schemas(self) -> Response:
+        """Return the names of all schemas."""
+        listed = [
+            {"name": name, "title": title, "link": SCHEMA.format(name=name)}
+            for name, title in schema_names().items()
+        ]
         return _json({"schemas": listed})
 
-    async def schema(name: str) -> Response:
+    async def schema(self, name: str) -> Response:
+        """Return one schema by its name."""
         try:
             return _json(schema_document(name), _SCHEMA_TYPE)
         except KeyError:
-            raise Refused("no-such-resource", f"No schema is called {show(name)}; GET /v1/schemas lists all.") from None
+            raise Refused(
+                "no-such-resource", f"No schema is called {show(name)}; GET /v1/schemas lists all."
+            ) from None
 
-    async def healthz() -> Response:
+    async def healthz(self) -> Response:
+        """Return that the server runs."""
         return _json({"status": "ok", "version": __version__})
 
-    async def readyz() -> Response:
-        if parts := await missing():
+    async def readyz(self) -> Response:
+        """Return that the server can answer; raises Refused where a part is missing."""
+        if parts := await self._missing():
             raise Refused("not-ready", " ".join(parts), retry_after=1)
         return _json({"status": "ready"})
 
+
+def _add_service_routes(routes: APIRouter, own: _ServiceEndpoints) -> None:
     table: tuple[tuple[str, Any, str, str, dict[str, Any]], ...] = (
-        ("/v1/systems", systems, "list_systems", "List the systems that can be solved", _describe("SystemList")),
-        ("/v1/schemas", schemas, "list_schemas", "List the JSON schemas of requests and answers", _describe("SchemaList")),
-        (SCHEMA, schema, "get_schema", "Give one JSON schema", {_SCHEMA_TYPE: {"schema": {"type": "object"}}}),
-        ("/healthz", healthz, "check_health", "Whether the server runs", _describe("Health")),
+        (
+            "/v1/systems",
+            own.systems,
+            "list_systems",
+            "List the systems that can be solved",
+            _describe("SystemList"),
+        ),
+        (
+            "/v1/schemas",
+            own.schemas,
+            "list_schemas",
+            "List the JSON schemas of requests and answers",
+            _describe("SchemaList"),
+        ),
+        (
+            SCHEMA,
+            own.schema,
+            "get_schema",
+            "Give one JSON schema",
+            {_SCHEMA_TYPE: {"schema": {"type": "object"}}},
+        ),
+        ("/healthz", own.healthz, "check_health", "Whether the server runs", _describe("Health")),
         (
             "/readyz",
-            readyz,
+            own.readyz,
             "check_readiness",
             "Whether the server can answer: a warm worker, its database",
             _describe("Health"),
@@ -112,16 +181,18 @@ def router(settings: Settings, answers: Answers, missing: Callable[[], Awaitable
         routes.add_api_route(path, endpoint, methods=["GET"], response_class=Response, **named)
         routes.add_api_route(path, endpoint, methods=["HEAD"], include_in_schema=False)
 
-    return routes
-
 
 class _Direct(APIRoute):
-    """A route whose endpoint reads the request itself: the framework looks for no parameters, which takes as long as the rest.
+    """A route whose endpoint reads the request itself: the framework looks for no parameters, which
+    takes as long as the rest.
 
-    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of the application.
+    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of
+    the application.
     """
 
-    def __init__(self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any) -> None:
+    def __init__(
+        self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any
+    ) -> None:
         super().__init__(path, endpoint, **described)
 
         async def answer(scope: Scope, receive: Receive, send: Send) -> None:

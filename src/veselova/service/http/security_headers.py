@@ -1,4 +1,6 @@
-"""What browsers are told of every answer, and the page of the documentation with the one policy that lets it run."""
+"""What browsers are told of every answer, and the page of the documentation with the one policy
+that lets it run.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ _OF_FAILURES = (*_HEADERS, (b"cache-control", b"no-store"))
 
 
 class SecurityHeaders:
-    """ASGI middleware: adds the headers that an answer does not have; failures are not to be stored."""
+    """ASGI middleware: adds the headers that an answer does not have; failures are not to be
+    stored.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -40,14 +44,19 @@ class SecurityHeaders:
                 fields = list(message.get("headers", ()))
                 stated = {name for name, _ in fields}
                 further = _HEADERS if message["status"] < 400 else _OF_FAILURES
-                message = {**message, "headers": fields + [field for field in further if field[0] not in stated]}
+                message = {
+                    **message,
+                    "headers": fields + [field for field in further if field[0] not in stated],
+                }
             await send(message)
 
         await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
 
 
 def add_documentation(app: FastAPI) -> None:
-    """Serve the interactive documentation at ``/docs``: its own script by its hash, the rest from the network it names."""
+    """Serve the interactive documentation at ``/docs``: its own script by its hash, the rest from
+    the network it names.
+    """
     page = get_swagger_ui_html(openapi_url="/openapi.json", title="veselova")
     script = re.search(rb"<script>(.*?)</script>", bytes(page.body), re.DOTALL)
     assert script, "the page starts itself by a script of its own"

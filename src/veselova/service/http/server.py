@@ -29,16 +29,25 @@ _BACKLOG = 256
 _OF_THE_CLIENT = {"VESELOVA_API_KEY"}
 
 
-def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips: str | None = None, **stated: Any) -> None:
-    """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an address or a setting.
+def serve(
+    host: str,
+    port: int,
+    settings_only: bool = False,
+    forwarded_allow_ips: str | None = None,
+    **stated: Any,
+) -> None:
+    """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an
+    address or a setting.
 
-    ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the proxies whose X-Forwarded-For
-    is believed (uvicorn's option), none when left out.
+    ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the
+    proxies whose X-Forwarded-For is believed (uvicorn's option), none when left out.
     """
-    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the loop kill the workers first.
+    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the
+    # loop kill the workers first.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     _drain_when_hung_up()
-    # The matrices are small: without this every process starts two threads for each further processor, and none of them helps.
+    # The matrices are small: without this every process starts two threads for each further
+    # processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.umask(0o077)  # what the server and its workers write is this account's alone
     limits = settings_of_environment(**stated)
@@ -61,7 +70,11 @@ def serve(host: str, port: int, settings_only: bool = False, forwarded_allow_ips
     keep_from_children()  # work in flight gets its grace after SIGINT as after SIGTERM
     app = create_app(limits, loopback=loopback)
     if not loopback and not Policy.requires_keys(limits, loopback):
-        _LOG.warning("clients need no key although %s is no loopback address: whoever reaches it can use the service", host)
+        _LOG.warning(
+            "clients need no key although %s is no loopback address: whoever reaches it can "
+            "use the service",
+            host,
+        )
     uvicorn.run(
         app,
         host=host,
@@ -86,18 +99,26 @@ def _drain_when_hung_up() -> None:
 
 
 def settings_of_environment(**stated: Any) -> Settings:
-    """Return the settings of the environment with those stated; raises InvalidInput for one that is not valid."""
+    """Return the settings of the environment with those stated; raises InvalidInput for one that is
+    not valid.
+    """
     known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} | _OF_THE_CLIENT
     for name in sorted(os.environ):
         if name.startswith("VESELOVA_") and name not in known:
-            print(f"veselova: {name} is not one of its settings (veselova serve --settings lists them)", file=sys.stderr)
+            print(
+                f"veselova: {name} is not one of its settings (veselova serve --settings "
+                "lists them)",
+                file=sys.stderr,
+            )
     try:
         return Settings(**{name: value for name, value in stated.items() if value is not None})
     except ValidationError as error:
         item = error.errors()[0]
         name = f"VESELOVA_{str(item['loc'][0]).upper()}"
         required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
-        raise InvalidInput((name,), required[:1].lower() + required[1:], str(item["input"])) from None
+        raise InvalidInput(
+            (name,), required[:1].lower() + required[1:], str(item["input"])
+        ) from None
 
 
 def _require_addresses(limits: Settings) -> None:
@@ -111,17 +132,24 @@ def _require_addresses(limits: Settings) -> None:
 def _bindable(host: str, port: int) -> bool:
     """Return whether an address is one of loopback.
 
-    An address that cannot be bound is refused in the words of the other refusals, before anything is started.
+    An address that cannot be bound is refused in the words of the other refusals, before anything
+    is started.
     """
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except socket.gaierror as error:
-        raise InvalidInput(("--host",), "an address of this machine", f"{host} ({error.strerror})") from None
+        raise InvalidInput(
+            ("--host",), "an address of this machine", f"{host} ({error.strerror})"
+        ) from None
     family, kind, protocol, _, address = found[0]
     with socket.socket(family, kind, protocol) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(address)
         except OSError as error:
-            raise InvalidInput(("--port",), "an address and a port to bind", f"{host}:{port} ({error.strerror})") from None
-    return all(ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found)
+            raise InvalidInput(
+                ("--port",), "an address and a port to bind", f"{host}:{port} ({error.strerror})"
+            ) from None
+    return all(
+        ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found
+    )

@@ -1,4 +1,6 @@
-"""The log: one formatter for all loggers, JSON or text, with the id of the request and without keys."""
+"""The log: one formatter for all loggers, JSON or text, with the id of the request and without
+keys.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from veselova.service.observability.request_log import FIELDS
 
 __all__ = ["configure_logging", "line_formatter"]
 
-#: The secret part of an API key, wherever one should stand (an exception, say, that quotes a header).
+#: The secret part of an API key, wherever one should stand (an exception, say, that quotes a
+#: header).
 _SECRET = re.compile(r"(vsl_[0-9a-f]{12}_)[A-Za-z0-9_-]+")
 
 _Event = MutableMapping[str, Any]
@@ -36,19 +39,33 @@ def configure_logging(settings: Settings) -> None:
             "formatters": {"line": {"()": line_formatter, "text": text, "colours": terminal}},
             "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "line"}},
             "root": {"handlers": ["stderr"], "level": "WARNING"},
-            # Ids that clients make up are replaced without a word: they could write as many lines as they like.
-            "loggers": {"veselova": {"level": level}, "uvicorn": {"level": level}, "asgi_correlation_id": {"level": "ERROR"}},
+            # Ids that clients make up are replaced without a word: they could write as many lines
+            # as they like.
+            "loggers": {
+                "veselova": {"level": level},
+                "uvicorn": {"level": level},
+                "asgi_correlation_id": {"level": "ERROR"},
+            },
         }
     )
     logging.captureWarnings(True)
 
 
 def line_formatter(text: bool, colours: bool = False) -> logging.Formatter:
-    """Return what makes a line of a record, in text or in JSON: the record, FIELDS of the request, its id, and no key."""
-    last: list[Any] = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer(ensure_ascii=False)]
+    """Return what makes a line of a record, in text or in JSON: the record, FIELDS of the request,
+    its id, and no key.
+    """
+    last: list[Any] = [
+        structlog.processors.format_exc_info,
+        structlog.processors.JSONRenderer(ensure_ascii=False),
+    ]
     if text:
         # Plain tracebacks: the pretty ones print the values of variables.
-        last = [structlog.dev.ConsoleRenderer(colors=colours, exception_formatter=structlog.dev.plain_traceback)]
+        last = [
+            structlog.dev.ConsoleRenderer(
+                colors=colours, exception_formatter=structlog.dev.plain_traceback
+            )
+        ]
     last.append(_without_secrets)
     return structlog.stdlib.ProcessorFormatter(
         processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *last],

@@ -38,21 +38,39 @@ class Metrics:
         self.registry = CollectorRegistry()
         here: dict[str, Any] = {"registry": self.registry}
         ProcessCollector(registry=self.registry)
-        Gauge("veselova_info", "Version of the server", ["version"], **here).labels(__version__).set(1)
+        Gauge("veselova_info", "Version of the server", ["version"], **here).labels(
+            __version__
+        ).set(1)
         self._seconds = Histogram(
-            "veselova_work_seconds", "Work on one request, waiting included", ["kind", "engine"], buckets=_BUCKETS, **here
+            "veselova_work_seconds",
+            "Work on one request, waiting included",
+            ["kind", "engine"],
+            buckets=_BUCKETS,
+            **here,
         )
-        self._outcomes = Counter("veselova_outcomes", "Work by how it ended", ["kind", "engine", "outcome"], **here)
-        self._refusals = Counter("veselova_refusals", "Requests refused by the service, by problem code", ["code"], **here)
-        self._cache = Counter("veselova_cache", "Answers looked up in the cache, by result", ["result"], **here)
+        self._outcomes = Counter(
+            "veselova_outcomes", "Work by how it ended", ["kind", "engine", "outcome"], **here
+        )
+        self._refusals = Counter(
+            "veselova_refusals",
+            "Requests refused by the service, by problem code",
+            ["code"],
+            **here,
+        )
+        self._cache = Counter(
+            "veselova_cache", "Answers looked up in the cache, by result", ["result"], **here
+        )
 
     @contextmanager
     def work(self, kind: str, system: str, engine: str) -> Iterator[Ending]:
-        """Time the work on a request inside the block, and count how it ends; the line of the request in the log says so too.
+        """Time the work on a request inside the block, and count how it ends; the line of the
+        request in the log says so too.
 
         An answer that was cached, and so needed no work, is not counted.
         """
-        outcome, began, ending = "stopped", time.perf_counter(), Ending()
+        outcome = "stopped"
+        began = time.perf_counter()
+        ending = Ending()
         try:
             yield ending
             outcome = "solved"
@@ -77,20 +95,28 @@ class Metrics:
         """Show a number that is asked for at every scrape."""
         Gauge(name, meaning, registry=self.registry).set_function(value)
 
-    def gauges(self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]) -> None:
-        """Show numbers by one label (jobs by state, say) that are asked for at every scrape; they may come from the database."""
+    def gauges(
+        self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]
+    ) -> None:
+        """Show numbers by one label (jobs by state, say) that are asked for at every scrape; they
+        may come from the database.
+        """
         self.registry.register(_Family(name, meaning, label, values))
 
     def serve(self, app: FastAPI) -> None:
         """Time every endpoint of an application, and show all numbers at ``/metrics``."""
         instrumentator = Instrumentator(
-            registry=self.registry, should_group_status_codes=False, excluded_handlers=["^/metrics$", "^/healthz$", "^/readyz$"]
+            registry=self.registry,
+            should_group_status_codes=False,
+            excluded_handlers=["^/metrics$", "^/healthz$", "^/readyz$"],
         )
         instrumentator.instrument(app).expose(app, include_in_schema=False)
 
 
 class _Family(Collector):
-    def __init__(self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]) -> None:
+    def __init__(
+        self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]
+    ) -> None:
         self._of = (name, meaning, label)
         self._values = values
 

@@ -16,8 +16,11 @@ from veselova.service.api.problem_details import problem_response
 
 __all__ = ["FIELDS", "Failures", "RequestLog", "note"]
 
-#: What a line may say of a request. Headers, bodies and queries are not among it, so no secret can be.
-FIELDS = frozenset({"method", "route", "path", "status", "seconds", "client", "key", "system", "engine", "outcome"})
+#: What a line may say of a request. Headers, bodies and queries are not among it, so no secret can
+#: be.
+FIELDS = frozenset(
+    {"method", "route", "path", "status", "seconds", "client", "key", "system", "engine", "outcome"}
+)
 
 _LOG = logging.getLogger("veselova.service.requests")
 
@@ -29,14 +32,18 @@ _LONGEST_PATH = 100
 
 
 def note(**facts: Any) -> None:
-    """Add facts (named in FIELDS) to the line of the request at hand; outside of a request nothing happens."""
+    """Add facts (named in FIELDS) to the line of the request at hand; outside of a request nothing
+    happens.
+    """
     known = _FACTS.get()
     if known is not None:
         known.update(facts)
 
 
 class RequestLog:
-    """ASGI middleware: logs what was asked, status, seconds, client, and what ``note`` was told; ``quiet`` paths as debugging."""
+    """ASGI middleware: logs what was asked, status, seconds, client, and what ``note`` was told;
+    ``quiet`` paths as debugging.
+    """
 
     def __init__(self, app: ASGIApp, quiet: frozenset[str] = frozenset()) -> None:
         self._app = app
@@ -61,23 +68,35 @@ class RequestLog:
         try:
             await self._app(scope, receive, watch)
         finally:
-            facts.setdefault("outcome", "answered" if status and status < 400 else "refused" if status else "no-answer")
+            facts.setdefault(
+                "outcome",
+                "answered" if status and status < 400 else "refused" if status else "no-answer",
+            )
             level = logging.DEBUG if scope["path"] in self._quiet else logging.INFO
-            line = {**_subject(scope), "status": status, "seconds": round(time.perf_counter() - began, 6), **facts}
+            line = {
+                **_subject(scope),
+                "status": status,
+                "seconds": round(time.perf_counter() - began, 6),
+                **facts,
+            }
             _LOG.log(level, "request", extra=line)
 
 
 class Failures:
-    """ASGI middleware: answers an exception that nothing inside did, and raises it again for the server to log.
+    """ASGI middleware: answers an exception that nothing inside did, and raises it again for the
+    server to log.
 
-    It stands inside of what adds headers; the framework's own, which stands outside of all, would answer without them.
+    It stands inside of what adds headers; the framework's own, which stands outside of all, would
+    answer without them.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on; where that raises before there is an answer, answer with the problem document of the exception."""
+        """Pass a request on; where that raises before there is an answer, answer with the problem
+        document of the exception.
+        """
         started = scope["type"] != "http"
 
         async def watch(message: Message) -> None:
@@ -95,11 +114,17 @@ class Failures:
 
 
 def _subject(scope: Scope) -> dict[str, Any]:
-    """Return what was asked: the route, or the path where no route has it, in characters that are safe to print."""
+    """Return what was asked: the route, or the path where no route has it, in characters that are
+    safe to print.
+    """
     client = (scope.get("client") or (None,))[0]
     route = getattr(scope.get("route"), "path", None)
     if route is None and "app" in scope:  # what was refused before it reached its route
         route = get_route_name(Request(scope), should_include_root_path=False)
     if route is None:
-        return {"method": scope["method"][:20], "path": quote(scope["path"])[:_LONGEST_PATH], "client": client}
+        return {
+            "method": scope["method"][:20],
+            "path": quote(scope["path"])[:_LONGEST_PATH],
+            "client": client,
+        }
     return {"method": scope["method"][:20], "route": route, "client": client}

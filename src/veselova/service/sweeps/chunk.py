@@ -1,4 +1,6 @@
-"""What a sweep says of each problem: a row of numbers by the names of their columns, and the motion itself where it is kept."""
+"""What a sweep says of each problem: a row of numbers by the names of their columns, and the motion
+itself where it is kept.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ __all__ = ["SOLVED", "Chunk", "OtherVersion", "compute_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
-#: What the column ``outcome`` says of a problem that was solved; else it names the reason, and ``detail`` explains it.
+#: What the column ``outcome`` says of a problem that was solved; else it names the reason, and
+#: ``detail`` explains it.
 SOLVED = "solved"
 
 Row = dict[str, Any]
@@ -37,7 +40,9 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Chunk:
-    """The answers to consecutive problems: a table as Parquet, and arrays with one entry of the first axis for each of them."""
+    """The answers to consecutive problems: a table as Parquet, and arrays with one entry of the
+    first axis for each of them.
+    """
 
     rows: int
     table: bytes
@@ -51,17 +56,21 @@ class OtherVersion(Exception):
 def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
     """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
 
-    A problem that cannot be solved is a row that says why. Raises OtherVersion where this process has another version of the
-    engines than the one that asks.
+    A problem that cannot be solved is a row that says why. Raises OtherVersion where this process
+    has another version of the engines than the one that asks.
     """
     if version != __version__:
-        raise OtherVersion(f"a worker of the cluster runs veselova {__version__}, and this is {version}")
+        raise OtherVersion(
+            f"a worker of the cluster runs veselova {__version__}, and this is {version}"
+        )
     _warm_up()
     sweep = _sweep(request)
     values = {row: sweep.values(row) for row in range(start, stop)}
     together = _together(sweep, values)
     answers = [_answer(sweep, row, values[row], together.get(row)) for row in range(start, stop)]
-    return Chunk(stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers]))
+    return Chunk(
+        stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers])
+    )
 
 
 @lru_cache(maxsize=4)
@@ -72,7 +81,9 @@ def _sweep(request: bytes) -> SweepRequest:
 
 @cache
 def _warm_up() -> None:
-    """Load and run both engines once in this process, so that the budget of its first problem is spent on the problem."""
+    """Load and run both engines once in this process, so that the budget of its first problem is
+    spent on the problem.
+    """
     warm_up()
 
 
@@ -83,7 +94,9 @@ def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
 
 
 def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Row]:
-    """Return what can be found for many problems at once, within the budgets of all; the others are answered one by one."""
+    """Return what can be found for many problems at once, within the budgets of all; the others are
+    answered one by one.
+    """
     try:
         with time_limit(sweep.budget_s * len(values)):
             return columns_at_once(sweep, values)
@@ -94,8 +107,12 @@ def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> 
         return {}
 
 
-def _answer(sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Row | None) -> tuple[Row, Mapping[str, Any]]:
-    """Return the row of one problem, unless its columns were ``found`` already, and the series that are kept of it."""
+def _answer(
+    sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Row | None
+) -> tuple[Row, Mapping[str, Any]]:
+    """Return the row of one problem, unless its columns were ``found`` already, and the series that
+    are kept of it.
+    """
     if found is not None:
         return {**_row(sweep, row, values, SOLVED, ""), **found}, {}
     found = {}
@@ -104,18 +121,24 @@ def _answer(sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Ro
         with time_limit(sweep.budget_s):
             for column, value in _findings(sweep.request_of(values), kept, sweep.trajectories):
                 found[column] = value
-        outcome, detail = SOLVED, ""
+        outcome = SOLVED
+        detail = ""
     except TimeIsUp:
-        outcome, detail = "over-budget", f"the work was stopped after its budget of {sweep.budget_s:g} s"
+        outcome = "over-budget"
+        detail = f"the work was stopped after its budget of {sweep.budget_s:g} s"
     except VeselovaError as error:
-        outcome, detail = problem_code(error), error.reason if isinstance(error, Unsolved) else str(error)
+        outcome = problem_code(error)
+        detail = error.reason if isinstance(error, Unsolved) else str(error)
     except Exception as error:
         _LOG.exception("problem %d of sweep %s failed", row, sweep.id)
-        outcome, detail = problem_code(error), "an unexpected error; it has been logged"
+        outcome = problem_code(error)
+        detail = "an unexpected error; it has been logged"
     return {**_row(sweep, row, values, outcome, detail), **found}, kept
 
 
-def _row(sweep: SweepRequest, row: int, values: Mapping[Path, Any], outcome: str, detail: str) -> Row:
+def _row(
+    sweep: SweepRequest, row: int, values: Mapping[Path, Any], outcome: str, detail: str
+) -> Row:
     return {"row": row, **dict(sweep.columns(values)), "outcome": outcome, "detail": detail}
 
 
@@ -137,7 +160,9 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
         yield from _of_motion(problem, trajectory, names)
 
 
-def _of_motion(problem: Problem, trajectory: Trajectory, names: list[str]) -> Iterator[tuple[str, Any]]:
+def _of_motion(
+    problem: Problem, trajectory: Trajectory, names: list[str]
+) -> Iterator[tuple[str, Any]]:
     yield "error.max", float(np.max(trajectory.error))
     for name, drift in trajectory.drift.items():
         yield f"drift.{name}", drift
@@ -148,7 +173,9 @@ def _of_motion(problem: Problem, trajectory: Trajectory, names: list[str]) -> It
 
 
 def _parquet(rows: list[Row]) -> bytes:
-    """Return the table of the rows, columns in the order in which they first appear; numbers that are missing are null."""
+    """Return the table of the rows, columns in the order in which they first appear; numbers that
+    are missing are null.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -160,18 +187,29 @@ def _parquet(rows: list[Row]) -> bytes:
 
 
 def _column(values: list[Any]) -> Any:
-    """Return an Arrow array of numbers, of texts where any value is one; what is missing is null."""
+    """Return an Arrow array of numbers, of texts where any value is one; what is
+    missing is null.
+    """
     import pyarrow as pa
 
     if any(isinstance(value, str) for value in values):
         return pa.array([None if value is None else str(value) for value in values], pa.string())
-    return pa.array(values) if any(value is not None for value in values) else pa.nulls(len(values), pa.float64())
+    return (
+        pa.array(values)
+        if any(value is not None for value in values)
+        else pa.nulls(len(values), pa.float64())
+    )
 
 
 def _arrays(kept: list[Mapping[str, Any]]) -> dict[str, np.ndarray[Any, Any]]:
     """Return the series of all problems, NaN for those that have none."""
     complete = next((series for series in kept if series), {})
     return {
-        name: np.stack([np.asarray(series[name]) if series else np.full_like(pattern, np.nan) for series in kept])
+        name: np.stack(
+            [
+                np.asarray(series[name]) if series else np.full_like(pattern, np.nan)
+                for series in kept
+            ]
+        )
         for name, pattern in complete.items()
     }

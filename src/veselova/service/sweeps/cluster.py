@@ -1,4 +1,6 @@
-"""The Dask cluster that computes sweeps: worker processes of this machine, or a scheduler by its address. One code path."""
+"""The Dask cluster that computes sweeps: worker processes of this machine, or a scheduler by its
+address. One code path.
+"""
 
 from __future__ import annotations
 
@@ -32,12 +34,18 @@ _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def require_scheduler(settings: Settings) -> None:
-    """Raise InvalidInput for a scheduler that is neither on loopback nor behind TLS, or for TLS without its files."""
+    """Raise InvalidInput for a scheduler that is neither on loopback nor behind TLS, or for TLS
+    without its files.
+    """
     if not settings.dask_scheduler:
         return
     address = urlsplit(settings.dask_scheduler)
     if address.scheme not in ("tcp", "tls") or not address.hostname:
-        raise InvalidInput(("VESELOVA_DASK_SCHEDULER",), "an address tls://HOST:PORT", settings.dask_scheduler[:100])
+        raise InvalidInput(
+            ("VESELOVA_DASK_SCHEDULER",),
+            "an address tls://HOST:PORT",
+            settings.dask_scheduler[:100],
+        )
     if address.scheme == "tcp" and address.hostname not in _LOOPBACK:
         raise InvalidInput(
             ("VESELOVA_DASK_SCHEDULER",),
@@ -48,15 +56,20 @@ def require_scheduler(settings: Settings) -> None:
         for name in ("dask_ca_file", "dask_cert_file", "dask_key_file"):
             path = getattr(settings, name)
             if path is None or not path.is_file():
-                raise InvalidInput((f"VESELOVA_{name.upper()}",), "a file, for tls://", str(path or "nothing"))
+                raise InvalidInput(
+                    (f"VESELOVA_{name.upper()}",), "a file, for tls://", str(path or "nothing")
+                )
 
 
 @asynccontextmanager
-async def open_cluster(settings: Settings, processes: bool = True, niceness: int = 0) -> AsyncIterator[Any]:
-    """Give a Dask client in the running event loop; ``processes=False`` and no scheduler, a thread of this process.
+async def open_cluster(
+    settings: Settings, processes: bool = True, niceness: int = 0
+) -> AsyncIterator[Any]:
+    """Give a Dask client in the running event loop; ``processes=False`` and no scheduler, a thread
+    of this process.
 
-    ``niceness``: how far the processes of this machine stand back behind others.
-    Raises InvalidInput for an address that is refused, OSError where the scheduler cannot be reached.
+    ``niceness``: how far the processes of this machine stand back behind others. Raises
+    InvalidInput for an address that is refused, OSError where the scheduler cannot be reached.
     """
     require_scheduler(settings)
     if not processes and not settings.dask_scheduler:
@@ -71,13 +84,25 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
     except ImportError:
         raise BackendMissing("distributed", "A sweep", install_extra("sweeps")) from None
 
-    # Every start and stop of a worker would be told; what goes wrong comes back as an exception, or as a lost chunk.
+    # Every start and stop of a worker would be told; what goes wrong comes back as an exception, or
+    # as a lost chunk.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if settings.dask_scheduler:
         files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
         ca, cert, key = (None if path is None else str(path) for path in files)
-        security = Security(tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key, require_encryption=True) if ca else None
-        options = {"asynchronous": True, "security": security, "timeout": _CONNECT_S, "set_as_default": False}
+        security = (
+            Security(
+                tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key, require_encryption=True
+            )
+            if ca
+            else None
+        )
+        options = {
+            "asynchronous": True,
+            "security": security,
+            "timeout": _CONNECT_S,
+            "set_as_default": False,
+        }
         async with Client(settings.dask_scheduler, **options) as client:
             yield client
         return
@@ -100,7 +125,8 @@ async def open_cluster(settings: Settings, processes: bool = True, niceness: int
 
 
 async def _keep_workers(cluster: Any) -> None:
-    """Replace, for ever, workers that have ended for good, which Dask leaves to whoever made the cluster.
+    """Replace, for ever, workers that have ended for good, which Dask leaves to whoever made the
+    cluster.
 
     A nanny ends when a successor of its worker could not be started.
     """
@@ -108,14 +134,20 @@ async def _keep_workers(cluster: Any) -> None:
 
     while True:
         await asyncio.sleep(_LOOK_S)
-        for name in [name for name, nanny in cluster.workers.items() if nanny.status in (Status.closed, Status.failed)]:
+        for name in [
+            name
+            for name, nanny in cluster.workers.items()
+            if nanny.status in (Status.closed, Status.failed)
+        ]:
             _LOG.warning("worker %s of the cluster has ended for good; another is started", name)
             del cluster.workers[name]
         cluster.scale(len(cluster.worker_spec))  # starts those that are not there
 
 
 def _preload(niceness: int) -> list[str]:
-    """Return what a worker runs once Dask is loaded; one that replaces another starts outside ``children_deaf``."""
+    """Return what a worker runs once Dask is loaded; one that replaces another starts outside
+    ``children_deaf``.
+    """
     code = ["import os, signal", "signal.signal(signal.SIGINT, signal.SIG_IGN)"]
     if niceness and hasattr(os, "setpriority"):
         code.append(f"os.setpriority(os.PRIO_PROCESS, 0, {niceness})")
@@ -125,16 +157,18 @@ def _preload(niceness: int) -> list[str]:
 def _configuration(preload: list[str]) -> dict[str, Any]:
     """Return what Dask is to do otherwise than by default."""
     return {
-        # A worker at its limit is ended. Paused, as Dask would have it before that, it would never go on.
+        # A worker at its limit is ended. Paused, as Dask would have it before that, it would never
+        # go on.
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
         "distributed.scheduler.allowed-failures": 2,
-        # So long after a worker was lost Dask looks whether there is a successor. Where that one is just being replaced itself,
-        # or takes long to start, its nanny would be closed, for good.
+        # So long after a worker was lost Dask looks whether there is a successor. Where that one is
+        # just being replaced itself, or takes long to start, its nanny would be closed, for good.
         "distributed.deploy.lost-worker-timeout": "1000 days",
         "distributed.comm.timeouts.connect": _CONNECT_S,
-        # As often as Dask looks after itself by default, a cluster without work takes a seventh of a processor.
+        # As often as Dask looks after itself by default, a cluster without work takes a seventh of
+        # a processor.
         "distributed.admin.tick.interval": "1s",
         "distributed.admin.system-monitor.interval": "10s",
         "distributed.worker.memory.monitor-interval": "500ms",

@@ -15,8 +15,10 @@ from veselova.version import __version__
 
 __all__ = ["ThisProcess", "seconds_of"]
 
-#: Problems that are computed to see what others cost: of those that are computed together, and of others.
-_TOGETHER, _SINGLE = 20, 2
+#: Problems that are computed to see what others cost: of those that are computed together, and of
+#: others.
+_TOGETHER = 20
+_SINGLE = 2
 
 #: Problems between two looks at whether anybody waits, where they are computed one by one.
 _PART = 4
@@ -33,7 +35,9 @@ class ThisProcess:
         return {"this process": 1}
 
     async def compute(self, job: Job, start: int, stop: int) -> list[Chunk]:
-        """Return the answers to the problems start … stop−1 of a job, in parts; ends between two once nobody waits."""
+        """Return the answers to the problems start … stop−1 of a job, in parts; ends between two
+        once nobody waits.
+        """
         rows = stop - start if job.sweep.tori_at_once else _PART
         stopping = Event()
 
@@ -53,13 +57,16 @@ class ThisProcess:
 
 
 def seconds_of(request: SweepRequest, enough: float) -> float:
-    """Return about how many seconds of a processor a sweep takes, from problems spread over it; beyond ``enough`` any number.
+    """Return about how many seconds of a processor a sweep takes, from problems spread over it;
+    beyond ``enough`` any number.
 
     Costs what those problems cost, of which none is begun after so many seconds.
     """
     rows = min(request.total, _TOGETHER if request.tori_at_once else _SINGLE)
-    compute_chunk(request.canonical, 0, 1, __version__)  # what is loaded and compiled at first is needed in any case
-    began, passed = time.thread_time(), 0.0
+    # what is loaded and compiled at first is needed in any case
+    compute_chunk(request.canonical, 0, 1, __version__)
+    began = time.thread_time()
+    passed = 0.0
     for start in (0, (request.total - rows) // 2, request.total - rows):
         compute_chunk(request.canonical, start, start + rows, __version__)
         passed = time.thread_time() - began

@@ -1,4 +1,6 @@
-"""Whether a new job has room: the limits of a server and of an owner, held against what was promised to other jobs."""
+"""Whether a new job has room: the limits of a server and of an owner, held against what was
+promised to other jobs.
+"""
 
 from __future__ import annotations
 
@@ -23,36 +25,68 @@ def promised_bytes(sweep: SweepPlan | SweepRequest) -> int:
     return sweep.total * sweep.row_values * 8 + len(sweep.canonical)
 
 
-def require_room(connection: sa.Connection, sweep: SweepPlan | SweepRequest, job_id: str, owner: str, settings: Settings) -> None:
-    """Raise InvalidInput where a sweep is beyond what this server takes from anybody, Refused (``too-many-jobs``,
-    ``storage-full``) where its job has no room beside the others.
+def require_room(
+    connection: sa.Connection,
+    sweep: SweepPlan | SweepRequest,
+    job_id: str,
+    owner: str,
+    settings: Settings,
+) -> None:
+    """Raise InvalidInput where a sweep is beyond what this server takes from anybody, Refused
+    (``too-many-jobs``, ``storage-full``) where its job has no room beside the others.
 
-    ``connection`` is in a transaction that no other of its kind runs beside, so that no two jobs are promised the same room.
+    ``connection`` is in a transaction that no other of its kind runs beside, so that no two jobs
+    are promised the same room.
     """
     size = promised_bytes(sweep)
     if sweep.total > settings.max_sweep_problems:
-        raise InvalidInput(("vary",), f"at most {settings.max_sweep_problems} problems on this server", str(sweep.total))
+        raise InvalidInput(
+            ("vary",),
+            f"at most {settings.max_sweep_problems} problems on this server",
+            str(sweep.total),
+        )
     if size > settings.max_sweep_bytes:
         room = f"at most {settings.max_sweep_bytes} bytes of results on this server"
-        raise InvalidInput(("trajectories" if sweep.trajectories else "vary",), room, f"about {size}")
+        raise InvalidInput(
+            ("trajectories" if sweep.trajectories else "vary",), room, f"about {size}"
+        )
     others = jobs.c.id != job_id
-    of_all, of_owner = _count_taken(connection, others), _count_taken(connection, others & (jobs.c.owner == owner))
+    of_all = _count_taken(connection, others)
+    of_owner = _count_taken(connection, others & (jobs.c.owner == owner))
     if of_all.waiting >= settings.max_jobs:
-        raise Refused("too-many-jobs", f"{of_all.waiting} jobs are waiting or running; try again later.", retry_after=30)
+        raise Refused(
+            "too-many-jobs",
+            f"{of_all.waiting} jobs are waiting or running; try again later.",
+            retry_after=30,
+        )
     if owner and of_owner.waiting >= settings.max_jobs_per_key:
-        detail = f"{of_owner.waiting} jobs of this key are waiting or running; try again when one has ended."
+        detail = (
+            f"{of_owner.waiting} jobs of this key are waiting or running; try again when one "
+            "has ended."
+        )
         raise Refused("too-many-jobs", detail, retry_after=30)
     if owner and size + of_owner.bytes > settings.max_stored_bytes_per_key:
-        detail = f"The jobs of this key take {of_owner.bytes} bytes, and this one may take {size}: at most "
+        detail = (
+            f"The jobs of this key take {of_owner.bytes} bytes, and this one may take {size}: "
+            "at most "
+        )
         detail += f"{settings.max_stored_bytes_per_key} in all; remove some (DELETE …?remove=true)."
         raise Refused("storage-full", detail)
     if size + of_all.bytes > settings.max_stored_bytes:
-        detail = "The results of earlier jobs take the room that this server has for them; remove some (DELETE …?remove=true)."
+        detail = (
+            "The results of earlier jobs take the room that this server has for them; remove "
+            "some (DELETE …?remove=true)."
+        )
         raise Refused("storage-full", detail)
 
 
 def _count_taken(connection: sa.Connection, which: sa.ColumnElement[bool]) -> Any:
-    """Return the number of jobs that wait or run, as ``waiting``, and the bytes that all have or were promised, as ``bytes``."""
+    """Return the number of jobs that wait or run, as ``waiting``, and the bytes that all have or
+    were promised, as ``bytes``.
+    """
     going_on = sa.func.sum(sa.case((jobs.c.state.not_in(ENDED), 1), else_=0))
-    numbers = (sa.func.coalesce(going_on, 0).label("waiting"), sa.func.coalesce(sa.func.sum(jobs.c.bytes), 0).label("bytes"))
+    numbers = (
+        sa.func.coalesce(going_on, 0).label("waiting"),
+        sa.func.coalesce(sa.func.sum(jobs.c.bytes), 0).label("bytes"),
+    )
     return connection.execute(sa.select(*numbers).where(which)).one()

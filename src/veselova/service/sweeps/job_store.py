@@ -1,4 +1,6 @@
-"""Jobs as they are kept: what was asked, by whom, what is done, and the files of the finished chunks."""
+"""Jobs as they are kept: what was asked, by whom, what is done, and the files of the finished
+chunks.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,14 @@ import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
 from veselova.mechanics.core.errors import InvalidInput, VeselovaError
-from veselova.service.access.database import chunks, connect, idempotency_keys, in_utc, jobs, writing
+from veselova.service.access.database import (
+    chunks,
+    connect,
+    idempotency_keys,
+    in_utc,
+    jobs,
+    writing,
+)
 from veselova.service.access.sqlite_file import vacuum
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -33,13 +42,19 @@ _LISTED = 100
 
 #: What is asked of the database about a job: all but its request.
 _STATUS_COLUMNS = [column.name for column in jobs.c if column is not jobs.c.request]
-_DONE = sa.select(sa.func.coalesce(sa.func.sum(chunks.c.rows), 0)).where(chunks.c.job_id == jobs.c.id).scalar_subquery()
+_DONE = (
+    sa.select(sa.func.coalesce(sa.func.sum(chunks.c.rows), 0))
+    .where(chunks.c.job_id == jobs.c.id)
+    .scalar_subquery()
+)
 _STATUS = sa.select(*(jobs.c[name] for name in _STATUS_COLUMNS), _DONE.label("done"))
 
 
 @dataclass(frozen=True)
 class JobStatus:
-    """How far a sweep is, as the database knows it. ``done`` counts the problems in finished chunks."""
+    """How far a sweep is, as the database knows it. ``done`` counts the problems in finished
+    chunks.
+    """
 
     id: str
     state: str
@@ -80,13 +95,17 @@ class Job(JobStatus):
 
 
 class JobEnded(Exception):
-    """A job that goes on no more: it was cancelled or removed, perhaps by another server, while this one worked at it."""
+    """A job that goes on no more: it was cancelled or removed, perhaps by another server, while
+    this one worked at it.
+    """
 
 
 class Jobs(JobFiles):
-    """The jobs of one database and one folder. A chunk counts when its file is on the disk and its hash in the database.
+    """The jobs of one database and one folder. A chunk counts when its file is on the disk and its
+    hash in the database.
 
-    Where an ``owner`` is asked for, jobs of another are as good as absent; None stands for all of them.
+    Where an ``owner`` is asked for, jobs of another are as good as absent; None stands for all of
+    them.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -99,22 +118,35 @@ class Jobs(JobFiles):
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(self, sweep: SweepPlan | SweepRequest, key: str | None = None, owner: str = "") -> Job:
-        """Return the owner's job of a sweep: a new one, or the one that the same request made, which goes on if it had been
-        stopped, and is run again if its results were lost.
+    def submit(
+        self, sweep: SweepPlan | SweepRequest, key: str | None = None, owner: str = ""
+    ) -> Job:
+        """Return the owner's job of a sweep: a new one, or the one that the same request made,
+        which goes on if it had been stopped, and is run again if its results were lost.
 
-        ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or beyond the limits of the settings,
+        ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
+        beyond the limits of the settings,
         Refused (``too-many-jobs``, ``storage-full``) while others take the room.
         """
-        job_id, size = job_id_of(sweep, owner), promised_bytes(sweep)
+        job_id = job_id_of(sweep, owner)
+        size = promised_bytes(sweep)
         with writing(self._engine, "submissions") as connection:
             if key is not None:
-                _claim(connection, {"owner": owner, "key": key, "job_id": job_id, "created_at": datetime.now(UTC)})
+                _claim(
+                    connection,
+                    {"owner": owner, "key": key, "job_id": job_id, "created_at": datetime.now(UTC)},
+                )
             state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
             if state is None:
                 require_room(connection, sweep, job_id, owner, self._settings)
-                connection.execute(sa.insert(jobs).values({**_new(sweep), "id": job_id, "owner": owner, "bytes": size}))
-            elif state in ("failed", "cancelled") or (state == "finished" and not self.result_path(job_id).exists()):
+                connection.execute(
+                    sa.insert(jobs).values(
+                        {**_new(sweep), "id": job_id, "owner": owner, "bytes": size}
+                    )
+                )
+            elif state in ("failed", "cancelled") or (
+                state == "finished" and not self.result_path(job_id).exists()
+            ):
                 require_room(connection, sweep, job_id, owner, self._settings)
                 again = {"state": "queued", "detail": "", "finished_at": None, "bytes": size}
                 connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(again))
@@ -133,7 +165,11 @@ class Jobs(JobFiles):
         found = None
         if _ID.fullmatch(job_id):
             with self._engine.connect() as connection:
-                found = connection.execute(_of(query.where(jobs.c.id == job_id), owner)).mappings().first()
+                found = (
+                    connection.execute(_of(query.where(jobs.c.id == job_id), owner))
+                    .mappings()
+                    .first()
+                )
         if found is None:
             shown = job_id[:40].encode("utf-8", "replace").decode()
             raise Refused("no-such-job", f"There is no job {shown}.")
@@ -142,7 +178,11 @@ class Jobs(JobFiles):
     def unfinished(self) -> list[str]:
         """Return the jobs that are to go on, oldest first."""
         with self._engine.connect() as connection:
-            query = sa.select(jobs.c.id).where(jobs.c.state.not_in(ENDED)).order_by(jobs.c.created_at, jobs.c.id)
+            query = (
+                sa.select(jobs.c.id)
+                .where(jobs.c.state.not_in(ENDED))
+                .order_by(jobs.c.created_at, jobs.c.id)
+            )
             return list(connection.execute(query).scalars())
 
     def newest(self, owner: str | None = None) -> list[JobStatus]:
@@ -152,7 +192,9 @@ class Jobs(JobFiles):
             return [JobStatus(**_status(row)) for row in connection.execute(query).mappings()]
 
     def require_writable(self) -> None:
-        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless the folder can."""
+        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless
+        the folder can.
+        """
         write_whole(self.folder / "probe", bytes(4096))
         with writing(self._engine) as connection:
             connection.execute(sa.update(jobs).where(jobs.c.id == "").values(detail=""))
@@ -169,50 +211,90 @@ class Jobs(JobFiles):
         An ended job has the bytes that it takes in place of those which were promised to it.
         """
         # Neither half of a surrogate pair nor, on PostgreSQL, a NUL can be stored.
-        changed: dict[str, Any] = {"state": state, "detail": detail[:2000].encode("utf-8", "replace").decode().replace("\0", "")}
+        changed: dict[str, Any] = {
+            "state": state,
+            "detail": detail[:2000].encode("utf-8", "replace").decode().replace("\0", ""),
+        }
         if state in ENDED:
-            changed |= {"finished_at": datetime.now(UTC), "bytes": self.size(job_id) + sa.func.length(jobs.c.request)}
+            changed |= {
+                "finished_at": datetime.now(UTC),
+                "bytes": self.size(job_id) + sa.func.length(jobs.c.request),
+            }
         with writing(self._engine) as connection:
-            query = sa.update(jobs).where(jobs.c.id == job_id, jobs.c.state.not_in(ENDED)).values(changed)
+            query = (
+                sa.update(jobs)
+                .where(jobs.c.id == job_id, jobs.c.state.not_in(ENDED))
+                .values(changed)
+            )
             return connection.execute(query).rowcount > 0
 
     def remove(self, job_id: str) -> None:
-        """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on, asked for again meanwhile."""
+        """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on,
+        asked for again meanwhile.
+        """
         with writing(self._engine) as connection:
-            removed = connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED))).rowcount
+            removed = connection.execute(
+                sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED))
+            ).rowcount
         if not removed:
-            raise Refused("not-finished", "The job has been asked for again and goes on; cancel it first.", retry_after=2)
+            raise Refused(
+                "not-finished",
+                "The job has been asked for again and goes on; cancel it first.",
+                retry_after=2,
+            )
         self.remove_files(job_id)
 
     def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
-        """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises JobEnded for a job that has ended."""
+        """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises
+        JobEnded for a job that has ended.
+        """
         with self._engine.connect() as connection:
             state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
         if state is None or state in ENDED:
             raise JobEnded(f"the job is {state or 'removed'}")
         write_whole(self.chunk_path(job_id, position), table)
-        values = {"job_id": job_id, "position": position, "rows": rows, "sha256": hashlib.sha256(table).hexdigest()}
+        values = {
+            "job_id": job_id,
+            "position": position,
+            "rows": rows,
+            "sha256": hashlib.sha256(table).hexdigest(),
+        }
         with writing(self._engine) as connection:
-            connection.execute(sa.delete(chunks).where(chunks.c.job_id == job_id, chunks.c.position == position))
+            connection.execute(
+                sa.delete(chunks).where(chunks.c.job_id == job_id, chunks.c.position == position)
+            )
             connection.execute(sa.insert(chunks).values(values))
 
     def missing(self, job: Job) -> list[int]:
-        """Return the chunks that are still to be computed; those whose file is lost or damaged are forgotten first."""
+        """Return the chunks that are still to be computed; those whose file is lost or damaged are
+        forgotten first.
+        """
         self.remove_parts(job.id)
         if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
             return []
         with self._engine.connect() as connection:
             query = sa.select(chunks.c.position, chunks.c.sha256).where(chunks.c.job_id == job.id)
-            stored = {int(position): str(digest) for position, digest in connection.execute(query).all()}
-        damaged = [position for position, digest in stored.items() if self.digest(job.id, position) != digest]
+            stored = {
+                int(position): str(digest) for position, digest in connection.execute(query).all()
+            }
+        damaged = [
+            position
+            for position, digest in stored.items()
+            if self.digest(job.id, position) != digest
+        ]
         if damaged:
             with writing(self._engine) as connection:
                 which = (chunks.c.job_id == job.id) & chunks.c.position.in_(damaged)
                 connection.execute(sa.delete(chunks).where(which))
-        return [position for position in range(job.chunk_count) if position not in stored or position in damaged]
+        return [
+            position
+            for position in range(job.chunk_count)
+            if position not in stored or position in damaged
+        ]
 
     def remove_old(self, now: datetime) -> int:
-        """Forget the jobs that ended, and the idempotency keys that came, longer ago than the settings say; return how many jobs.
+        """Forget the jobs that ended, and the idempotency keys that came, longer ago than the
+        settings say; return how many jobs.
 
         The room that they took goes back to the disk.
         """
@@ -223,13 +305,19 @@ class Jobs(JobFiles):
                 found = list(connection.execute(sa.select(jobs.c.id).where(old)).scalars())
             for job_id in found:
                 with writing(self._engine) as connection:
-                    gone = connection.execute(sa.delete(jobs).where(old, jobs.c.id == job_id)).rowcount
+                    gone = connection.execute(
+                        sa.delete(jobs).where(old, jobs.c.id == job_id)
+                    ).rowcount
                 if gone:
                     removed += 1
                     self.remove_files(job_id)
         if days := self._settings.retain_idempotency_days:
             with writing(self._engine) as connection:
-                connection.execute(sa.delete(idempotency_keys).where(idempotency_keys.c.created_at < now - timedelta(days=days)))
+                connection.execute(
+                    sa.delete(idempotency_keys).where(
+                        idempotency_keys.c.created_at < now - timedelta(days=days)
+                    )
+                )
         vacuum(self._engine)
         return removed
 
@@ -241,15 +329,22 @@ class Jobs(JobFiles):
         for job_id, state in found:
             size = self.size(job_id) + len(self.get(job_id).request)
             if state not in ENDED:
-                with suppress(VeselovaError):  # of a version whose requests were others: it will fail when it is run
+                # of a version whose requests were others: it will fail when it is run
+                with suppress(VeselovaError):
                     size = promised_bytes(self.get(job_id).sweep)
             with writing(self._engine) as connection:
-                connection.execute(sa.update(jobs).where(jobs.c.id == job_id, uncounted).values(bytes=size))
+                connection.execute(
+                    sa.update(jobs).where(jobs.c.id == job_id, uncounted).values(bytes=size)
+                )
 
 
 def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
-    """Return the id of an owner's job of a sweep: the same request of another owner is another job."""
-    return sweep.id if not owner else hashlib.sha256(f"{owner} {sweep.id}".encode()).hexdigest()[:32]
+    """Return the id of an owner's job of a sweep: the same request of another owner
+    is another job.
+    """
+    return (
+        sweep.id if not owner else hashlib.sha256(f"{owner} {sweep.id}".encode()).hexdigest()[:32]
+    )
 
 
 def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
@@ -258,7 +353,11 @@ def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
 
 def _status(row: sa.RowMapping) -> dict[str, Any]:
     times = {name: row[name] and in_utc(row[name]) for name in ("created_at", "finished_at")}
-    return {**{column: row[column] for column in _STATUS_COLUMNS}, **times, "done": int(row["done"])}
+    return {
+        **{column: row[column] for column in _STATUS_COLUMNS},
+        **times,
+        "done": int(row["done"]),
+    }
 
 
 def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
@@ -272,12 +371,21 @@ def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
 
 
 def _claim(connection: sa.Connection, row: dict[str, Any]) -> None:
-    """Write which job an Idempotency-Key stands for, and raise InvalidInput where it stands for another.
+    """Write which job an Idempotency-Key stands for, and raise InvalidInput where it stands for
+    another.
 
-    The row comes before the job: of two requests at once the primary key lets one in, and the other finds what it wrote.
+    The row comes before the job: of two requests at once the primary key lets one in, and the other
+    finds what it wrote.
     """
     dialect: Any = postgresql if connection.dialect.name == "postgresql" else sqlite
     connection.execute(dialect.insert(idempotency_keys).values(row).on_conflict_do_nothing())
     same = (idempotency_keys.c.owner == row["owner"]) & (idempotency_keys.c.key == row["key"])
-    if connection.execute(sa.select(idempotency_keys.c.job_id).where(same)).scalar() != row["job_id"]:
-        raise InvalidInput(("Idempotency-Key",), "a key of its own for every request", "one that came with another request")
+    if (
+        connection.execute(sa.select(idempotency_keys.c.job_id).where(same)).scalar()
+        != row["job_id"]
+    ):
+        raise InvalidInput(
+            ("Idempotency-Key",),
+            "a key of its own for every request",
+            "one that came with another request",
+        )

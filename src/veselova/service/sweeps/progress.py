@@ -10,7 +10,9 @@ __all__ = ["Progress"]
 
 @dataclass
 class Progress:
-    """How far a running job is: problems done before this process took it, and since; what it waits for, if anything."""
+    """How far a running job is: problems done before this process took it, and since; what it waits
+    for, if anything.
+    """
 
     began: float
     before: int

@@ -1,4 +1,6 @@
-"""The results of a job on the disk: a table of all problems as Parquet, and the kept trajectories as a Zarr store."""
+"""The results of a job on the disk: a table of all problems as Parquet, and the kept trajectories
+as a Zarr store.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from veselova.service.sweeps.job_store import Job, Jobs
 
 __all__ = ["Result", "table_stream"]
 
-#: Rows of one row group: what a reader has in memory at a time. It does not depend on the chunks of the computation.
+#: Rows of one row group: what a reader has in memory at a time. It does not depend on the chunks of
+#: the computation.
 _GROUP_ROWS = 65_536
 
 
@@ -30,7 +33,9 @@ class Result:
         self._making = threading.Lock()
 
     def store(self, position: int, parts: list[Chunk]) -> None:
-        """Keep the answers of one chunk, in one part or more: the arrays first, for the table says that they are there."""
+        """Keep the answers of one chunk, in one part or more: the arrays first, for the table says
+        that they are there.
+        """
         row = self._job.rows(position)[0]
         for part in parts:
             if part.arrays:
@@ -41,7 +46,9 @@ class Result:
         self._jobs.store(self._job.id, position, sum(part.rows for part in parts), _join(parts))
 
     def _store_arrays(self, row: int, part: Chunk) -> None:
-        """Write arrays into their rows of the store; chunks of the computation are chunks of the store, so no two write one."""
+        """Write arrays into their rows of the store; chunks of the computation are chunks of the
+        store, so no two write one.
+        """
         import zarr
 
         for name, values in part.arrays.items():
@@ -52,17 +59,23 @@ class Result:
             with self._making:  # by one of the threads that store chunks
                 group = zarr.open_group(self._jobs.trajectories_path(self._job.id), mode="a")
                 if name not in group:
-                    group.create_array(name, chunks=chunks, fill_value=float("nan"), dimension_names=names, **kind)
+                    group.create_array(
+                        name, chunks=chunks, fill_value=float("nan"), dimension_names=names, **kind
+                    )
             array = group.require_array(name, **kind)
             array[row : row + part.rows] = values
 
     def finish(self) -> None:
-        """Make the table of all problems, and of the trajectories one file; what was made before is left as it is.
+        """Make the table of all problems, and of the trajectories one file; what was made before is
+        left as it is.
 
         At last the chunks go, of which all was made.
         """
         path = self._jobs.result_path(self._job.id)
-        chunks = [self._jobs.chunk_path(self._job.id, position) for position in range(self._job.chunk_count)]
+        chunks = [
+            self._jobs.chunk_path(self._job.id, position)
+            for position in range(self._job.chunk_count)
+        ]
         if not path.exists():
             _concatenate(chunks, path)
         store = self._jobs.trajectories_path(self._job.id)
@@ -75,7 +88,9 @@ class Result:
 
 
 def table_stream(path: Path, form: str) -> Iterator[bytes]:
-    """Yield the table of a finished job as ``csv`` or as an ``arrow`` stream, a group of rows at a time."""
+    """Yield the table of a finished job as ``csv`` or as an ``arrow`` stream, a group of rows at a
+    time.
+    """
     import pyarrow as pa
     from pyarrow import csv, ipc, parquet
 
@@ -109,12 +124,19 @@ def _join(parts: list[Chunk]) -> bytes:
 
 
 def _concatenate(paths: list[Path], target: Path) -> None:
-    """Write the tables one after the other into one, row group by row group, columns in the order of their first appearance."""
+    """Write the tables one after the other into one, row group by row group, columns in the order
+    of their first appearance.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
-    schema = pa.unify_schemas([parquet.read_schema(path) for path in paths], promote_options="permissive")
-    with atomic_file(target) as part, parquet.ParquetWriter(part, schema, compression="zstd") as writer:
+    schema = pa.unify_schemas(
+        [parquet.read_schema(path) for path in paths], promote_options="permissive"
+    )
+    with (
+        atomic_file(target) as part,
+        parquet.ParquetWriter(part, schema, compression="zstd") as writer,
+    ):
         for group in _groups(paths, schema):
             writer.write_table(group, row_group_size=_GROUP_ROWS)
 
@@ -123,21 +145,31 @@ def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
     import pyarrow as pa
     from pyarrow import parquet
 
-    held, rows = [schema.empty_table()], 0
+    held = [schema.empty_table()]
+    rows = 0
     for path in paths:
-        table = pa.concat_tables([schema.empty_table(), parquet.read_table(path)], promote_options="permissive")
-        held, rows = [*held, table.select(schema.names).cast(schema)], rows + table.num_rows
+        table = pa.concat_tables(
+            [schema.empty_table(), parquet.read_table(path)], promote_options="permissive"
+        )
+        held = [*held, table.select(schema.names).cast(schema)]
+        rows = rows + table.num_rows
         while rows >= _GROUP_ROWS:
             joined = pa.concat_tables(held)
             yield joined.slice(0, _GROUP_ROWS)
-            held, rows = [joined.slice(_GROUP_ROWS)], rows - _GROUP_ROWS
+            held = [joined.slice(_GROUP_ROWS)]
+            rows = rows - _GROUP_ROWS
     if rows:
         yield pa.concat_tables(held)
 
 
 def _pack(store: Path, target: Path) -> None:
-    """Put a Zarr store into one file, in an order and with dates that depend on nothing but its content."""
+    """Put a Zarr store into one file, in an order and with dates that depend on nothing but its
+    content.
+    """
     with atomic_file(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as archive:
         for path in sorted(path for path in store.rglob("*") if path.is_file()):
-            with path.open("rb") as source, archive.open(zipfile.ZipInfo(path.relative_to(store).as_posix()), "w") as entry:
+            with (
+                path.open("rb") as source,
+                archive.open(zipfile.ZipInfo(path.relative_to(store).as_posix()), "w") as entry,
+            ):
                 shutil.copyfileobj(source, entry)

@@ -1,4 +1,6 @@
-"""The running of jobs: chunks go to the cluster, and what comes back is stored at once and never computed again."""
+"""The running of jobs: chunks go to the cluster, and what comes back is stored at once and never
+computed again.
+"""
 
 from __future__ import annotations
 
@@ -57,10 +59,17 @@ class _NoCluster(Exception):
 
 
 class Sweeps:
-    """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its process, whatever ends that."""
+    """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its
+    process, whatever ends that.
+    """
 
     def __init__(
-        self, settings: Settings, jobs: Jobs, processes: bool = True, niceness: int = 0, tries: int | None = None
+        self,
+        settings: Settings,
+        jobs: Jobs,
+        processes: bool = True,
+        niceness: int = 0,
+        tries: int | None = None,
     ) -> None:
         """``tries``: how often a job asks for a cluster before it fails; for ever when left out."""
         self.jobs = jobs
@@ -95,7 +104,9 @@ class Sweeps:
                 self.begin(job_id)
 
     async def watch(self) -> None:
-        """Take up, for ever, what another server begins or leaves unfinished, and forget what ended long ago."""
+        """Take up, for ever, what another server begins or leaves unfinished, and forget what ended
+        long ago.
+        """
         tidied = -math.inf
         while True:
             await asyncio.sleep(_WATCH_S)
@@ -103,13 +114,17 @@ class Sweeps:
                 await self.resume()
                 if time.monotonic() - tidied > _TIDY_S:
                     tidied = time.monotonic()
-                    if removed := await anyio.to_thread.run_sync(self.jobs.remove_old, datetime.now(UTC)):
+                    if removed := await anyio.to_thread.run_sync(
+                        self.jobs.remove_old, datetime.now(UTC)
+                    ):
                         _LOG.info("%d jobs that ended long ago were removed", removed)
             except (OSError, SQLAlchemyError) as error:
                 _LOG.warning("the jobs could not be read: %s", error)
 
     def begin(self, job_id: str) -> None:
-        """Run a job; one that runs already is looked at again at its end, for it may be stopping just now."""
+        """Run a job; one that runs already is looked at again at its end, for it may be stopping
+        just now.
+        """
         if job_id in self._tasks:
             self._again.add(job_id)
             return
@@ -170,7 +185,13 @@ class Sweeps:
                 _LOG.info("job %s is given up: %s", job_id, error)
             except Exception:
                 _LOG.exception("job %s failed", job_id)
-                await self._persist(job_id, self.jobs.advance, job_id, "failed", "an unexpected error; it has been logged")
+                await self._persist(
+                    job_id,
+                    self.jobs.advance,
+                    job_id,
+                    "failed",
+                    "an unexpected error; it has been logged",
+                )
             finally:
                 lock.release()
                 self._progress.pop(job_id, None)
@@ -184,9 +205,11 @@ class Sweeps:
         if not await self._persist(job_id, self.jobs.advance, job_id, "running"):
             return
         result = Result(self.jobs, job)
-        pause, tries = _FIRST_PAUSE_S, 0
+        pause = _FIRST_PAUSE_S
+        tries = 0
         while missing:
-            client, tries = None, tries + 1
+            client = None
+            tries = tries + 1
             try:
                 client = await self._open_cluster()
                 await self._compute(client, job, result, missing)
@@ -204,8 +227,11 @@ class Sweeps:
         await self._persist(job_id, self.jobs.advance, job_id, "finished")
 
     async def _compute(self, client: Any, job: Job, result: Result, missing: list[int]) -> None:
-        """Send the missing chunks to the cluster, a few ahead, and store what comes back. Raises OSError when it is lost."""
-        waiting, at_work = list(reversed(missing)), set[asyncio.Task[None]]()
+        """Send the missing chunks to the cluster, a few ahead, and store what comes back. Raises
+        OSError when it is lost.
+        """
+        waiting = list(reversed(missing))
+        at_work = set[asyncio.Task[None]]()
         try:
             while waiting or at_work:
                 # A worker that died is missing for a moment; the others, or its successor, go on.
@@ -217,8 +243,12 @@ class Sweeps:
                 share = max(1, _AHEAD * max(1, workers) // max(1, self._turns.held_by(job.owner)))
                 room = share - len(at_work)
                 for _ in range(min(room, len(waiting))):
-                    at_work.add(asyncio.create_task(self._chunk(client, job, result, waiting.pop())))
-                finished, at_work = await asyncio.wait(at_work, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED)
+                    at_work.add(
+                        asyncio.create_task(self._chunk(client, job, result, waiting.pop()))
+                    )
+                finished, at_work = await asyncio.wait(
+                    at_work, timeout=_LOOK_S, return_when=asyncio.FIRST_COMPLETED
+                )
                 if failures := [error for task in finished if (error := task.exception())]:
                     raise failures[0]
         finally:
@@ -254,7 +284,8 @@ class Sweeps:
                 _LOG.warning("the cluster did not close in order", exc_info=True)
 
     async def _persist(self, job_id: str, call: Callable[..., T], *arguments: Any) -> T:
-        """Return what a call that stores or reads gives, trying again for as long as the disk or the database refuse.
+        """Return what a call that stores or reads gives, trying again for as long as the disk or
+        the database refuse.
 
         A cancellation waits for the call, whose thread would go on behind it.
         """
@@ -283,7 +314,9 @@ class Sweeps:
 
 
 def _take_lock(lock: FileLock) -> bool:
-    """Take the lock of a job, whose folder is made first; return whether no other process holds it."""
+    """Take the lock of a job, whose folder is made first; return whether no other
+    process holds it.
+    """
     Path(lock.lock_file).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     try:
         lock.acquire()

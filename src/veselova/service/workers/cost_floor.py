@@ -1,8 +1,10 @@
-"""What a request costs at the least, in seconds and in memory, from its size alone: points × n² × digits.
+"""What a request costs at the least, in seconds and in memory, from its size alone: points × n² ×
+digits.
 
-The constants are floors, the smallest cost of any measured request (``python benchmarks/estimates.py`` measures them again), so
-that a request is only refused when it is hopeless. What a problem adds to its size (a stiff flow, a far time, a narrow gap)
-is not known before the work; the budget ends that.
+The constants are floors, the smallest cost of any measured request (``python
+benchmarks/estimates.py`` measures them again), so that a request is only refused when it is
+hopeless. What a problem adds to its size (a stiff flow, a far time, a narrow gap) is not known
+before the work; the budget ends that.
 """
 
 from __future__ import annotations
@@ -19,12 +21,16 @@ __all__ = ["Cost", "cost", "require_hope"]
 #: Seconds for each time and n², by engine, in double precision.
 _SECONDS = {"analytic": 7e-7, "numeric": 9e-8}
 
-#: Seconds for each time, n² and FEWEST_DIGITS digits beyond double precision; and for the set-up, for each n, at that many
-#: digits, where it grows like digits^1.5.
-_SECONDS_EXACT, _SET_UP_EXACT, _SET_UP_POWER = 2.5e-5, 3e-3, 1.5
+#: Seconds for each time, n² and FEWEST_DIGITS digits beyond double precision; and for the set-up,
+#: for each n, at that many digits, where it grows like digits^1.5.
+_SECONDS_EXACT = 2.5e-5
+_SET_UP_EXACT = 3e-3
+_SET_UP_POWER = 1.5
 
-#: Bytes for each time and n²: the frame, ω, and as much again while they are computed; a decimal is an object of its own.
-_BYTES, _BYTES_DECIMAL = 32, 400
+#: Bytes for each time and n²: the frame, ω, and as much again while they are computed; a decimal is
+#: an object of its own.
+_BYTES = 32
+_BYTES_DECIMAL = 400
 
 
 class Cost(NamedTuple):
@@ -36,7 +42,8 @@ class Cost(NamedTuple):
 
 def cost(request: ComparisonRequest) -> Cost:
     """Return the least cost of a motion, or of two for a comparison."""
-    n, points = request.problem.dimension, request.time_count()
+    n = request.problem.dimension
+    points = request.time_count()
     entries = float(points) * n * n
     if not isinstance(request, TrajectoryRequest):
         return Cost(entries * sum(_SECONDS.values()), 2 * entries * _BYTES / MEGABYTE)
@@ -48,11 +55,20 @@ def cost(request: ComparisonRequest) -> Cost:
 
 
 def require_hope(request: ComparisonRequest, settings: Settings) -> None:
-    """Raise InvalidInput where even the least cost is beyond the budget, by the slack of the settings, or beyond the memory."""
+    """Raise InvalidInput where even the least cost is beyond the budget, by the slack of the
+    settings, or beyond the memory.
+    """
     seconds, megabytes = cost(request)
     if settings.estimate_slack and seconds > settings.estimate_slack * request.budget_s:
-        required = f"fewer times or digits, or more than budget_s = {request.budget_s:g} (at most {settings.max_budget_s:g})"
+        required = (
+            f"fewer times or digits, or more than budget_s = {request.budget_s:g} (at most "
+            f"{settings.max_budget_s:g})"
+        )
         raise InvalidInput(("times",), required, f"work for {seconds:.3g} s or more, as estimated")
     if megabytes > settings.worker_memory_mb:
-        required = f"what {settings.worker_memory_mb} MB, the memory of a worker on this server, can hold"
-        raise InvalidInput(("times",), required, f"work for {megabytes:.3g} MB or more, as estimated")
+        required = (
+            f"what {settings.worker_memory_mb} MB, the memory of a worker on this server, can hold"
+        )
+        raise InvalidInput(
+            ("times",), required, f"work for {megabytes:.3g} MB or more, as estimated"
+        )

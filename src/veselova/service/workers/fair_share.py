@@ -1,4 +1,6 @@
-"""Places that several callers share, whoever asks most: free ones go to the caller who has fewest, then to who waits longest."""
+"""Places that several callers share, whoever asks most: free ones go to the caller who has fewest,
+then to who waits longest.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +14,17 @@ __all__ = ["Shares"]
 
 
 class Shares:
-    """So many places, of which one caller may hold ``most_each``; a caller who holds none may exceed them with ``first_free``."""
+    """So many places, of which one caller may hold ``most_each``; a caller who holds none may
+    exceed them with ``first_free``.
+    """
 
     def __init__(self, places: int, most_each: int, first_free: bool = False) -> None:
         self.places = places
         self._most_each = most_each
         self._first_free = first_free
         self._held: Counter[str] = Counter()
-        #: Who waits, those served longest ago first, each with what tells its requests that they have a place.
+        #: Who waits, those served longest ago first, each with what tells its requests that they
+        #: have a place.
         self._queues: OrderedDict[str, deque[anyio.Event]] = OrderedDict()
 
     @property
@@ -47,7 +52,9 @@ class Shares:
         return self.held < self.places and self._held[caller] < self._most_each
 
     async def acquire(self, caller: str) -> None:
-        """Take a place, and wait for one where that has to be; with a place to be had, without giving way to other tasks."""
+        """Take a place, and wait for one where that has to be; with a place to be had, without
+        giving way to other tasks.
+        """
         if self.has_place_for(caller):
             self._held[caller] += 1
             return

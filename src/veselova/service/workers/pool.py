@@ -1,4 +1,6 @@
-"""Killable work: every computation runs in a worker process of bounded memory that is ended when its budget is used up."""
+"""Killable work: every computation runs in a worker process of bounded memory that is ended when
+its budget is used up.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ __all__ = ["Workers"]
 
 _LOG = logging.getLogger("veselova.service")
 
-#: Seconds before a killed worker is replaced: a server that ends kills all of them at once, and nothing is to start then.
+#: Seconds before a killed worker is replaced: a server that ends kills all of them at once, and
+#: nothing is to start then.
 _SETTLED_S = 0.1
 
 #: Seconds between two tries to start a worker: doubled from the first to the last.
@@ -38,24 +41,35 @@ T = TypeVar("T")
 
 
 class Workers:
-    """The worker processes of one server. Threads, and pools of the standard library, go on burning after a timeout."""
+    """The worker processes of one server. Threads, and pools of the standard library, go on burning
+    after a timeout.
+    """
 
     def __init__(self, settings: Settings, metrics: Metrics, shared: bool = False) -> None:
-        """``shared`` says whether callers are told apart, so that none may take all workers, or fill the queue."""
+        """``shared`` says whether callers are told apart, so that none may take all workers, or
+        fill the queue.
+        """
         self._metrics = metrics
-        number, waiting = settings.workers, settings.max_waiting
+        number = settings.workers
+        waiting = settings.max_waiting
         most = settings.max_workers_per_caller or (max(1, number - 1) if shared else number)
         self._shares = Shares(number, min(most, number))
         self._max_waiting = waiting
-        self._max_waiting_each = settings.max_waiting_per_caller or (math.ceil(waiting / 4) if shared else waiting)
+        self._max_waiting_each = settings.max_waiting_per_caller or (
+            math.ceil(waiting / 4) if shared else waiting
+        )
         self._memory_mb = settings.worker_memory_mb
         self._warm: set[Worker] = set()
         self._resting: deque[tuple[Worker, float]] = deque()
         self._tasks: TaskGroup | None = None
         self._starting = False
-        metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self._shares.places)
+        metrics.gauge(
+            "veselova_workers", "Worker processes that may run", lambda: self._shares.places
+        )
         metrics.gauge("veselova_workers_busy", "Worker processes at work", self._busy)
-        metrics.gauge("veselova_queue_length", "Requests that wait for a worker", lambda: self._shares.waiting)
+        metrics.gauge(
+            "veselova_queue_length", "Requests that wait for a worker", lambda: self._shares.waiting
+        )
 
     def _busy(self) -> int:
         """Return how many workers are at work for requests: one that is being started is not."""
@@ -68,7 +82,9 @@ class Workers:
         return [worker.process_id for worker in self._warm]
 
     def ready(self) -> bool:
-        """Return whether there is a warm worker, one that has answered before; where there is none, one is started."""
+        """Return whether there is a warm worker, one that has answered before; where there is none,
+        one is started.
+        """
         ready = bool(self.warm)
         if not ready:
             self._replace()
@@ -76,7 +92,8 @@ class Workers:
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Start a worker with both engines loaded, and another whenever none is left for the next request, within the context.
+        """Start a worker with both engines loaded, and another whenever none is left for the next
+        request, within the context.
 
         At its end no worker is left.
         """
@@ -93,17 +110,22 @@ class Workers:
             while self._resting:
                 await self._resting.popleft()[0].end()
 
-    async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = "") -> T:
-        """Return what a task gives within the budget, waiting for a worker included; ``caller`` is whose share it takes.
+    async def run(
+        self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = ""
+    ) -> T:
+        """Return what a task gives within the budget, waiting for a worker included; ``caller`` is
+        whose share it takes.
 
-        Raises Refused: ``overloaded`` when too many requests wait, ``over-budget`` when time is up (the process is killed),
-        ``worker-memory`` when the task needs more of it, ``worker-lost`` when the process died. What the engines raise comes
-        through.
+        Raises Refused: ``overloaded`` when too many requests wait, ``over-budget`` when time is up
+        (the process is killed), ``worker-memory`` when the task needs more of it, ``worker-lost``
+        when the process died. What the engines raise comes through.
         """
         self._require_room(caller)
         try:
             return await self._answer(task, *arguments, budget_s=budget_s, caller=caller)
-        except BaseException:  # among them the cancellation of a request whose client has gone, which kills its worker
+        except (
+            BaseException
+        ):  # among them the cancellation of a request whose client has gone, which kills its worker
             self._replace()
             raise
 
@@ -120,7 +142,9 @@ class Workers:
                 detail = f"{most} requests{whose} are waiting for a worker; try again later."
                 raise Refused("overloaded", detail, retry_after=2)
 
-    async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = "") -> T:
+    async def _answer(
+        self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = ""
+    ) -> T:
         call = message((task, arguments, budget_s))
         try:
             with anyio.fail_after(budget_s):
@@ -128,15 +152,26 @@ class Workers:
                     answer: T = await self._ask(call)
                     return answer
         except TimeoutError:
-            raise Refused("over-budget", f"The work was stopped after its budget of {budget_s:g} s.") from None
+            raise Refused(
+                "over-budget", f"The work was stopped after its budget of {budget_s:g} s."
+            ) from None
         except WorkerLost:
-            raise Refused("worker-lost", "The worker process ended before it answered; try again.", retry_after=1) from None
+            raise Refused(
+                "worker-lost",
+                "The worker process ended before it answered; try again.",
+                retry_after=1,
+            ) from None
         except MemoryError:
-            detail = f"The work needs more than the {self._memory_mb} MB of memory that a worker of this server has"
+            detail = (
+                f"The work needs more than the {self._memory_mb} MB of memory that a worker "
+                "of this server has"
+            )
             raise Refused("worker-memory", f"{detail}; ask for fewer times.") from None
 
     async def _ask(self, call: bytes) -> Any:
-        """Return what a worker answers: the one that rests since the shortest time, or a new one."""
+        """Return what a worker answers: the one that rests since the shortest time,
+        or a new one.
+        """
         while self._resting:
             worker, _ = self._resting.pop()
             if worker.lives:
@@ -154,7 +189,9 @@ class Workers:
         return answer
 
     def _replace(self, pause_s: float = _SETTLED_S) -> None:
-        """Start a worker in the background, unless one is idle, or all are at work, or requests wait, which start their own."""
+        """Start a worker in the background, unless one is idle, or all are at work, or requests
+        wait, which start their own.
+        """
         held = self._shares.held
         room = held < self._shares.places and not self._shares.waiting
         if self._tasks is not None and room and not self._starting and len(self.warm) <= held:

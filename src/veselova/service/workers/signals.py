@@ -1,4 +1,6 @@
-"""The interrupt of a terminal goes to every process it runs; workers are to leave it to the process that started them."""
+"""The interrupt of a terminal goes to every process it runs; workers are to leave it to the process
+that started them.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +13,18 @@ from multiprocessing import resource_tracker
 
 __all__ = ["ignore_interrupt_in_children", "keep_from_children"]
 
-_MASKS = hasattr(signal, "pthread_sigmask")  # only POSIX systems have them, and interrupts that go to a group of processes
+# only POSIX systems have them, and interrupts that go to a group of processes
+_MASKS = hasattr(signal, "pthread_sigmask")
 
 
 def keep_from_children() -> None:
-    """Let no process that the main thread starts from now on receive SIGINT; this process goes on receiving it.
+    """Let no process that the main thread starts from now on receive SIGINT; this process goes on
+    receiving it.
 
-    A process inherits the signals that are blocked in the thread that starts it, and there is no other way to reach one that is
-    still loading its interpreter. Blocked here, SIGINT is awaited by a thread and handed to the main one, which SIGURG, otherwise
-    ignored, wakes from what it waits for. Call it in the main thread.
+    A process inherits the signals that are blocked in the thread that starts it, and there is no
+    other way to reach one that is still loading its interpreter. Blocked here, SIGINT is awaited by
+    a thread and handed to the main one, which SIGURG, otherwise ignored, wakes from what it waits
+    for. Call it in the main thread.
     """
     if _MASKS:
         signal.signal(signal.SIGURG, lambda *_: None)
@@ -36,7 +41,8 @@ def _hand_on() -> None:
 
 @contextmanager
 def ignore_interrupt_in_children() -> Iterator[None]:
-    """Let no process that this thread, or one that it starts, starts within the block receive SIGINT.
+    """Let no process that this thread, or one that it starts, starts within the block receive
+    SIGINT.
 
     Interrupts of this thread mostly come after the block.
     """
@@ -45,7 +51,8 @@ def ignore_interrupt_in_children() -> Iterator[None]:
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        resource_tracker.ensure_running()  # multiprocessing starts it with its first process, and unblocks SIGINT when it has
+        # multiprocessing starts it with its first process, and unblocks SIGINT when it has
+        resource_tracker.ensure_running()
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
     finally:

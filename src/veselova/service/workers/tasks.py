@@ -1,4 +1,6 @@
-"""What a request computes: called in a worker process by the server, in the same process by the command line."""
+"""What a request computes: called in a worker process by the server, in the same process by the
+command line.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,17 @@ __all__ = ["TASKS", "compare_request", "solve_request", "torus_request", "warm_u
 
 
 def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
-    """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that is made already."""
+    """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that
+    is made already.
+    """
     faults = Faults()
     prepared = prepared or faults.attempt(lambda: Prepared(request.problem.problem()))
     grid = faults.attempt(request.time_grid)
     faults.require_none()
     assert prepared is not None
-    options: dict[str, Any] = {name: getattr(request, name) for name in ("digits", "certified", "formulation")}
+    options: dict[str, Any] = {
+        name: getattr(request, name) for name in ("digits", "certified", "formulation")
+    }
     return prepared.solve(grid, request.engine, request.method, **options)
 
 
@@ -59,7 +65,9 @@ TASKS: Mapping[str, tuple[type[TorusRequest], Callable[[Any], dict[str, Any]]]] 
 
 
 def warm_up() -> None:
-    """Load both engines and run them once, so that the first request finds nothing left to import."""
+    """Load both engines and run them once, so that the first request finds nothing
+    left to import.
+    """
     request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
     encode(_comparison(request))
     _torus(request)

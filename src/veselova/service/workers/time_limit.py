@@ -11,21 +11,28 @@ __all__ = ["TimeIsUp", "time_limit"]
 
 
 class TimeIsUp(BaseException):
-    """Raised inside a computation that has used up its time; no handler of errors may take it for one of its own."""
+    """Raised inside a computation that has used up its time; no handler of errors may take it for
+    one of its own.
+    """
 
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Raise TimeIsUp in the thread of the caller when the block has run for so many seconds.
 
-    It is raised between two instructions of Python, so a single call into a compiled library ends first.
+    It is raised between two instructions of Python, so a single call into a compiled library ends
+    first.
     """
-    thread, lock, ended = threading.get_ident(), threading.Lock(), False
+    thread = threading.get_ident()
+    lock = threading.Lock()
+    ended = False
 
     def stop() -> None:
         with lock:
             if not ended:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(TimeIsUp))
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                    ctypes.c_ulong(thread), ctypes.py_object(TimeIsUp)
+                )
 
     timer = threading.Timer(seconds, stop)
     timer.daemon = True

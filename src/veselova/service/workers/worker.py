@@ -23,7 +23,8 @@ class WorkerLost(Exception):
 class Worker(asyncio.SubprocessProtocol):
     """One process of ``worker_process``, which answers one call at a time.
 
-    Nothing stands between its pipes and the event loop: a call is one write, and the end of an answer wakes whoever waits for it.
+    Nothing stands between its pipes and the event loop: a call is one write, and the end of an
+    answer wakes whoever waits for it.
     """
 
     def __init__(self) -> None:
@@ -34,7 +35,9 @@ class Worker(asyncio.SubprocessProtocol):
 
     @classmethod
     async def start(cls, most_bytes: int) -> Worker:
-        """Return a new worker, whose process may take so much memory; it can be asked at once. Raises WorkerLost."""
+        """Return a new worker, whose process may take so much memory; it can be asked at once.
+        Raises WorkerLost.
+        """
         command = (sys.executable, "-m", worker_process.__name__, str(most_bytes))
         try:
             _, worker = await asyncio.get_running_loop().subprocess_exec(cls, *command, stderr=None)
@@ -52,14 +55,19 @@ class Worker(asyncio.SubprocessProtocol):
         """Take a part of an answer."""
         received = self._received
         received += data
-        if len(received) >= SIZE.size and len(received) == SIZE.size + SIZE.unpack_from(received)[0]:
+        if (
+            len(received) >= SIZE.size
+            and len(received) == SIZE.size + SIZE.unpack_from(received)[0]
+        ):
             content = bytes(memoryview(received)[SIZE.size :])
             received.clear()
             if self._answer is not None and not self._answer.done():
                 self._answer.set_result(content)
 
     def pipe_connection_lost(self, fd: int, exc: Exception | None) -> None:
-        """Tell whoever waits that no answer comes any more; what was sent before has come by now."""
+        """Tell whoever waits that no answer comes any more; what was sent before has
+        come by now.
+        """
         if fd == 1:
             self._closed = True
             if self._answer is not None and not self._answer.done():
@@ -84,9 +92,11 @@ class Worker(asyncio.SubprocessProtocol):
         return not self._closed and not self._ended.is_set()
 
     async def ask(self, call: bytes) -> Any:
-        """Return what a call gives (the ``message`` of a task, its arguments and its budget), and raise what it raises.
+        """Return what a call gives (the ``message`` of a task, its arguments and its budget), and
+        raise what it raises.
 
-        Raises WorkerLost where the process ends before it has answered. Who stops waiting for the answer ends the process.
+        Raises WorkerLost where the process ends before it has answered. Who stops waiting for the
+        answer ends the process.
         """
         if not self.lives:
             raise WorkerLost

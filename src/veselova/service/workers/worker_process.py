@@ -1,9 +1,10 @@
-"""What runs in a worker process: it takes one call after the other from its server, and answers each.
+"""What runs in a worker process: it takes one call after the other from its server, and answers
+each.
 
     python -m veselova.service.workers.worker_process BYTES
 
-Calls come on standard input and answers leave on standard output, each a pickle behind its size. The first thing that comes is
-the server's path of imports.
+Calls come on standard input and answers leave on standard output, each a pickle behind its size.
+The first thing that comes is the server's path of imports.
 """
 
 from __future__ import annotations
@@ -36,10 +37,12 @@ def message(content: Any) -> bytes:
 
 def serve(most_bytes: int) -> None:
     """Answer the calls of a server, within so much memory, until it closes its end."""
-    for name in ("SIGINT", "SIGHUP"):  # what a terminal sends is for the server, which ends its workers
+    # what a terminal sends is for the server, which ends its workers
+    for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    calls, answers = _withdraw(0, "rb"), _withdraw(1, "wb")
+    calls = _withdraw(0, "rb")
+    answers = _withdraw(1, "wb")
     sys.path[:] = pickle.loads(_receive(calls) or pickle.dumps(sys.path))
     _limit_memory(most_bytes)
     while call := _receive(calls):
@@ -48,7 +51,9 @@ def serve(most_bytes: int) -> None:
 
 
 def _withdraw(descriptor: int, mode: str) -> Any:
-    """Return the stream behind a descriptor, which leads nowhere from now on: nothing that a library prints is an answer."""
+    """Return the stream behind a descriptor, which leads nowhere from now on: nothing that a
+    library prints is an answer.
+    """
     stream = os.fdopen(os.dup(descriptor), mode)
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, descriptor)
@@ -63,7 +68,9 @@ def _receive(calls: BinaryIO) -> bytes:
 
 
 def answer(call: bytes) -> bytes:
-    """Return the message that answers a call, the pickle of a task, its arguments and the seconds that it may take."""
+    """Return the message that answers a call, the pickle of a task, its arguments and the seconds
+    that it may take.
+    """
     try:
         task, arguments, seconds = pickle.loads(call)
         _end_after(seconds)
@@ -79,9 +86,13 @@ def answer(call: bytes) -> bytes:
 
 
 def _end_after(seconds: float) -> None:
-    """Let the system end this process after so many seconds, as its server would have done, had it not been killed itself."""
+    """Let the system end this process after so many seconds, as its server would have done, had it
+    not been killed itself.
+    """
     if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, seconds + _SERVERS_TURN_S if math.isfinite(seconds) else 0)
+        signal.setitimer(
+            signal.ITIMER_REAL, seconds + _SERVERS_TURN_S if math.isfinite(seconds) else 0
+        )
 
 
 def _limit_memory(most_bytes: int) -> None:
@@ -91,10 +102,13 @@ def _limit_memory(most_bytes: int) -> None:
         return
     # Arrow's own allocator reserves a gigabyte, used or not, which would count.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
-    # On Linux RLIMIT_DATA counts what a process writes to, and not the libraries that it maps, as RLIMIT_AS would.
+    # On Linux RLIMIT_DATA counts what a process writes to, and not the libraries that it maps, as
+    # RLIMIT_AS would.
     kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     hard = resource.getrlimit(kind)[1]
-    resource.setrlimit(kind, (most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard), hard))
+    resource.setrlimit(
+        kind, (most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard), hard)
+    )
 
 
 if __name__ == "__main__":
