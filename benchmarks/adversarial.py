@@ -15,8 +15,9 @@ of both errors.
 Prints per class how many there were, how many were refused by name and how many failed, the largest
 true error of the bounded series, the largest reported one, the median of reported over true errors,
 and the largest true error over the one reported at the same time (at most 1); then the starts that
-broke a promise. "Without truth" are those for which none could be had. True errors count as ε/2 at
-least. Ctrl-C prints what has been seen.
+broke a promise. "Without truth" are those for which none could be had. A true error counts
+as half a unit in the last place of the largest number there at least. Ctrl-C prints what has been
+seen.
 """
 
 from __future__ import annotations
@@ -40,10 +41,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import CLASSES, adversarial_start
 from system_draws import CLASSES_OF, adversarial_system
-from verdict import against_truth, time_unit
-
-#: No true error counts as less: half a unit in the last place of one.
-LEAST = float(np.finfo(float).eps) / 2
+from verdict import against_truth, pessimism, time_unit
 
 #: What a start ended in besides figures.
 REFUSED, NO_TRUTH = "refused", "without truth"
@@ -86,7 +84,7 @@ def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, i
     figures = (
         np.max(off),
         np.max(found.error),
-        np.median(found.error / np.maximum(off, LEAST)),
+        pessimism(found, off),
         np.max(off / allowed),
     )
     return i, name, n, tuple(float(x) for x in figures)

@@ -193,7 +193,7 @@ class _TorusMotion(Motion[TorusProblem]):
         )
         evaluators = (self._evaluator, *neighbours)
         return DepartureBound(
-            partial(_frames, evaluators, self.time_map), self.problem.turning, _NO_DIGIT
+            partial(_with_neighbours, evaluators, self.time_map), self.problem.turning, _NO_DIGIT
         )
 
     @property
@@ -214,8 +214,9 @@ class _TorusMotion(Motion[TorusProblem]):
         time_map = plan.time_map(self.time_map)
         along, error = evaluator.evaluate(plan, time_map)
         if self._departure is not None:
-            apart = self._departure.at(grid.doubles)
-            error = np.maximum(error, self.problem.bound({"frame": along.series[1]}, apart))
+            apart, on_the_way = self._departure.at(grid.doubles)
+            apart = self.problem.bound({"frame": along.series[1]}, apart)
+            error = np.maximum(error, on_the_way) + apart
         if not error.max() <= _NO_DIGIT:  # or it is no number
             lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
@@ -246,11 +247,17 @@ class _TorusMotion(Motion[TorusProblem]):
         )
 
 
-def _frames(evaluators: Sequence[Evaluator], time_map: str | None, instants: Array) -> list[Array]:
-    """Return the frames of several motions at increasing times."""
+def _with_neighbours(
+    evaluators: Sequence[Evaluator], time_map: str | None, instants: Array
+) -> tuple[list[Array], Array]:
+    """Return the frames of a motion and its neighbours at increasing times, and the error of the
+    first, by its sensitivities at these times.
+    """
     grid = TimeGrid.of(instants)
     plans = [evaluator.to(grid) for evaluator in evaluators]
-    return [
-        evaluator.evaluate(plan, plan.time_map(time_map))[0].series[1]
-        for evaluator, plan in zip(evaluators, plans, strict=True)
-    ]
+    local = [instants.size, *(0 for _ in evaluators[1:])]
+    (first, error), *others = (
+        evaluator.evaluate(plan, plan.time_map(time_map), most_local)
+        for evaluator, plan, most_local in zip(evaluators, plans, local, strict=True)
+    )
+    return [first.series[1], *(other.series[1] for other, _ in others)], error

@@ -7,41 +7,69 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Sensitivity"]
+__all__ = ["MOST_LOCAL", "Sensitivity", "combine_bounds"]
 
 Array = NDArray[np.float64]
+
+#: Times up to which an error is that by the sensitivities at the times themselves; for more times
+#: it is that by the largest sensitivity on the torus. A budget: at so many points they cost less
+#: than the periods do.
+MOST_LOCAL = 24
+
+#: The largest second derivative over the square of the largest first one, with some to spare: one
+#: for a cosine, 0.8 for a hyperbolic tangent.
+_CURVATURE = 4.0
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The largest derivatives of numbers x of a state, such as the entries of its frame, over
-    points of the torus.
+    """Derivatives of numbers x of a state, such as the entries of its frame, at N points of the
+    torus, or their maxima over points. Each is the largest over the numbers.
 
-    by_phase (g,) |∂x/∂z_k| · along_flow |dx/dτ₁| · together √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k
-    ∂x/∂z_k|
+    by_phase |∂x/∂z_k|, (N, g) or (g,) · the others (N,) or numbers: along_flow |dx/dτ₁| · together
+    √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k ∂x/∂z_k| · by_start √Σ_j (Σ_k ∂x/∂z_k δ_kj)², where source j
+    of rounding at the start moves phase k by δ_kj
     """
 
     by_phase: Array
-    along_flow: float
-    together: float
-    by_rates: float
+    along_flow: Array
+    together: Array
+    by_rates: Array
+    by_start: Array
 
     @classmethod
-    def of(cls, slopes: Array, rates: Array) -> Sensitivity:
-        """Return it from derivatives in every phase, shape (N, K, g)."""
+    def at_points(cls, slopes: Array, rates: Array, sources: Array) -> Sensitivity:
+        """Return those at each point, from derivatives of K numbers in every phase, (N, K, g), the
+        frequencies (g,) and δ (g, S).
+        """
         sizes = np.abs(slopes)
-        together = np.max(np.sum(sizes * sizes, axis=2))
-        by_rates = np.max(sizes @ np.abs(rates))
-        along_flow = float(np.max(np.abs(slopes @ rates)))
         return cls(
-            np.max(sizes, axis=(0, 1)), along_flow, float(np.sqrt(together)), float(by_rates)
+            np.max(sizes, axis=1),
+            np.max(np.abs(slopes @ rates), axis=1),
+            np.max(np.linalg.norm(slopes, axis=2), axis=1),
+            np.max(sizes @ np.abs(rates), axis=1),
+            np.max(np.linalg.norm(slopes @ sources, axis=2), axis=1),
         )
 
+    def largest(self) -> Sensitivity:
+        """Return the maxima over the points."""
+        return Sensitivity(*(np.asarray(np.max(part, axis=0)) for part in self._parts))
+
     def maximum(self, other: Sensitivity) -> Sensitivity:
-        """Return the larger of both."""
-        return Sensitivity(
-            np.maximum(self.by_phase, other.by_phase),
-            max(self.along_flow, other.along_flow),
-            max(self.together, other.together),
-            max(self.by_rates, other.by_rates),
-        )
+        """Return the larger of both, number by number."""
+        pairs = zip(self._parts, other._parts, strict=True)
+        return Sensitivity(*(np.maximum(mine, theirs) for mine, theirs in pairs))
+
+    @property
+    def _parts(self) -> tuple[Array, ...]:
+        return self.by_phase, self.along_flow, self.together, self.by_rates, self.by_start
+
+
+def combine_bounds(largest: Array, local: Array) -> Array:
+    """Return the error from two bounds: by the largest sensitivities, and by those at the state.
+
+    The state moves by the error meanwhile, and a sensitivity changes by at most _CURVATURE times
+    the square of the largest one: what the second bound leaves out is of second order.
+    """
+    left_out = _CURVATURE * largest * np.minimum(largest, 1.0)  # squares may leave the floats
+    return np.asarray(np.minimum(largest, local + left_out))

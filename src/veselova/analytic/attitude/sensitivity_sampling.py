@@ -53,15 +53,16 @@ def sample_phases(genus: int) -> Array:
 class SensitivitySampling:
     """The frame around a torus, from the angles (g,) of its start.
 
-    rates: f, cycles per unit of τ₁, (g,) · half_periods, steep: whether the attitudes at half
-    periods, and the steepness, are wanted · point: what the positions q (N, m) are normals at, the
-    point of a geodesic; None for other motions
+    rates: f, cycles per unit of τ₁, (g,) · sources: δ (g, S) of ``Sensitivity`` · half_periods,
+    steep: whether the attitudes at half periods, and the sensitivity, are wanted · point: what the
+    positions q (N, m) are normals at, the point of a geodesic; None for other motions
     """
 
     frame: Frame
     inversion: AbelJacobi[Periods]
     angles: Array
     rates: Array
+    sources: Array
     half_periods: bool
     steep: bool
     point: Callable[[Array], Array] | None = None
@@ -101,7 +102,7 @@ class SensitivitySampling:
         return self._found[2]
 
     @property
-    def steepness_of_point(self) -> Sensitivity | None:
+    def sensitivity_of_point(self) -> Sensitivity | None:
         """Return how fast the point of ``point`` moves with the phases, in the same way; None where
         there is none.
         """
@@ -119,13 +120,14 @@ class SensitivitySampling:
     def _sensitivity(self, slopes: Array) -> Sensitivity:
         genus = self.rates.size
         if genus <= FEW:
-            return Sensitivity.of(slopes, self.rates)
+            return Sensitivity.at_points(slopes, self.rates, self.sources).largest()
         # Σ|a_k| ≤ √g √Σa_k², and the mean square of Σ ±a_k over random signs is Σa_k².
-        spread = float(np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2))))
+        spread = np.sqrt(np.max(np.mean(slopes[:, :, :-1] ** 2, axis=2)))
         by_phase = np.full(genus, spread / np.sqrt(genus))
         return Sensitivity(
             by_phase,
-            float(np.max(np.abs(slopes[:, :, -1]))),
+            np.max(np.abs(slopes[:, :, -1])),
             spread,
-            float(np.abs(self.rates) @ by_phase),
+            np.abs(self.rates) @ by_phase,
+            np.asarray(np.linalg.norm(by_phase @ np.abs(self.sources))),
         )

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import Sensitivity
+from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, combine_bounds
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.rate import TimeMap
@@ -26,6 +26,10 @@ _EPSILON = float(np.finfo(float).eps)
 #: stands in an exponent. That of transforms comes on top.
 _EVALUATION = {"angles": 8.0, "theta": 20.0, "products": 20.0, "nufft": 20.0}
 
+#: The same of the point of a geodesic, relative to the longest semi-axis; largest seen 2, at the
+#: tips of needles.
+_EVALUATION_OF_POINT = 8.0
+
 #: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of
 #: different phases add in squares.
 _PHASE = {"angles": 4.0, "theta": 2.0, "products": 2.0, "nufft": 2.0}
@@ -39,10 +43,6 @@ _RATE = 2.0
 
 #: The same where they carry guard digits: 30 digits in the leading and the following double.
 _GUARDED_RATE = 1e-30
-
-#: Times at which the steepness of the attitude is looked at besides, near a separatrix and for wide
-#: A's.
-_ON_ORBIT = 24
 
 #: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of
 #: them.
@@ -63,67 +63,79 @@ class ErrorBound:
     solution: Solution
     method: str
 
-    def at(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap) -> Array:
-        """Return the bound at each time of a horizon, (N,), from the Neumann times there."""
+    def at(
+        self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap, most_local: int = MOST_LOCAL
+    ) -> Array:
+        """Return the bound at each time of a plan, (N,), from the Neumann times there.
+
+        Up to ``most_local`` times the sensitivities are those at the times, where the samples do
+        not represent the orbit; for more times they are the largest ones.
+        """
         solution = self.solution
-        sensitivity = self.solution.sensitivity
-        at_once = self._at_once
-        if self._is_looked_at:
-            rows = np.linspace(0, tau1.size - 1, min(tau1.size, _ON_ORBIT)).astype(int)
-            sensitivity = sensitivity.maximum(
-                solution.steepness_at(solution.in_tau1.phases(tau1[rows]))
-            )
-            at_once = self._of_one_evaluation(sensitivity)
+        of_frame, of_point = solution.sensitivity, self._largest_of_point
+        moved = self._moved(plan, tau1, time_map)
+        if not self._is_looked_at:
+            return self._along_axes(self._by(of_frame, of_point, moved))
+        count = tau1.size if tau1.size <= most_local else min(tau1.size, MOST_LOCAL)
+        rows = np.linspace(0, tau1.size - 1, count).astype(int)
+        frame_there, point_there = solution.sensitivities_at(solution.in_tau1.phases(tau1[rows]))
+        of_frame = of_frame.maximum(frame_there.largest())
+        of_point = of_point and of_point.maximum(point_there.largest())
+        result = self._by(of_frame, of_point, moved)
+        if tau1.size <= most_local:
+            local = self._by(frame_there, of_point and point_there, moved)
+            result = combine_bounds(result, local)
+        return self._along_axes(result)
+
+    def _moved(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap) -> _Moved:
+        """Return how far the state is from where it should be.
+
+        The rounding of dt/dτ₁ is one of the time elapsed, not of F_0|τ₁|. A rounding of f_k moves
+        phase k alone; an error of the time map moves all phases along the flow.
+        """
+        solution = self.solution
         rounding = _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
-        lag = self._lag(plan, tau1, time_map, rounding)
-        error = (
-            self._of_point(tau1, lag, rounding)
-            if solution.problem.time == "s"
-            else np.zeros_like(tau1)
-        )
-        if (
-            slowness := _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))
-        ) is not None:
-            lag *= slowness
-        # A rounding of f_k moves phase k alone; an error of the clock moves all phases along the
-        # flow.
-        lag *= sensitivity.along_flow
-        lag += (rounding * sensitivity.by_rates) * np.abs(tau1) + at_once
-        np.maximum(error, lag, out=error)
-        # back along the body axes, scalar products of n terms
-        if solution.problem.axes is not None:
-            error += (solution.problem.n + _AXES_ROUNDING) * _EPSILON
-        return error
+        of_map, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
+        lag = np.abs(plan.times / solution.mean_rate)
+        lag *= rounding + drift
+        lag += of_map
+        slowness = _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))
+        return _Moved(lag, lag if slowness is None else lag * slowness, rounding * np.abs(tau1))
 
-    def _lag(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap, rounding: float) -> Array:
-        """Return the error of t over F_0, (N,): the rounding of dt/dτ₁ is one of the time elapsed,
-        not of F_0|τ₁|.
+    def _by(self, of_frame: Sensitivity, of_point: Sensitivity | None, moved: _Moved) -> Array:
+        """Return the error by sensitivities at each time, or by the largest ones.
+
+        The point of a geodesic moves with unit speed however fast its normal turns. X_i is as
+        accurate relative to √A_i as the normal is: on a flat side both q_i and √(q,Aq) are small.
         """
-        of_clock, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
-        result = np.abs(plan.times / self.solution.mean_rate)
-        result *= rounding + drift
-        result += of_clock
-        return result
+        result = moved.along_flow * of_frame.along_flow
+        result += moved.frequencies * of_frame.by_rates
+        result += self._of_one_evaluation(of_frame, _EVALUATION[self.method])
+        if of_point is not None:
+            size = float(np.sqrt(np.max(self.solution.problem.A)))
+            error = moved.lag * self.solution.mean_rate
+            error += moved.frequencies * of_point.by_rates
+            error += self._of_one_evaluation(of_point, _EVALUATION_OF_POINT, size)
+            np.maximum(result, error, out=result)
+        return np.asarray(result)
 
-    def _of_point(self, tau1: Array, lag: Array, rounding: float) -> Array:
-        """Return the error of the point of a geodesic, (N,), which moves with unit speed however
-        fast its normal turns.
+    def _along_axes(self, error: Array) -> Array:
+        """Return the error back along the body axes: of scalar products of n terms."""
+        if self.solution.problem.axes is None:
+            return error
+        return error + (self.solution.problem.n + _AXES_ROUNDING) * _EPSILON
 
-        X_i is as accurate relative to √A_i as the normal is: on a flat side both q_i and √(q,Aq)
-        are small.
-        """
-        solution = self.solution
-        sensitivity = self.solution.steepness_of_point
-        at_once = self._of_one_evaluation(
-            sensitivity, size=float(np.sqrt(np.max(solution.problem.A)))
-        )
-        moved = (rounding * sensitivity.by_rates) * np.abs(tau1)
-        return np.asarray(lag * solution.mean_rate + moved + at_once)
+    @property
+    def _largest_of_point(self) -> Sensitivity | None:
+        return self.solution.sensitivity_of_point if self.solution.problem.time == "s" else None
 
     @cached_property
     def _is_looked_at(self) -> bool:
-        # There the frame turns within a hundredth of the torus, which samples miss.
-        return self.solution.near_separatrix or not self.solution.is_even
+        # There the frame turns within a hundredth of the torus, which samples miss; on flat or
+        # needle-like ellipsoids they say little of where the motion is.
+        solution = self.solution
+        is_wide = solution.moving.rate_variation >= _WIDE
+        return solution.near_separatrix or not solution.is_even or is_wide
 
     @cached_property
     def _frequencies(self) -> Array:
@@ -133,27 +145,34 @@ class ErrorBound:
     def _of_start(self) -> Array:
         return _START_PHASE * _EPSILON + self.solution.start_rounding
 
-    @cached_property
-    def _at_once(self) -> float:
-        return self._of_one_evaluation(self.solution.sensitivity)
-
-    def _of_one_evaluation(self, sensitivity: Sensitivity, size: float = 1.0) -> float:
+    def _of_one_evaluation(
+        self, sensitivity: Sensitivity, evaluation: float, size: float = 1.0
+    ) -> Array:
         """Return the error of one evaluation at phases that are known to a few roundings, of
         numbers of that size.
 
         Angles take a rounding of the start's angles to the phases and back again; theta functions
-        see the phases as they are, and so does the clock.
+        see the phases as they are, and so does the time map.
         """
         solution = self.solution
-        evaluation = size * _EVALUATION[self.method]
         result = _PHASE[self.method] * _EPSILON * sensitivity.together
         if self.method == "angles":
-            return result + evaluation * _EPSILON
-        result += (
-            float(solution.start_rounding @ sensitivity.by_phase)
-            + size * solution.quotients.rounding
-        )
-        return result + evaluation * max(1.0, solution.largest_period) * _EPSILON
+            return result + size * evaluation * _EPSILON
+        result = result + sensitivity.by_start + size * solution.quotients.rounding
+        return result + size * evaluation * max(1.0, solution.largest_period) * _EPSILON
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """Errors of where a state is, at each of N times.
+
+    lag: of the time over F_0 · along_flow: of τ₁, by the rate at the time · frequencies: relative
+    rounding of f times |τ₁|
+    """
+
+    lag: Array
+    along_flow: Array
+    frequencies: Array
 
 
 def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.attitude.sensitivity import MOST_LOCAL
 from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.error_bound import ErrorBound
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
@@ -42,18 +43,21 @@ class Evaluator:
         """Return what the times ask for."""
         return EvaluationPlan(self.solution, times.doubles, self.given, times.remainders)
 
-    def evaluate(self, plan: EvaluationPlan, time_map: TimeMap) -> tuple[Samples, Array]:
+    def evaluate(
+        self, plan: EvaluationPlan, time_map: TimeMap, most_local: int = MOST_LOCAL
+    ) -> tuple[Samples, Array]:
         """Return the motion, (q̇, frame) its series, after them λ where the angles of few times
         have it; and its error.
 
         Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet
-        they turn sharply, and the rest does not.
+        they turn sharply, and the rest does not. The error is that by sensitivities at the times
+        themselves up to ``most_local`` of them.
         """
         windows = plan.windows(time_map.name)
         with_coordinates = self.method == "angles" and windows.inversions == plan.times.size
         evaluation = self._with_coordinates if with_coordinates else self._states
         along = windows.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
-        error = self._bound.at(plan, along.tau1, time_map)
+        error = self._bound.at(plan, along.tau1, time_map, most_local)
         error += along.error
         if self.method == "nufft":
             error += along.series[2]

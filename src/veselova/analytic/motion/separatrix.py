@@ -36,48 +36,50 @@ _BETWEEN = 2.0
 class DepartureBound:
     """The bound of one motion, extended when times ask for it.
 
-    frames: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n) ·
-    turning: radians a unit of time
+    motions: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n), and
+    the error of the motion's evaluation there, (N,) · turning: radians a unit of time
     lost: the difference beyond which nothing is known; instants after the first such one are not
     evaluated
     """
 
-    frames: Callable[[Array], Sequence[Array]]
+    motions: Callable[[Array], tuple[Sequence[Array], Array]]
     turning: float
     lost: float
     _known: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False)
 
-    def at(self, times: Array) -> Array:
-        """Return the bound at times (N,), infinite where nothing is known."""
-        result = np.zeros(times.size)
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Return the bound at times (N,), infinite where nothing is known, and the largest error of
+        the evaluation on the way there.
+        """
+        result = np.zeros((times.size, 2))
         for side in (1.0, -1.0):
             rows = times * side > 0
             if rows.any():
                 instants, bounds = self._until(side, float(np.max(times[rows] * side)))
                 places = np.searchsorted(instants, times[rows] * side)
-                result[rows] = np.where(
-                    places < len(bounds), bounds[np.minimum(places, len(bounds) - 1)], np.inf
-                )
-        return result
+                ends_before = (places >= len(bounds))[:, None]
+                last = np.minimum(places, len(bounds) - 1)
+                result[rows] = np.where(ends_before, np.inf, bounds[last])
+        return result[:, 0], result[:, 1]
 
     def _until(self, side: float, farthest: float) -> tuple[Array, Array]:
-        """Return the instants on one side of t = 0, increasing, and the bounds there, to the
-        farthest time or the last digit.
+        """Return the instants on one side, increasing from t = 0, and both bounds there, (N, 2), to
+        the farthest time or the last digit.
         """
-        instants, bounds = self._known.get(side, (np.zeros(1), np.zeros(1)))
-        while instants[-1] < farthest and bounds[-1] <= self.lost:
+        instants, bounds = self._known.get(side, (np.zeros(0), np.zeros((0, 2))))
+        while not instants.size or (instants[-1] < farthest and bounds[-1, 0] <= self.lost):
             further = _instants(len(instants), _BLOCK) / self.turning
-            first, *others = self.frames(further * side if side > 0 else further[::-1] * side)
+            in_order = slice(None, None, int(side))
+            (first, *others), error = self.motions(further[in_order] * side)
             differences = np.max(
                 [np.max(np.abs(other - first), axis=(1, 2)) for other in others], axis=0
             )
-            differences = differences if side > 0 else differences[::-1]
-            largest = np.maximum.accumulate(
-                np.maximum(bounds[-1], _BETWEEN * np.nan_to_num(differences, nan=np.inf))
-            )
-            selected = int(np.searchsorted(largest, self.lost, side="right")) + 1
+            found = np.stack([_BETWEEN * differences, error], axis=1)[in_order]
+            found = np.vstack([bounds[-1:], np.nan_to_num(found, nan=np.inf)])
+            largest = np.maximum.accumulate(found)[-further.size :]
+            selected = int(np.searchsorted(largest[:, 0], self.lost, side="right")) + 1
             instants = np.append(instants, further[:selected])
-            bounds = np.append(bounds, largest[:selected])
+            bounds = np.vstack([bounds, largest[:selected]])
         self._known[side] = instants, bounds
         return instants, bounds
 

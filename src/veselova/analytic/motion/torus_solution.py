@@ -159,14 +159,22 @@ class Solution:
         return float(self.rate.mean)
 
     @cached_property
-    def start_rounding(self) -> Array:
-        """Return what rounding of the start's angles, and of the map from them, makes of its
-        phases, shape (g,).
+    def start_sources(self) -> Array:
+        """Return how far each source of rounding at the start moves the phases, shape (g, 2g).
+
+        They are the angles, and the integrals of the forms before a⁻¹ makes them phases: near a
+        separatrix a⁻¹ is large in one direction, in which the frame hardly turns.
         """
-        slopes = np.abs(self.inversion.jacobian(self.start.angles[None, :])[0])
-        return np.asarray(
-            (slopes @ np.abs(self.start.angles) + self.periods.cancellation) * DOUBLE.epsilon
-        )
+        slopes = self.inversion.jacobian(self.start.angles[None, :])[0]
+        periods = self.periods
+        integrals = sum(np.sum(np.abs(series), axis=1) for series in periods.cut_series)
+        sources = [slopes * np.abs(self.start.angles), periods.inverse_cycles * integrals]
+        return np.asarray(np.concatenate(sources, axis=1) * DOUBLE.epsilon)
+
+    @cached_property
+    def start_rounding(self) -> Array:
+        """Return how far all of them together move each phase, shape (g,)."""
+        return np.asarray(np.sum(np.abs(self.start_sources), axis=1))
 
     @cached_property
     def in_tau1(self) -> LinearFlow:
@@ -230,6 +238,7 @@ class Solution:
             self.inversion,
             self.start.angles,
             self.in_tau1.rates,
+            self.start_sources,
             half_periods,
             steep,
             point,
@@ -249,28 +258,22 @@ class Solution:
         """
         if self._sampling.sensitivity is not None:
             return self._sampling.sensitivity
-        return self.steepness_at(self._drawn)
+        return self.sensitivities_at(self._drawn)[0].largest()
 
     @cached_property
-    def steepness_of_point(self) -> Sensitivity:
+    def sensitivity_of_point(self) -> Sensitivity:
         """Return how fast the point of a geodesic moves with the phases, in the same way."""
-        if self._sampling.steepness_of_point is not None:
-            return self._sampling.steepness_of_point
-        return self._steepness_between(self._drawn)[1]
+        if self._sampling.sensitivity_of_point is not None:
+            return self._sampling.sensitivity_of_point
+        return self.sensitivities_at(self._drawn)[1].largest()
 
     @property
     def _drawn(self) -> Array:
         return np.concatenate([sample_phases(self.curve.genus), self._origin[None, :]])
 
-    def steepness_at(self, z: Array) -> Sensitivity:
-        """Return how fast the frame turns at phases z (N, g), and more; doubled near a separatrix,
-        where it varies most.
-        """
-        return self._steepness_between(z)[0]
-
-    def _steepness_between(self, z: Array) -> tuple[Sensitivity, Sensitivity]:
-        """Return how fast the frame turns, and the point of a geodesic moves, at
-        phases z (N, g).
+    def sensitivities_at(self, z: Array) -> tuple[Sensitivity, Sensitivity]:
+        """Return how fast the frame turns, and the point of a geodesic moves, at each of the phases
+        z (N, g), and more between; doubled near a separatrix, where it varies most.
         """
         near = self.near_separatrix
         rates = self.in_tau1.rates
@@ -282,9 +285,11 @@ class Solution:
         attitude: Callable[[Array], Attitude] = self.quotients.at if near else self.frame.at
         at = attitude(ends.ends)
         between = 2.0 if near else BETWEEN
-        of_frame = ends.slopes(at)
-        of_point = ends.quotients(self.point(at.q))
-        return Sensitivity.of(between * of_frame, rates), Sensitivity.of(between * of_point, rates)
+        slopes = (ends.slopes(at), ends.quotients(self.point(at.q)))
+        of_frame, of_point = (
+            Sensitivity.at_points(between * part, rates, self.start_sources) for part in slopes
+        )
+        return of_frame, of_point
 
     @cached_property
     def quotients(self) -> ThetaQuotients:

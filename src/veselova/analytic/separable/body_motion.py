@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.motion.base import Motion
@@ -70,8 +71,6 @@ class BodyMotion(Motion[VeselovaSO3]):
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
-        motion = self._orbit.motion
-        inversion = self._orbit.inversion
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
@@ -80,17 +79,17 @@ class BodyMotion(Motion[VeselovaSO3]):
         high = max(tau[-1], 0.0)
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
-        panels = integrate_on_panels(
-            lambda z: motion.turning(inversion.invert(z)), orbit.in_tau, low, high, largest, noise
-        )
-        at, velocity = orbit.states(z)
+        panels = integrate_on_panels(self._turning_at, orbit.in_tau, low, high, largest, noise)
+        at, velocity, rate = orbit.states(z)
         gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
-        error, lag = orbit.error(tau, time_map, self._sensitivity)
+        lag = orbit.lag(grid.doubles, tau, rate, time_map)
+        error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _frames))
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
         # mean.
         error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
-        error = error + orbit.integral_error(tau, slopes)
+        along = orbit.slopes_along(self._turning_at, panels, tau)
+        error = error + orbit.integral_error(tau, slopes, along)
         error = orbit.require_digit(error, grid.doubles)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(time_map)
@@ -117,22 +116,23 @@ class BodyMotion(Motion[VeselovaSO3]):
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
-        return self._orbit.sensitivity(
-            lambda at: np.concatenate([at.q[:, :, None], at.normals], axis=2)
-        )
+        return self._orbit.sensitivity(_frames)
+
+    def _turning_at(self, z: Array) -> Array:
+        """Return how fast the frame turns against the coordinate lines at phases z (N, g)."""
+        return np.asarray(self._orbit.motion.turning(self._orbit.inversion.invert(z)))
 
     @cached_property
     def _turning(self) -> tuple[Array, float]:
         """Return the largest |∂/∂z_k| of the turning over a cycle, shape (g,), and its largest
         value, over the samples.
         """
-        orbit = self._orbit
-        motion = self._orbit.motion
-        here = motion.turning(orbit.inversion.invert(orbit.sample))
-        steps = _STEP * np.eye(motion.periods.genus)
-        moves = [
-            motion.turning(orbit.inversion.invert(orbit.sample + step)) - here for step in steps
-        ]
-        return BETWEEN * np.array([np.max(np.abs(move)) for move in moves]) / _STEP, float(
-            np.max(np.abs(here))
-        )
+        sample = self._orbit.sample
+        here = self._turning_at(sample)
+        steps = _STEP * np.eye(sample.shape[1])
+        moves = [np.max(np.abs(self._turning_at(sample + step) - here)) for step in steps]
+        return BETWEEN / _STEP * np.array(moves), float(np.max(np.abs(here)))
+
+
+def _frames(at: Attitude) -> Array:
+    return np.concatenate([at.q[:, :, None], at.normals], axis=2)

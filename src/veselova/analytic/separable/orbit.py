@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences
-from veselova.analytic.attitude.sensitivity import Sensitivity
+from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, combine_bounds
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
+from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
@@ -43,6 +44,13 @@ _RATE = 4.0
 
 #: Points at which steepness is sampled.
 _SAMPLES = 48
+
+#: Panels up to which slopes of an integrand are summed along the orbit, and cells of a panel.
+_FEW_PANELS = 200
+_CELLS = 8
+
+#: Step of a difference quotient in a phase.
+_STEP = 1e-6
 
 
 class SeparableOrbit:
@@ -102,13 +110,14 @@ class SeparableOrbit:
             )
         return error
 
-    def states(self, z: Array) -> tuple[Attitude, Array]:
-        """Return positions and coordinate lines at phases (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
+    def states(self, z: Array) -> tuple[Attitude, Array, Array]:
+        """Return positions and coordinate lines at phases (N, g), q̇ = q'/(dt/dτ), (N, n), and
+        dt/dτ, (N,).
+        """
         phi = self.inversion.invert(z)
         at = self.motion.attitude(phi)
-        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / self.rate.at(phi)[
-            :, None
-        ]
+        rate = self.rate.at(phi)
+        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / rate[:, None], rate
 
     def details(self, time_map: TimeMap) -> dict[str, Any]:
         """Return what a trajectory's provenance says of the orbit."""
@@ -124,43 +133,75 @@ class SeparableOrbit:
         """Return how fast numbers (N, …) of the attitudes change with the phases, and more between
         the sampled points.
         """
+        return self._sensitivity_at(self.sample, values).largest()
+
+    def local_sensitivity(
+        self, z: Array, values: Callable[[Attitude], Array]
+    ) -> Sensitivity | None:
+        """Return the same at each of the phases z (N, g); None where they are many."""
+        return None if len(z) > MOST_LOCAL else self._sensitivity_at(z, values)
+
+    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
         genus = self.motion.periods.genus
-        differences = Differences(
-            self.sample, np.broadcast_to(np.eye(genus), (_SAMPLES, genus, genus))
-        )
+        differences = Differences(z, np.broadcast_to(np.eye(genus), (len(z), genus, genus)))
         at = self.motion.attitude(self.inversion.invert(differences.ends))
-        return Sensitivity.of(BETWEEN * differences.quotients(values(at)), self.in_tau.rates)
+        slopes = BETWEEN * differences.quotients(values(at))
+        return Sensitivity.at_points(slopes, self.in_tau.rates, np.diag(self.start_rounding))
 
     @cached_property
     def start_rounding(self) -> Array:
         """Return the rounding of the phases at the start, (g,)."""
         return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
 
-    def error(self, tau: Array, time_map: TimeMap, sensitivity: Sensitivity) -> tuple[Array, Array]:
-        """Return a bound on the error of numbers of that steepness, (N,), and that of τ."""
-        rates = np.abs(self.in_tau.rates)
-        elapsed = np.abs(tau)
+    def lag(self, times: Array, tau: Array, rate: Array, time_map: TimeMap) -> Array:
+        """Return the error of τ at each time, (N,), from dt/dτ there: that of t over the rate."""
         rounding = _RATE * DOUBLE.epsilon
-        of_clock, drift = time_map.error(tau, self.start_rounding, rounding * rates)
-        lag = (rounding + drift) * elapsed + of_clock
-        at_once = (
-            _EVALUATION * DOUBLE.epsilon + float(np.max(self.start_rounding)) * sensitivity.together
-        )
-        return np.asarray(
-            at_once + rounding * sensitivity.by_rates * elapsed + lag * sensitivity.along_flow
-        ), np.asarray(lag)
+        rates = np.abs(self.in_tau.rates)
+        of_map, drift = time_map.error(tau, self.start_rounding, rounding * rates)
+        by_mean = (rounding + drift) * np.abs(times / self.rate.mean) + of_map
+        return np.asarray(by_mean * np.maximum(1.0, self.rate.mean / rate))
 
-    def integral_error(self, tau: Array, slopes: Array) -> Array:
+    def error(
+        self, tau: Array, lag: Array, largest: Sensitivity, local: Sensitivity | None
+    ) -> Array:
+        """Return a bound on the error of numbers of those sensitivities, (N,)."""
+
+        def by(sensitivity: Sensitivity) -> Array:
+            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * sensitivity.by_rates
+            at_once = _EVALUATION * DOUBLE.epsilon + sensitivity.by_start
+            return np.asarray(at_once + moved + lag * sensitivity.along_flow)
+
+        return by(largest) if local is None else combine_bounds(by(largest), by(local))
+
+    def slopes_along(
+        self, integrand: Callable[[Array], Array], panels: Panels, tau: Array
+    ) -> Array | None:
+        """Return ∫|∂f/∂z_k| dτ from zero to each τ, (N, g), of an integrand f at phases; None on
+        many panels.
+        """
+        genus = self.motion.periods.genus
+        if panels.lengths.size > _FEW_PANELS:
+            return None
+        cells = np.repeat(panels.lengths / _CELLS, _CELLS)
+        borders = panels.borders[0] + np.concatenate([[0.0], np.cumsum(cells)])
+        z = self.in_tau.phases(borders[:-1] + cells / 2)
+        here = integrand(z)
+        slopes = [np.abs(integrand(z + step) - here) / _STEP for step in _STEP * np.eye(genus)]
+        sums = [np.concatenate([[0.0], np.cumsum(BETWEEN * cells * part)]) for part in slopes]
+        between = [np.interp(tau, borders, x) - np.interp(0.0, borders, x) for x in sums]
+        return np.asarray(np.abs(np.stack(between, axis=1)))
+
+    def integral_error(self, tau: Array, slopes: Array, along: Array | None) -> Array:
         """Return how far errors of the phases move an integral along the orbit, (N,), from its
-        integrand's slopes in them, (g,).
+        integrand's largest slopes in them, (g,), and from those along the orbit, ``slopes_along``.
 
         They act in one sense for as long as the slowest phase takes for a radian, at most.
         """
         rates = np.abs(self.in_tau.rates)
         elapsed = np.abs(tau)
         acting = np.minimum(elapsed, 1 / np.min(rates))
-        moved = (
-            float(self.start_rounding @ slopes)
-            + _RATE * DOUBLE.epsilon * float(rates @ slopes) * elapsed
-        )
-        return np.asarray(acting * moved)
+        moved = self.start_rounding + _RATE * DOUBLE.epsilon * elapsed[:, None] * rates
+        largest = acting * (moved @ slopes)
+        if along is None:
+            return np.asarray(largest)
+        return np.asarray(np.minimum(largest, np.sum(moved * along, axis=1)))

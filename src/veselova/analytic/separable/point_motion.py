@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
@@ -46,16 +47,22 @@ class PointMotion(Motion[SeparableVeselova]):
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
-        return self._orbit.sensitivity(lambda at: at.q)
+        return self._orbit.sensitivity(_positions)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
-        at, velocity = orbit.states(z)
+        at, velocity, rate = orbit.states(z)
         series = {
             name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))
         }
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
-        error = orbit.require_digit(orbit.error(tau, time_map, self._sensitivity)[0], grid.doubles)
+        lag = orbit.lag(grid.doubles, tau, rate, time_map)
+        error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _positions))
+        error = orbit.require_digit(error, grid.doubles)
         return series, error, "angles", orbit.details(time_map)
+
+
+def _positions(at: Attitude) -> Array:
+    return np.asarray(at.q)

@@ -97,8 +97,9 @@ class ChebyshevTimeMap(TimeMap):
         What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
         """
         panels = self.panels
-        # The tails are those of t; divided by the mean rate they are those of τ₁.
-        error = panels.error(tau1) / panels.mean_size
+        # The tails are those of t; divided by F_0, whatever dt/dτ₁ is along these panels: whoever
+        # takes the error multiplies by F_0 over the rate at each time.
+        error = panels.error(tau1) / self._mean
         # The fastest phase has no part in them where it takes orders that are not there to make up
         # for it.
         rates = np.abs(self.in_tau1.rates)
