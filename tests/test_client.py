@@ -116,7 +116,18 @@ def test_the_asynchronous_client_has_the_same_methods(server: Server) -> None:
 def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
     public = {name for name in vars(Client) if not name.startswith("_")}
     assert public == {name for name in vars(AsyncClient) if not name.startswith("_")}
-    assert public == {"trajectory", "download", "compare", "torus", "sweep", "run", "close"}
+    assert public == {
+        "close",
+        "closed_form",
+        "compare",
+        "curve",
+        "download",
+        "run",
+        "sweep",
+        "theta",
+        "torus",
+        "trajectory",
+    }
     for name in public:
         assert getattr(Client, name).__doc__ == getattr(AsyncClient, name).__doc__
 

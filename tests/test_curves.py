@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from veselova import InvalidInput, curves, theta
+from veselova import InvalidInput, Unsolved, curves, theta
 
 
 def branch_points(random: np.random.Generator, count: int) -> list[float]:
@@ -192,7 +192,7 @@ def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
         (["0.5", "1/2", 1], "distinct numbers"),
         ([0, 1], "3 to 34 real numbers"),
         ([0, 1j, 2], "branch_points"),
-        (np.array([0, 1j, 2]), "real numbers"),
+        (np.array([0, 1j, 2]), "a real number .curves with complex branch points are not served"),
         ([0, float("nan"), 2], "branch_points"),
         ("012", "branch_points"),
         (list(range(60)), "3 to 34"),
@@ -242,3 +242,37 @@ def test_high_genera_agree_with_quadrature(genus: int) -> None:
     assert max(
         abs(found[i, j] - float(T[i, j])) for i in range(genus) for j in range(genus)
     ) < 1e-13 * np.max(found)
+
+
+@pytest.mark.parametrize("count", [5, 6])
+@pytest.mark.parametrize("unit", [1e-250, 1e-100, 1e100, 1e250])
+def test_the_riemann_matrix_has_no_unit(count: int, unit: float) -> None:
+    points = branch_points(np.random.default_rng([7, count]), count)
+    scaled = curves.RealHyperelliptic([Fraction(b) * Fraction(unit) for b in points])
+    plain = curves.RealHyperelliptic(points)
+    assert np.allclose(scaled.riemann_matrix, plain.riemann_matrix, rtol=1e-13, atol=0)
+    assert scaled.legendre_residual < 1e-12
+    point, signs = scaled.invert([0.2, 0.7])
+    assert np.allclose(scaled.torus(point.tolist(), signs), [0.2, 0.7], atol=1e-12)
+
+
+def test_far_branch_points_are_as_good_as_near_ones() -> None:
+    near = curves.RealHyperelliptic([0, 1, 3, 7, 12])
+    far = curves.RealHyperelliptic([10**15, 10**15 + 1, 10**15 + 3, 10**15 + 7, 10**15 + 12])
+    assert np.array_equal(near.riemann_matrix, far.riemann_matrix)
+    assert far.legendre_residual < 1e-13
+
+
+def test_periods_out_of_range_are_refused_by_name() -> None:
+    curve = curves.RealHyperelliptic(["1e250", "2e250", "4e250", "5e250", "7e250"])
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        _ = curve.periods
+    with pytest.raises(InvalidInput, match="1e-100"):
+        curves.RealHyperelliptic([0, 1e-200, 1])
+
+
+def test_every_bad_branch_point_is_named() -> None:
+    with pytest.raises(InvalidInput) as caught:
+        curves.RealHyperelliptic([0, "x", 1j, float("nan")], 3)
+    fields = [fault.field for fault in caught.value.faults]
+    assert fields == ["branch_points[1]", "branch_points[2]", "branch_points[3]", "sign"]

@@ -23,6 +23,7 @@ from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import BUDGET_S, GOOD, INVALID, MALFORMED, changed
 from veselova import Veselova, compare, solve, torus
 from veselova.service.api.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.http.routes import RESOURCES
 
 JSON = {"content-type": "application/json"}
 
@@ -111,10 +112,8 @@ def test_the_worked_examples_of_the_document_are_true(server: Server) -> None:
 
 def test_the_openapi_document_describes_and_exemplifies_every_resource(server: Server) -> None:
     document = server.get("/openapi.json").json()
-    assert {"/v1/trajectories", "/v1/trajectories/{name}", "/v1/comparisons", "/v1/tori"} < set(
-        document["paths"]
-    )
-    for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori"):
+    assert {"/v1/trajectories/{name}", *RESOURCES} < set(document["paths"])
+    for path in RESOURCES:
         operation = document["paths"][path]["post"]
         body = operation["requestBody"]["content"]["application/json"]
         assert body["schema"]["$ref"].split("/")[-1] in document["components"]["schemas"]

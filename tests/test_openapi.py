@@ -14,6 +14,7 @@ from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
+from veselova.service.http.routes import RESOURCES
 
 #: Names of functions in generated clients: programs of users call them, so that none may change or
 #: go.
@@ -22,8 +23,11 @@ OPERATIONS = {
     "check_health",
     "check_readiness",
     "compare_engines",
+    "compute_closed_form",
+    "compute_curve",
     "compute_torus",
     "create_sweep",
+    "evaluate_theta",
     "get_job",
     "get_job_result",
     "get_job_trajectories",
@@ -88,7 +92,7 @@ def test_every_reference_resolves_and_every_schema_is_referred_to(document: dict
 
 
 def test_bodies_and_parameters_can_be_refused(document: dict[str, Any]) -> None:
-    for path in ("/v1/trajectories", "/v1/comparisons", "/v1/tori", "/v1/sweeps"):
+    for path in (*RESOURCES, "/v1/sweeps"):
         assert {"400", "413", "415", "422"} < set(document["paths"][path]["post"]["responses"]), (
             path
         )

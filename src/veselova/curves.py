@@ -8,8 +8,11 @@ curve.riemann_matrix
 
 from __future__ import annotations
 
+import cmath
 import itertools
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -20,16 +23,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.theta.characteristic import Characteristic
-from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_vector
+from veselova.mechanics.core.curve_arguments import (
+    curve_arguments,
+    exact_points,
+    points_with_sheets,
+)
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
+from veselova.mechanics.results.curve import CurveData
 
 __all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-#: Genera that are served; higher ones are right too, but were not tested.
-_LARGEST_GENUS = 16
 
 #: Rounding of an entry of T in ε, for each unit by which its periods cancel; largest seen over
 #: random curves: 6.
@@ -71,11 +76,8 @@ class RealHyperelliptic:
     """
 
     def __init__(self, branch_points: ArrayLike | Sequence[Any], sign: int = -1) -> None:
-        if isinstance(sign, bool) or sign not in (-1, 1):
-            raise InvalidInput(("sign",), "1 or −1", show(sign))
-        points = _exact_points(branch_points)
-        self._curve = RealCurve(points, int(sign))
-        self.sign = int(sign)
+        points, self.sign = curve_arguments(branch_points, sign)
+        self._curve = RealCurve(points, self.sign)
 
     def __repr__(self) -> str:
         return (
@@ -103,6 +105,28 @@ class RealHyperelliptic:
         """Return the intervals between them that b_1 … b_g are made of, (g, 2)."""
         return self._intervals(0)
 
+    def data(self, points: Any = None, w: Any = None) -> CurveData:
+        """Return the curve as data, with the images of points (λ, w) where they are given."""
+        periods: CurvePeriods | None = None
+        differentials: Array | None = None
+        with suppress(Unsolved):
+            periods = self.periods
+            differentials = self.normalized_differentials
+        return CurveData(
+            genus=self.genus,
+            sign=self.sign,
+            branch_points=self.branch_points,
+            cuts=self.cuts,
+            gaps=self.gaps,
+            a_periods=None if periods is None else periods.a,
+            b_periods=None if periods is None else periods.b,
+            normalized_differentials=differentials,
+            riemann_matrix=self.riemann_matrix,
+            riemann_matrix_error=self.riemann_matrix_error,
+            characteristics=np.array(self.characteristics),
+            abel=None if points is None else self.abel(points, w),
+        )
+
     def _intervals(self, first: int) -> Array:
         order = self._curve.order
         ends = [[order[j], order[j + 1]] for j in range(first, 2 * self.genus, 2)]
@@ -115,13 +139,26 @@ class RealHyperelliptic:
         On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which
         ``cuts`` are numbered.
         """
-        a, b = self._curve.cycles(self.genus - 1)
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            a, b = self._curve.cycles(self.genus - 1)
+        # a cycle of zeros has left the range at its other end
+        if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b)) and np.all(np.any(a, axis=1))):
+            reason = "a period leaves the range of a float; take branch points in other units"
+            raise Unsolved("beyond-floats", reason)
         return CurvePeriods(a, np.asarray(1j * b, dtype=complex))
 
     @cached_property
     def normalized_differentials(self) -> Array:
         """Return c, (g, g): v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js."""
-        return np.asarray(np.linalg.inv(self.periods.a), dtype=np.float64)
+        a = self.periods.a
+        # rows are of different units
+        sizes = np.max(np.abs(a), axis=1)
+        with np.errstate(over="ignore"):
+            inverse = np.linalg.inv(a / sizes[:, None]) / sizes
+        if not np.all(np.isfinite(inverse)):
+            reason = "a coefficient leaves the range of a float; take branch points in other units"
+            raise Unsolved("beyond-floats", reason)
+        return np.asarray(inverse, dtype=np.float64)
 
     @cached_property
     def riemann_matrix(self) -> Complex:
@@ -148,14 +185,14 @@ class RealHyperelliptic:
         one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are
         2g+2.
         """
-        return self._curve.quasi_periods
+        return self._curve.quasi_periods()
 
     @property
     def legendre_residual(self) -> float:
         """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over ½π: Legendre's relation between periods of the first
         and second kind, a check.
         """
-        omega, omega_prime, eta, eta_prime = self._curve.quasi_periods
+        omega, omega_prime, eta, eta_prime = self._curve.quasi_periods(in_nu=False)
         found = (omega @ eta_prime.T - omega_prime @ eta.T) / (np.pi / 2)
         return float(np.max(np.abs(np.abs(found) - np.eye(self.genus))))
 
@@ -179,12 +216,7 @@ class RealHyperelliptic:
         complex λ) name the sheets. Raises InvalidInput for bad numbers, Unsolved where a path
         passes too near a branch point. Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
         """
-        sheets = np.atleast_1d(np.array(w, dtype=complex))
-        places = _numbers(points)
-        if len(places) != len(sheets):
-            raise InvalidInput(
-                ("w",), f"{len(places)} numbers, one for each point", str(len(sheets))
-            )
+        places, sheets = points_with_sheets(points, w)
         return np.array(
             [
                 self._image(point, sheet)
@@ -211,11 +243,11 @@ class RealHyperelliptic:
         else:
             target = complex(curve.to_mu(point))
         j, part, v = curve.from_nearest_end(target)
-        # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity.
-        wanted = (
-            w * (-target if curve.reverses else target) ** (self.genus + 1) if curve.is_even else w
-        )
-        sign = 1 if abs(wanted - v) <= abs(wanted + v) else -1
+        # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity: phases say which.
+        angle = cmath.phase(w)
+        if curve.is_even:
+            angle -= (self.genus + 1) * cmath.phase(complex(curve.points[-1] - point))
+        sign = 1 if math.cos(angle - cmath.phase(v)) >= 0 else -1
         return np.asarray((0 if j is None else self._at_end(j, T)) + sign * part)
 
     def _at_end(self, j: int, T: Array) -> Complex:
@@ -243,20 +275,22 @@ class RealHyperelliptic:
         curve = self._curve
         psi = curve.inversion.invert(rows - np.floor(rows))
         below, above = curve.periods.roots_on_cuts(psi)
-        betas = curve.periods.curve.branch_points
-        lower = betas[1::2, None] + below**2
-        upper = betas[2::2, None] - above**2
-        mu = np.where(below**2 <= above**2, lower, upper).T
+        nu = np.array(
+            [
+                curve.nu(2 * s + 1, left**2, right**2)
+                for s, (left, right) in enumerate(zip(below, above, strict=True))
+            ]
+        ).T
         turns = np.arange(self.genus, 0, -1) - 1
         signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
-        points = curve.to_lambda(mu)
+        points = curve.to_lambda(nu)
         return (points[0], signs[0]) if phases.ndim == 1 else (points, signs)
 
     def torus(self, points: Any, signs: ArrayLike) -> Array:
         """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
         inverse of ``invert``.
         """
-        rows = [_numbers(row) for row in (points if np.ndim(points) == 2 else [points])]
+        rows = [exact_points(row) for row in (points if np.ndim(points) == 2 else [points])]
         directions = np.atleast_2d(np.array(signs, dtype=float))
         if any(len(row) != self.genus for row in rows) or directions.shape != (
             len(rows),
@@ -320,46 +354,3 @@ class RealHyperelliptic:
 
 def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(e / 2 for e in characteristic.epsilon), tuple(d / 2 for d in characteristic.delta)
-
-
-def _exact_points(given: Any) -> tuple[Fraction, ...]:
-    """Return the branch points as rationals, increasing; raises InvalidInput."""
-    if isinstance(given, np.ndarray) and np.iscomplexobj(given):
-        raise InvalidInput(
-            ("branch_points",),
-            "real numbers (curves with complex branch points are not served)",
-            show(given),
-        )
-    values = [Fraction(value) for value in exact_vector(given, ("branch_points",))]
-    if not 3 <= len(values) <= 2 * _LARGEST_GENUS + 2:
-        raise InvalidInput(
-            ("branch_points",), f"3 to {2 * _LARGEST_GENUS + 2} real numbers", str(len(values))
-        )
-    points = tuple(sorted(values))
-    for before, after in itertools.pairwise(points):
-        if before == after:
-            raise InvalidInput(
-                ("branch_points",), "distinct numbers (drop a pair: the curve of the others has "
-                    "the same differentials)",
-                f"{float(before):.6g} twice",
-            )  # fmt: skip
-    return points
-
-
-def _numbers(given: Any) -> list[Fraction | complex]:
-    """Return points as rationals where they are real, and complex numbers; raises InvalidInput."""
-    items = (
-        np.atleast_1d(given).tolist()
-        if isinstance(given, (np.ndarray, int, float, complex))
-        else list(given)
-    )
-    found: list[Fraction | complex] = []
-    for i, item in enumerate(items):
-        if isinstance(item, complex) and item.imag:
-            if not np.isfinite(item):
-                raise InvalidInput(("points", i), "a finite number", show(item))
-            found.append(item)
-        else:
-            value = item.real if isinstance(item, complex) else item
-            found.append(Fraction(exact_vector([value], ("points",))[0]))
-    return found

@@ -10,17 +10,18 @@ theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.theta_arguments import ThetaArguments, siegel_matrix
+from veselova.mechanics.results.scaled_theta import ScaledTheta
 
 __all__ = [
     "ScaledTheta",
+    "evaluate_theta",
     "riemann_theta",
     "scaled_riemann_theta",
     "siegel_reduce",
@@ -28,28 +29,6 @@ __all__ = [
 ]
 
 Complex = NDArray[np.complex128]
-
-#: τ may be off its transpose by this part of its largest entry; it is made symmetric.
-_SYMMETRY = 1e-12
-
-#: Genera that are served.
-_LARGEST_GENUS = 8
-
-#: exp of this is the largest double.
-_LARGEST_EXPONENT = 709.0
-
-
-@dataclass(frozen=True)
-class ScaledTheta:
-    """Theta values as ``mantissa``·exp(``exponent``), whatever their size.
-
-    mantissa: complex, the shape of the values · exponent, error: real, without the axes of
-    derivatives. The mantissa is off by at most ``error``.
-    """
-
-    mantissa: Complex
-    exponent: NDArray[np.float64]
-    error: NDArray[np.float64]
 
 
 def riemann_theta(
@@ -68,16 +47,7 @@ def riemann_theta(
     (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against
     python-flint.
     """
-    found = scaled_riemann_theta(z, tau, characteristic, derivatives)
-    exponent = found.exponent.reshape(
-        found.exponent.shape + (1,) * (found.mantissa.ndim - found.exponent.ndim)
-    )
-    if np.max(exponent, initial=0.0) > _LARGEST_EXPONENT:
-        raise Unsolved(
-            "beyond-floats",
-            f"exp({np.max(exponent):.6g}) leaves the range of a float; take scaled_riemann_theta",
-        )
-    return np.asarray(found.mantissa * np.exp(exponent))
+    return scaled_riemann_theta(z, tau, characteristic, derivatives).values
 
 
 def scaled_riemann_theta(
@@ -86,17 +56,26 @@ def scaled_riemann_theta(
     """Return the same as ``riemann_theta`` as mantissas and exponents, with a bound
     of the error.
     """
-    matrix = _siegel(tau)
-    genus = len(matrix)
-    points, single = _points(z, genus)
-    halves, alone = _characteristics(characteristic, genus)
-    if isinstance(derivatives, bool) or derivatives not in (0, 1, 2):
-        raise InvalidInput(("derivatives",), "0, 1 or 2", show(derivatives))
-    function = SiegelTheta(matrix)
+    return evaluate_theta(ThetaArguments.of(z, tau, characteristic, derivatives))
+
+
+def evaluate_theta(asked: ThetaArguments) -> ScaledTheta:
+    """Return the theta functions of arguments that are validated already."""
+    function = SiegelTheta(asked.tau)
+    if not function.terms < np.inf:
+        raise Unsolved("beyond-floats", "the reduced τ leaves the range of a float")
     if not function.is_small:
         raise Unsolved("too-many-terms", f"the sum has about {function.terms:.1e} terms")
-    take = (0 if single else slice(None), 0 if alone else slice(None))
-    mantissas, exponents, errors = function.values(points, halves, derivatives)
+    take = (
+        0 if asked.single_point else slice(None),
+        0 if asked.single_characteristic else slice(None),
+    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = function.values(asked.points, asked.characteristics, asked.derivatives)
+    if not all(np.all(np.isfinite(part)) for part in parts):
+        reason = "an exponent or derivative leaves the range of a float: z is too far out"
+        raise Unsolved("beyond-floats", reason)
+    mantissas, exponents, errors = parts
     return ScaledTheta(
         np.asarray(mantissas[take]), np.asarray(exponents[take]), np.asarray(errors[take])
     )
@@ -106,7 +85,7 @@ def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float
     """Return θ[ε;δ](0|τ) of all half-integer characteristics by (ε, δ), entries 0 and ½; odd ones
     vanish exactly.
     """
-    matrix = _siegel(tau)
+    matrix = siegel_matrix(tau)
     genus = len(matrix)
     rows = list(itertools.product((0.0, 0.5), repeat=genus))
     pairs = [(epsilon, delta) for epsilon in rows for delta in rows]
@@ -122,74 +101,5 @@ def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
     Reduced: Im τ' is reduced as a quadratic form, |Re τ'| ≤ ½, |τ'_11| ≥ 1, so that Im τ'_11 ≥
     √3/2.
     """
-    reduction = SiegelTheta(_siegel(tau)).reduction
+    reduction = SiegelTheta(siegel_matrix(tau)).reduction
     return reduction.tau.astype(complex), reduction.symplectic
-
-
-def _siegel(tau: Any) -> Complex:
-    """Return τ as a symmetric complex matrix; raises InvalidInput outside the Siegel half space."""
-    try:
-        matrix = np.array(tau, dtype=complex)
-    except (TypeError, ValueError):
-        raise InvalidInput(("tau",), "a square matrix of numbers", show(tau)) from None
-    if (
-        matrix.ndim != 2
-        or matrix.shape[0] != matrix.shape[1]
-        or not 1 <= len(matrix) <= _LARGEST_GENUS
-    ):
-        raise InvalidInput(
-            ("tau",), f"a g × g matrix, g = 1 … {_LARGEST_GENUS}", f"shape {matrix.shape}"
-        )
-    if not np.all(np.isfinite(matrix)):
-        raise InvalidInput(("tau",), "finite numbers", show(tau))
-    defect = float(np.max(np.abs(matrix - matrix.T)))
-    if defect > _SYMMETRY * float(np.max(np.abs(matrix))):
-        raise InvalidInput(
-            ("tau",), "a symmetric matrix", f"one that differs from its transpose by {defect:.3g}"
-        )
-    matrix = np.asarray((matrix + matrix.T) / 2)
-    least = float(np.linalg.eigvalsh(matrix.imag)[0])
-    if not least > 0:
-        raise InvalidInput(
-            ("tau",), "a positive definite imaginary part", f"one with least eigenvalue {least:.6g}"
-        )
-    return matrix
-
-
-def _points(z: Any, genus: int) -> tuple[Complex, bool]:
-    """Return points (N, g), and whether one was given by itself."""
-    try:
-        points = np.array(z, dtype=complex)
-    except (TypeError, ValueError):
-        raise InvalidInput(
-            ("z",), f"a vector of {genus} numbers, or rows of them", show(z)
-        ) from None
-    if points.ndim not in (1, 2) or points.shape[-1] != genus:
-        raise InvalidInput(
-            ("z",), f"a vector of {genus} numbers, or rows of them", f"shape {points.shape}"
-        )
-    if not np.all(np.isfinite(points)):
-        raise InvalidInput(("z",), "finite numbers", show(z))
-    return np.atleast_2d(points), points.ndim == 1
-
-
-def _characteristics(given: Any, genus: int) -> tuple[NDArray[np.float64], bool]:
-    """Return characteristics (C, 2, g), and whether one was given by itself."""
-    if given is None:
-        return np.zeros((1, 2, genus)), True
-    try:
-        halves = np.array([[[float(x) for x in row] for row in one] for one in _to_list(given)])
-    except (TypeError, ValueError):
-        halves = np.empty(0)
-    alone = np.ndim(given) == 2
-    if halves.ndim != 3 or halves.shape[1:] != (2, genus) or not np.all(np.isfinite(halves)):
-        raise InvalidInput(
-            ("characteristic",),
-            f"[ε, δ] of {genus} real numbers each, or a list of those",
-            show(given),
-        )
-    return halves, alone
-
-
-def _to_list(given: Any) -> Any:
-    return [given] if np.ndim(given) == 2 else given

@@ -1,13 +1,14 @@
 """A hyperelliptic curve with real branch points, brought to w² = −Π(μ−β_j), j = 0 … 2g, whose
 bounded ovals lie over the cuts.
 
-    w² = −Π_{2g+1}(λ−b_j)     μ = λ
-    w² = +Π_{2g+1}(λ−b_j)     μ = −λ
-    w² = +Π_{2g+2}(λ−b_j)     μ = 1/(e−λ), e the last branch point, which goes to infinity
-    w² = −Π_{2g+2}(λ−b_j)     μ = 1/(λ−e), e the last branch point
+    w² = −Π_{2g+1}(λ−b_j)     ν = λ
+    w² = +Π_{2g+1}(λ−b_j)     ν = −λ
+    w² = +Π_{2g+2}(λ−b_j)     ν = 1/(e−λ), e the last branch point, which goes to infinity
+    w² = −Π_{2g+2}(λ−b_j)     ν = 1/(λ−e), e the last branch point
 
-Differences of β's are products and quotients of exact differences, so that near branch points keep
-their digits.
+and μ = (ν−c)/s, where the β's are between −2 and 2: neither powers nor products of differences
+leave the range of a double. Differences of β's are products and quotients of exact differences, so
+that near branch points keep their digits.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,7 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
-from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
 
 __all__ = ["RealCurve"]
 
@@ -40,6 +42,10 @@ _FEWEST_NODES = 32
 _MOST_NODES = 1024
 _QUADRATURE = 1e-13
 
+#: The nearest two β's over the span of all: below it products of elliptic integrals leave the range
+#: of a double.
+_SMALLEST_GAP = Fraction(1, 10**100)
+
 
 @dataclass(frozen=True)
 class RealCurve:
@@ -49,6 +55,16 @@ class RealCurve:
 
     points: tuple[Fraction, ...]
     sign: int
+
+    def __post_init__(self) -> None:
+        gap = min(after - before for before, after in pairwise(self.betas))
+        if gap < _SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
+            moved = ", the largest moved to infinity," if self.is_even else ""
+            raise InvalidInput(
+                ("branch_points",),
+                f"differences of neighbours{moved} of at least 1e-100 of their span",
+                "a smaller one",
+            )
 
     @property
     def genus(self) -> int:
@@ -66,11 +82,28 @@ class RealCurve:
         return (self.sign > 0) != self.is_even
 
     @cached_property
-    def betas(self) -> tuple[Fraction, ...]:
-        """Return β_0 < … < β_{2g}, exact."""
+    def _nus(self) -> tuple[Fraction, ...]:
+        """Return the finite branch points in ν, increasing, exact."""
         *finite, last = self.points if self.is_even else (*self.points, Fraction(0))
         values = [1 / (last - b) for b in finite] if self.is_even else finite
         return tuple(-b for b in reversed(values)) if self.reverses else tuple(values)
+
+    @cached_property
+    def centre(self) -> Fraction:
+        """Return c of μ = (ν−c)/s."""
+        return (self._nus[0] + self._nus[-1]) / 2
+
+    @cached_property
+    def root_of_unit(self) -> Fraction:
+        """Return √s, the power of 2 for which half the span is between ½s and 4s."""
+        half = (self._nus[-1] - self._nus[0]) / 2
+        exponent = half.numerator.bit_length() - half.denominator.bit_length()
+        return Fraction(2) ** (exponent // 2)
+
+    @cached_property
+    def betas(self) -> tuple[Fraction, ...]:
+        """Return β_0 < … < β_{2g}, exact."""
+        return tuple((nu - self.centre) / self.root_of_unit**2 for nu in self._nus)
 
     @cached_property
     def order(self) -> tuple[int, ...]:
@@ -96,26 +129,35 @@ class RealCurve:
 
     @cached_property
     def scale(self) -> float:
-        """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}μ^{g−1}) dμ/v, or of ±λ^{k−1} dμ/v where μ
-        = ±λ.
+        """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}|ν|^{g−1}) dμ/v, without |ν|^{g−1} where
+        ν = ±λ.
         """
-        if not self.is_even:
-            return -1.0 if self.reverses else 1.0
-        *finite, last = self.points
-        root = math.sqrt(math.prod((last - b for b in finite), start=Fraction(1)))
-        return -1.0 / root if self.reverses else 1.0 / root
+        square = self.root_of_unit ** (2 - 4 * self.genus)
+        if self.is_even:
+            *finite, last = self.points
+            square /= math.prod((last - b for b in finite), start=Fraction(1))
+        return -_square_root(square) if self.reverses else _square_root(square)
 
-    def to_lambda(self, mu: Array) -> Array:
-        """Return λ at μ."""
-        mu = -mu if self.reverses else mu
-        return np.asarray(float(self.points[-1]) - 1 / mu if self.is_even else mu)
+    def nu(self, number: int, below: Array, above: Array) -> Array:
+        """Return ν at distances in μ from both ends of the interval [β_number, β_{number+1}], from
+        the nearer end.
+        """
+        unit = float(self.root_of_unit**2)
+        left = float(self._nus[number]) + unit * below
+        right = float(self._nus[number + 1]) - unit * above
+        return np.where(below <= above, left, right)
 
-    def weights(self, mu: Array, highest: int) -> Array:
-        """Return c·λ^k, times |μ|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
+    def to_lambda(self, nu: Array) -> Array:
+        """Return λ at ν."""
+        nu = -nu if self.reverses else nu
+        return np.asarray(float(self.points[-1]) - 1 / nu if self.is_even else nu)
+
+    def weights(self, nu: Array, highest: int) -> Array:
+        """Return c·λ^k, times |ν|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
         the forms λ^k dλ/w over dμ/v.
         """
-        point = self.to_lambda(mu)
-        common = self.scale * (np.abs(mu) ** (self.genus - 1) if self.is_even else np.ones_like(mu))
+        point = self.to_lambda(nu)
+        common = self.scale * (np.abs(nu) ** (self.genus - 1) if self.is_even else np.ones_like(nu))
         return np.stack([common * point**k for k in range(highest + 1)])
 
     def integrals(self, number: int, highest: int) -> Array:
@@ -128,40 +170,44 @@ class RealCurve:
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
         density = measure / np.prod(of_gaps, axis=-2)
-        beta = self.periods.curve.branch_points
-        width = self.periods.curve.differences[number, number + 1]
-        near_left = below <= width / 2
-        mu = np.where(near_left, beta[number] + below, beta[number + 1] - above)
-        return np.asarray(2 * np.pi * np.mean(self.weights(mu, highest) * density, axis=-1))
+        weights = self.weights(self.nu(number, below, above), highest)
+        return np.asarray(2 * np.pi * np.mean(weights * density, axis=-1))
 
-    def monomial_integrals(self, number: int, highest: int) -> Array:
-        """Return ∫ μ^k dμ/√|R| over the interval [β_number, β_{number+1}], k = 0 … highest."""
+    def monomial_integrals(self, number: int, highest: int, in_nu: bool = False) -> Array:
+        """Return ∫ μ^k dμ/√|R| over the interval [β_number, β_{number+1}], k = 0 … highest.
+
+        ``in_nu``: the same in ν.
+        """
         interval = Interval(self.periods.curve, number)
         nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
-        mu = self.periods.curve.branch_points[number] + below
-        powers = mu ** np.arange(highest + 1)[:, None]
+        point = self.periods.curve.branch_points[number] + below
+        if in_nu:
+            measure = measure * _square_root(self.root_of_unit ** (2 - 4 * self.genus))
+            point = self.nu(number, below, above)
+        powers = point ** np.arange(highest + 1)[:, None]
         return np.asarray(
             2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1)
         )
 
-    @cached_property
-    def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
-        """Return ω, ω', η, η', half the periods of du_k = μ^{k−1}dμ/y and −dr_k over a_s and b_s,
-        (g, g), y² = 4Π(μ−β).
+    def quasi_periods(self, in_nu: bool = True) -> tuple[Complex, Complex, Complex, Complex]:
+        """Return ω, ω', η, η', half the periods of du_k = x^{k−1}dx/y and −dr_k over a_s and b_s,
+        (g, g), y² = 4Π(x−x_j), where x is ν, or else μ.
 
-        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} μ^j dμ/4y for y² = Σ m_i μ^i (Baker): differentials
+        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} x^j dx/4y for y² = Σ m_i x^i (Baker): differentials
         of the second kind.
         """
         g = self.genus
-        m = 4 * np.poly(np.array([float(b) for b in self.betas]))[::-1]
+        m = 4 * np.poly(np.array([float(b) for b in (self._nus if in_nu else self.betas)]))[::-1]
         kinds = np.zeros((2 * g, 2 * g))
         kinds[:g, :g] = np.eye(g)
         for k in range(1, g + 1):
             for j in range(k, 2 * g + 1 - k):
                 kinds[g + k - 1, j] = -(j + 1 - k) * m[j + 1 + k] / 4
-        over = [kinds @ self.monomial_integrals(number, 2 * g - 1) for number in range(2 * g)]
+        over = [
+            kinds @ self.monomial_integrals(number, 2 * g - 1, in_nu) for number in range(2 * g)
+        ]
         # y = 2iv on cuts; on gaps v is i√|R| as in the b-periods of the first kind.
         a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1) / 2j
         b = (
@@ -199,8 +245,10 @@ class RealCurve:
 
     def to_mu(self, point: Any) -> Any:
         """Return μ at λ, exact for rationals."""
-        mu = 1 / (self.points[-1] - point) if self.is_even else point
-        return -mu if self.reverses else mu
+        if self.is_even:
+            point = 1 / (self.points[-1] - point)
+        nu = -point if self.reverses else point
+        return (nu - self.centre) / self.root_of_unit**2
 
     def place(self, mu: Fraction) -> int:
         """Return the number of the interval [β_j, β_{j+1}] that holds μ, −1 below β_0 and 2g above
@@ -279,6 +327,17 @@ class RealCurve:
 
         v = end * roots(np.array([end]))[0]
         return j, self.periods.inverse_cycles @ _integral(over_x, end), complex(v)
+
+
+def _square_root(value: Fraction) -> float:
+    """Return the root of a positive number, correctly rounded but for its last bit, 0 or infinity
+    beyond the range of doubles.
+    """
+    exponent = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    try:
+        return math.ldexp(math.sqrt(value / Fraction(4) ** exponent), exponent)
+    except OverflowError:
+        return math.inf
 
 
 def _without_each(factors: Complex) -> Complex:

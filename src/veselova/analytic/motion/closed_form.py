@@ -15,21 +15,16 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form import ClosedForm
+from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.systems.torus_problem import on_torus
 from veselova.version import __version__
 
 __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
-
-#: Accuracies that may be asked for: below the first, coefficients are rounding; above the last,
-#: nothing is left of the motion.
-_FINEST = 1e-15
-_COARSEST = 1e-2
 
 #: Modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
@@ -54,14 +49,7 @@ def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
     InvalidInput for another number, Unsolved at rest, on a separatrix (``no-closed-form``) and
     where theta functions or modes are too many.
     """
-    if (
-        isinstance(accuracy, bool)
-        or not isinstance(accuracy, (int, float))
-        or not _FINEST <= accuracy <= _COARSEST
-    ):
-        raise InvalidInput(
-            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
-        )
+    accuracy = require_accuracy(accuracy)
     problem = on_torus(given)
     solution = Solution(problem)
     if solution.separatrices:

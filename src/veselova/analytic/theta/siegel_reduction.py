@@ -73,6 +73,7 @@ class SiegelReduction:
     tau (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1 · linear L (g, g) ·
     quadratic Q (g, g)
     symplectic (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
+    rounding about the error of the entries of τ'
 
     Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
     bits more where the processor has them. Integers are chosen in doubles.
@@ -82,6 +83,7 @@ class SiegelReduction:
     linear: Wide = field(init=False)
     quadratic: Wide = field(init=False)
     symplectic: Integers = field(init=False)
+    rounding: float = field(default=0.0, init=False)
     _steps: list[tuple[str, Array]] = field(default_factory=list, init=False)
     _log_root: complex = field(default=0j, init=False)
 
@@ -104,6 +106,8 @@ class SiegelReduction:
         U = reduce_lattice(self.tau.imag.astype(float))
         self.tau = U @ self.tau @ U.T
         self.tau = (self.tau + self.tau.T) / 2
+        if not np.array_equal(U, np.eye(len(U))):
+            self._round(U)
         self.linear = U @ self.linear
         self._compose(U, 0 * U, 0 * U, np.rint(np.linalg.inv(U)).T.astype(np.int64))
         self._steps.append(("basis", U.astype(float)))
@@ -121,18 +125,30 @@ class SiegelReduction:
         b = self.tau[0, 1:]
         row = self.linear[0].copy()
         self.quadratic = self.quadratic - np.outer(row, row) / a
+        change = np.eye(len(self.tau), dtype=complex)
+        change[1:, 0] = -(b / a).astype(complex)
+        change[0, 0] = complex(-1 / a)
         self.linear[1:] -= np.outer(b, row) / a
         self.linear[0] = -row / a
         tau = self.tau.copy()
         tau[0, 0], tau[0, 1:], tau[1:, 0] = -1 / a, -b / a, -b / a
         tau[1:, 1:] -= np.outer(b, b) / a
         self.tau = tau
+        self._round(change)
         self._log_root -= complex(np.log(-1j * a)) / 2  # Re(−ia) = Im a > 0: the principal branch
         one = np.eye(len(tau), dtype=np.int64)
         first = np.zeros_like(one)
         first[0, 0] = 1
         self._compose(one - first, first, -first, one - first)
         self._steps.append(("inversion", np.empty(0)))
+
+    def _round(self, change: Any) -> None:
+        """Note the rounding of a step that takes dτ to M dτ Mᵀ; translations have none."""
+        largest = float(np.max(np.abs(self.tau)))
+        size = float(np.linalg.norm(change, 2))
+        self.rounding = (
+            self.rounding * size * size + 2 * float(np.finfo(np.longdouble).eps) * largest
+        )
 
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
         self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic

@@ -6,7 +6,8 @@ After Siegel reduction, with m = n + k and n the lattice point next to the large
     θ[ε;δ](z|τ) = e^{…} Σ_k W_k Π_j u_j^{k_j},   W_k = exp(πi kᵀτk),   u = exp 2πi(z + δ + τ(n+ε)).
 
 W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W
-is a sparse matrix between the products of powers of the two halves.
+is a sparse matrix between the products of powers of the two halves. Where Im τ is large, both leave
+the range of a double, though few terms matter: there the exponents are added first.
 """
 
 from __future__ import annotations
@@ -33,9 +34,18 @@ WideReal = NDArray[np.longdouble]
 
 _PI = np.longdouble("3.14159265358979323846264338327950288")
 
+#: Rounding of a long double over that of a double.
+_WIDE_RATIO = float(np.finfo(np.longdouble).eps / np.finfo(float).eps)
+
 #: Rounding of a term in ε, by its exponent and by products of powers; largest seen over random τ:
 #: 6.
 _TERM_ROUNDING = 4 * float(np.finfo(float).eps)
+
+#: Largest exponent of W up to which W and powers are multiplied: 2^±1022 = e^±708.
+_LARGEST_EXPONENT = 200.0
+
+#: Im τ' from which exponents leave the range of a double.
+_LARGEST_TAU = 1e200
 
 #: Entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
 _BLOCK = 1_000_000
@@ -53,6 +63,11 @@ class _Table:
     weights: csr_array
     sizes: csr_array
 
+    @property
+    def width(self) -> int:
+        """Return the numbers that a point needs."""
+        return max(len(self.left), len(self.right))
+
     @classmethod
     def of(cls, tau: Complex, points: Array) -> _Table:
         """Return the table of the points k (K, g)."""
@@ -62,15 +77,20 @@ class _Table:
         weights = csr_array((values, (j, i)), shape=(len(right), len(left)))
         return cls(left, right, weights, abs(weights))
 
-    def moments(self, v: Complex, order: int) -> tuple[list[Complex], Array]:
-        """Return Σ W e^{2πi k·v}, and with k_i and k_ik_j in the sum, (N,), (N, g), (N, g, g); and
-        Σ|W e^{2πi k·v}|.
+    def moments(self, v: Wide, order: int) -> tuple[list[Complex], Array, Array]:
+        """Return Σ W e^{2πi k·v}, and with k_i and k_ik_j in the sum, (N,), (N, g), (N, g, g);
+        Σ|W e^{2πi k·v}|; and this sum times 1 and 2π|k·v|, which its rounding is proportional to.
         """
         split = self.left.shape[1]
         genus = v.shape[1]
+        v = v.astype(complex)
         left = np.exp(2j * np.pi * (self.left @ v[:, :split].T))
         right = np.exp(2j * np.pi * (self.right @ v[:, split:].T))
         sizes = np.sum(np.abs(right) * (self.sizes @ np.abs(left)), axis=0)
+        turns = sum(
+            np.max(np.abs(k), axis=0, initial=0.0) @ np.abs(u).T
+            for k, u in ((self.left, v[:, :split]), (self.right, v[:, split:]))
+        )
         factors = [(self.left, i) for i in range(split)] + [
             (self.right, i) for i in range(genus - split)
         ]
@@ -94,20 +114,48 @@ class _Table:
             for i, j in itertools.combinations_with_replacement(range(genus), 2):
                 second[:, i, j] = second[:, j, i] = total((i, j))
             found.append(second)
-        return found, sizes
+        return found, sizes, sizes * (1 + 2 * np.pi * turns)
+
+
+@dataclass(frozen=True)
+class _Exponents:
+    """The terms of a sum by their k's (K, g) and exponents πi kᵀτk (K,), in long doubles."""
+
+    points: Array
+    exponents: Wide
+
+    @property
+    def width(self) -> int:
+        """Return the numbers that a point needs."""
+        return len(self.points)
+
+    def moments(self, v: Wide, order: int) -> tuple[list[Complex], Array, Array]:
+        """Return what ``_Table.moments`` does."""
+        turns = self.points @ v.T
+        terms = np.exp(self.exponents[:, None] + 2j * _PI * turns).astype(complex)
+        k = self.points
+        found = [np.sum(terms, axis=0)]
+        if order >= 1:
+            found.append(terms.T @ k)
+        if order == 2:
+            found.append(np.einsum("kn,ki,kj->nij", terms, k, k))
+        sizes = np.abs(terms)
+        exponents = np.abs(self.exponents)[:, None] + 2 * np.pi * np.abs(turns)
+        roundings = np.sum(sizes * (1 + 4 * _WIDE_RATIO * exponents.astype(float)), axis=0)
+        return found, np.sum(sizes, axis=0), roundings
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Σ terms and their derivatives, over e^{2πi·turns}; Σ|terms|; the largest 2π|m+ε|, and the
-    turns of a term by one of v.
+    """Σ terms and their derivatives, over e^{2πi·turns}; Σ|terms|; the largest 2π|m+ε|; the
+    rounding of the sum in ε.
     """
 
     derivatives: list[Complex]
     turns: Wide
     sizes: Array
     largest: Array
-    turning: float
+    rounding: Array
 
 
 def _transform(
@@ -149,8 +197,12 @@ class SiegelTheta:
 
     @cached_property
     def terms(self) -> float:
-        """Return about the number of terms of a sum, without forming them."""
+        """Return about the number of terms of a sum, without forming them; infinity where their
+        exponents leave the range of a double.
+        """
         form = self.reduction.tau.imag.astype(float)
+        if not np.max(np.abs(form)) < _LARGEST_TAU:
+            return math.inf
         return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
 
     @property
@@ -159,9 +211,14 @@ class SiegelTheta:
         return self.terms <= _MOST_TERMS
 
     @cached_property
-    def _table(self) -> _Table:
-        tau = self.reduction.tau.astype(complex)
-        return _Table.of(tau, points_near_cell(tau.imag, RADIUS))
+    def _table(self) -> _Table | _Exponents:
+        wide = self.reduction.tau
+        tau = wide.astype(complex)
+        points = points_near_cell(tau.imag, RADIUS)
+        exponents = 1j * _PI * _forms(points, wide)
+        if np.max(np.abs(exponents.real)) > _LARGEST_EXPONENT:
+            return _Exponents(points, exponents)
+        return _Table.of(tau, points)
 
     def values(
         self, z: Complex, characteristics: Array, order: int
@@ -208,10 +265,10 @@ class SiegelTheta:
             factor = np.exp((exponent - exponents[:, c]).astype(float) + 1j * phase)
             derivative, scale = _transform(found, slope, L.astype(complex), Q.astype(complex))
             values[:, c] = derivative * factor.reshape((count, *(1,) * order))
-            wide = float(np.finfo(np.longdouble).eps) * (1 + np.abs(turns).astype(float))
-            errors[:, c] = (
-                found.sizes * scale * (_TERM_ROUNDING + _TERM_ROUNDING * found.turning + 64 * wide)
-            )
+            wide = 64 * float(np.finfo(np.longdouble).eps) * (1 + np.abs(turns).astype(float))
+            # a rounding of τ' turns a term by ½(m+ε)ᵀdτ'(m+ε)
+            wide += self.reduction.rounding * found.largest**2
+            errors[:, c] = scale * (_TERM_ROUNDING * found.rounding + wide * found.sizes)
         return values, exponents, errors
 
     def _sums(self, z: Wide, epsilon: WideReal, delta: WideReal, order: int) -> _Sums:
@@ -223,14 +280,15 @@ class SiegelTheta:
         m = np.rint(-(epsilon.astype(float) + height)) + epsilon
         v = z + delta + m @ tau
         turns = _forms(m, tau) / 2 + np.sum(m * (z + delta), axis=1)
-        v = (v - np.rint(v.real)).astype(complex)  # k is an integer
+        v = v - np.rint(v.real)  # k is an integer
         own = m.astype(float)
         sums = [np.empty((count, *(genus,) * k), dtype=complex) for k in range(order + 1)]
         sizes = np.empty(count)
-        block = max(1, _BLOCK // max(len(self._table.left), len(self._table.right)))
+        roundings = np.empty(count)
+        block = max(1, _BLOCK // self._table.width)
         for first in range(0, count, block):
             rows = slice(first, first + block)
-            moments, sizes[rows] = self._table.moments(v[rows], order)
+            moments, sizes[rows], roundings[rows] = self._table.moments(v[rows], order)
             sums[0][rows], shift = moments[0], own[rows]
             if order >= 1:
                 sums[1][rows] = 2j * np.pi * (moments[1] + shift * moments[0][:, None])
@@ -240,18 +298,14 @@ class SiegelTheta:
                 sums[2][rows] = (
                     -4 * np.pi**2 * (moments[2] + mixed + np.swapaxes(mixed, 1, 2) + square)
                 )
-        return _Sums(
-            sums, turns, sizes, 2 * np.pi * (np.max(np.abs(own), axis=1) + self._reach), self._reach
-        )
+        largest = 2 * np.pi * (np.max(np.abs(own), axis=1) + self._reach)
+        return _Sums(sums, turns, sizes, largest, roundings)
 
     @cached_property
     def _reach(self) -> float:
-        return float(
-            max(
-                np.max(np.abs(self._table.left), initial=0),
-                np.max(np.abs(self._table.right), initial=0),
-            )
-        )
+        table = self._table
+        parts = (table.points,) if isinstance(table, _Exponents) else (table.left, table.right)
+        return float(max(np.max(np.abs(part), initial=0) for part in parts))
 
 
 def _distinct(points: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -16,9 +16,27 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
-__all__ = ["ClosedForm", "ClosedFormStates"]
+__all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
 
 Array = NDArray[np.float64]
+
+#: Accuracies that may be asked for: below the first, coefficients are rounding; above the last,
+#: nothing is left of the motion.
+_FINEST = 1e-15
+_COARSEST = 1e-2
+
+
+def require_accuracy(accuracy: Any) -> float:
+    """Return the error that modes left out of a time map may make; raises InvalidInput."""
+    if (
+        isinstance(accuracy, bool)
+        or not isinstance(accuracy, (int, float))
+        or not _FINEST <= accuracy <= _COARSEST
+    ):
+        raise InvalidInput(
+            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
+        )
+    return float(accuracy)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,10 @@ _NUMBER: dict[str, Any] = {
 }
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
-_HALVES: dict[str, Any] = {"type": "array", "items": {"enum": [0, 0.5]}}
+_HALVES: dict[str, Any] = {"type": "array", "items": {"type": "number", "enum": [0, 0.5]}}
 _PAIR: dict[str, Any] = {
     "type": "array",
-    "prefixItems": [{"type": "integer", "minimum": 0}, _NUMBER],
+    "items": _NUMBER,
     "minItems": 2,
     "maxItems": 2,
 }
@@ -38,7 +38,7 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "format": ({"const": FORMAT}, "the name and version of this format"),
     "version": ({"type": "string"}, "the version of veselova that made the document"),
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
-    "time": ({"enum": ["t", "s", "tau1"]}, "the independent variable"),
+    "time": ({"type": "string", "enum": ["t", "s", "tau1"]}, "the independent variable"),
     "digits": (
         {"type": "integer", "minimum": 15},
         "significant digits of the numbers; above 15 they are strings",
@@ -95,7 +95,7 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
             "properties": {
                 "characteristic": {"type": "integer"},
                 "constant": _NUMBER,
-                "power": {"enum": [-2, 0, 1]},
+                "power": {"type": "integer", "enum": [-2, 0, 1]},
             },
         },
         "d(time)/dτ₁ = constant·|θ[characteristic]/θ|^power",

@@ -7,8 +7,13 @@ from typing import Any
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.json_text import layers
-from veselova.service.api.request_models import ComparisonRequest, TorusRequest
+from veselova.service.api.request_models import (
+    BudgetedRequest,
+    ComparisonRequest,
+    TorusRequest,
+)
 from veselova.service.api.settings import Settings
+from veselova.service.api.toolkit_requests import ToolkitRequest
 from veselova.service.workers.cost_floor import require_hope
 
 __all__ = ["admit", "require_acceptable", "require_modest"]
@@ -33,22 +38,29 @@ def require_modest(document: Any, settings: Settings) -> None:
             )
 
 
-def admit(request: TorusRequest, settings: Settings) -> None:
+def admit(request: BudgetedRequest, settings: Settings) -> None:
     """Raise InvalidInput where a request is beyond the limits of this server, before its numbers
     are looked at.
     """
+    if request.budget_s > settings.max_budget_s:
+        raise InvalidInput(
+            ("budget_s",),
+            f"at most {settings.max_budget_s:g} on this server",
+            f"{request.budget_s:g}",
+        )
+    if isinstance(request, TorusRequest):
+        _admit_motion(request, settings)
+    elif isinstance(request, ToolkitRequest):
+        _admit_points(request, settings)
+
+
+def _admit_motion(request: TorusRequest, settings: Settings) -> None:
     n = request.problem.dimension
     if n > settings.max_dimension:
         raise InvalidInput(
             ("problem", request.problem.measured),
             f"at most {settings.max_dimension} entries on this server",
             str(n),
-        )
-    if request.budget_s > settings.max_budget_s:
-        raise InvalidInput(
-            ("budget_s",),
-            f"at most {settings.max_budget_s:g} on this server",
-            f"{request.budget_s:g}",
         )
     count = request.time_count()
     if count > settings.max_times:
@@ -67,3 +79,14 @@ def admit(request: TorusRequest, settings: Settings) -> None:
                 ("digits",), f"at most {settings.max_digits} on this server", str(request.digits)
             )
         require_hope(request, settings)
+
+
+def _admit_points(request: ToolkitRequest, settings: Settings) -> None:
+    path = (request.points_field,)
+    count = request.point_count()
+    if count > settings.max_times:
+        raise InvalidInput(path, f"at most {settings.max_times} points on this server", str(count))
+    values = request.value_count()
+    if values > settings.max_values:
+        required = f"at most {settings.max_values} numbers in one answer on this server"
+        raise InvalidInput(path, required, str(values))

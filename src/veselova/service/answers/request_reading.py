@@ -19,13 +19,14 @@ from veselova.service.api.caller import caller_of
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import (
+    BudgetedRequest,
     ComparisonRequest,
-    TorusRequest,
     TrajectoryRequest,
     read_request,
 )
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.api.toolkit_requests import ToolkitRequest
 from veselova.service.workers.pool import Workers
 from veselova.service.workers.tasks import TASKS
 
@@ -131,13 +132,13 @@ def _read(kind: str, body: bytes, settings: Settings) -> Asked:
     """Return what a body asks; raises Refused and InvalidInput as ``Reader.asked`` does."""
     document = decode(body)
     require_modest(document, settings)
-    model: type[TorusRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
+    model: type[BudgetedRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
     request: Any = read_request(model, document)
     admit(request, settings)
     if isinstance(request, SweepRequest):
         content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
         return Asked(
-            request.problem.system,
+            request.subject,
             request.engine or "",
             request.budget_s,
             False,
@@ -151,12 +152,12 @@ def _read(kind: str, body: bytes, settings: Settings) -> Asked:
         name = cache_key(request, stated)
         engine = request.chosen_engine
     content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
-    return Asked(
-        request.problem.system, engine, request.budget_s, _is_large(request), name, content
-    )
+    return Asked(request.subject, engine, request.budget_s, _is_large(request), name, content)
 
 
-def _is_large(request: TorusRequest) -> bool:
+def _is_large(request: BudgetedRequest) -> bool:
+    if isinstance(request, ToolkitRequest):
+        return request.value_count() > _LARGE_NUMBERS
     if not isinstance(request, ComparisonRequest):
         return False
     return (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["ANSWERS", "BODY4", "BODY4_PROBLEM"]
+__all__ = ["ANSWERS", "BODIES", "BODY3_PROBLEM", "BODY4", "BODY4_PROBLEM", "CURVE", "THETA"]
 
 #: A four-dimensional body with distinct A's, thrown so that no phase is slow (examples/body4.json
 #: is this document).
@@ -16,6 +16,36 @@ BODY4_PROBLEM: dict[str, Any] = {
 }
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": 601}}
+
+#: A body whose motion as data is 4 kB (examples/body3.json has it too).
+BODY3_PROBLEM: dict[str, Any] = {
+    "system": "veselova",
+    "A": ["3", "2", "1.5"],
+    "q": ["0.6", "0", "0.8"],
+    "q_dot": ["0.3", "1", "-0.225"],
+}
+
+#: A curve of genus 2 with one point over a cut and one in a gap, and theta functions of its matrix.
+CURVE: dict[str, Any] = {
+    "branch_points": [0, 1, "1.7", 3, "4.5"],
+    "points": ["1.2", 2],
+    "w": [1, [0, 1]],
+}
+THETA: dict[str, Any] = {
+    "z": [[0.1, [0, 0.2]], [0, 0]],
+    "tau": [[[0.3, 0.9], 0.2], [0.2, [0, 1.1]]],
+    "characteristic": [[0.5, 0], [0, 0.5]],
+}
+
+#: Kind of answer → the body of its worked example.
+BODIES: dict[str, Any] = {
+    "trajectory": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
+    "comparison": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
+    "torus": {"problem": BODY4_PROBLEM},
+    "closed_form": {"problem": BODY3_PROBLEM},
+    "curve": CURVE,
+    "theta": THETA,
+}
 
 #: Answers to ``{"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}`` and to its
 #: torus, by kind, for the OpenAPI document; a test holds them against the engine.

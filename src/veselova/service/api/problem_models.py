@@ -23,20 +23,20 @@ from veselova.mechanics.systems.stiefel import StiefelFlow
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["SYSTEMS", "ProblemModel", "Request", "Times"]
+__all__ = ["NUMBER", "SYSTEMS", "ProblemModel", "Request", "Times"]
 
-_NUMBER = {
+NUMBER = {
     "anyOf": [
         {"type": "number"},
         {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100},
     ],
     "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
 }
-_VECTOR = {"type": "array", "items": _NUMBER, "minItems": 2}
+_VECTOR = {"type": "array", "items": NUMBER, "minItems": 2}
 _MATRIX = {"type": "array", "items": _VECTOR, "minItems": 2}
 _UNIFORM = {
     "type": "object",
-    "properties": {"start": _NUMBER, "stop": _NUMBER, "count": {"type": "integer", "minimum": 1}},
+    "properties": {"start": NUMBER, "stop": NUMBER, "count": {"type": "integer", "minimum": 1}},
     "required": ["start", "stop", "count"],
     "additionalProperties": False,
 }
@@ -59,7 +59,7 @@ _INERTIA_OPERATOR = {
             ),
             (
                 "matrix",
-                {"type": "array", "items": {"type": "array", "items": _NUMBER}, "minItems": 1},
+                {"type": "array", "items": {"type": "array", "items": NUMBER}, "minItems": 1},
             ),
         )
     ],
@@ -67,7 +67,7 @@ _INERTIA_OPERATOR = {
 _MONOMIAL = {
     "type": "object",
     "properties": {
-        "coefficient": _NUMBER,
+        "coefficient": NUMBER,
         "powers": {
             "type": "array",
             "items": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
@@ -77,14 +77,14 @@ _MONOMIAL = {
     "additionalProperties": False,
     "description": "c Π g_ij^p for powers [[i, j, p], …], i and j from 1",
 }
-_TIMES = {"anyOf": [{"type": "array", "items": _NUMBER, "minItems": 1}, _UNIFORM]}
+_TIMES = {"anyOf": [{"type": "array", "items": NUMBER, "minItems": 1}, _UNIFORM]}
 
-_TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_TRIPLE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
 _SQUARE = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
 _TERM = {
     "type": "object",
     "properties": {
-        "coefficient": _NUMBER,
+        "coefficient": NUMBER,
         "powers": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
     },
     "required": ["coefficient", "powers"],
@@ -93,8 +93,8 @@ _TERM = {
 _POTENTIAL = {
     "type": "object",
     "properties": {
-        "clebsch": _NUMBER,
-        "family": {"type": "array", "items": _NUMBER, "minItems": 5, "maxItems": 5},
+        "clebsch": NUMBER,
+        "family": {"type": "array", "items": NUMBER, "minItems": 5, "maxItems": 5},
         "polynomial": {"type": "array", "items": _TERM, "minItems": 1},
         "companion": {"type": "array", "items": _TERM, "minItems": 1},
     },
@@ -103,13 +103,13 @@ _POTENTIAL = {
 }
 _SEPARABLE = {
     "type": "object",
-    "properties": {"quartic": _NUMBER, "quadratic": _NUMBER, "centrifugal": _VECTOR},
+    "properties": {"quartic": NUMBER, "quadratic": NUMBER, "centrifugal": _VECTOR},
     "minProperties": 1,
     "additionalProperties": False,
 }
 _COLUMNS = {
     "type": "array",
-    "items": {"type": "array", "items": _NUMBER, "minItems": 1},
+    "items": {"type": "array", "items": NUMBER, "minItems": 1},
     "minItems": 2,
 }
 _BODY_INERTIA = {

@@ -32,7 +32,14 @@ from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.json_text import layers
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
 
-__all__ = ["MOST_OUTPUTS", "ComparisonRequest", "TorusRequest", "TrajectoryRequest", "read_request"]
+__all__ = [
+    "MOST_OUTPUTS",
+    "BudgetedRequest",
+    "ComparisonRequest",
+    "TorusRequest",
+    "TrajectoryRequest",
+    "read_request",
+]
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
 #: the field's own message.
@@ -53,20 +60,35 @@ _FEW_TIMES = 1000
 _LONGEST_NAME = 100
 
 
-class TorusRequest(Request):
-    """A problem whose invariant torus is asked for."""
+class BudgetedRequest(Request):
+    """What is asked of a server: work that ends after its budget."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
-
-    problem: ProblemModel
     budget_s: Annotated[
         float,
         Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
     ] = 10.0
 
+    @property
+    def subject(self) -> str:
+        """Return what the request is about, in a word."""
+        raise NotImplementedError
+
     def faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request for the system that it asks of."""
+        """Return what is wrong with the request beyond its fields."""
         return []
+
+
+class TorusRequest(BudgetedRequest):
+    """A problem whose invariant torus is asked for."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
+
+    problem: ProblemModel
+
+    @property
+    def subject(self) -> str:
+        """Return the name of the system."""
+        return self.problem.system
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them."""
@@ -208,7 +230,7 @@ class TrajectoryRequest(ComparisonRequest):
         return beyond_double(self.digits, self.certified)
 
 
-_Model = TypeVar("_Model", bound=TorusRequest)
+_Model = TypeVar("_Model", bound=BudgetedRequest)
 
 
 def read_request(model: type[_Model], document: Any) -> _Model:
@@ -246,7 +268,7 @@ def _is_deeper(document: Any, levels: int) -> bool:
 
 
 def _fields(
-    model: type[TorusRequest], document: Any, place: tuple[int | str, ...]
+    model: type[BudgetedRequest], document: Any, place: tuple[int | str, ...]
 ) -> Sequence[str]:
     """Return the names of the fields that there are where pydantic found a fault."""
     if len(place) == 1:

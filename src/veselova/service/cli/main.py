@@ -210,9 +210,7 @@ def torus(file: _File, json: _Json = False) -> None:
     from veselova.service.cli.console import print_json, print_torus, terminal
     from veselova.service.workers.tasks import torus_request
 
-    document = _document(file)
-    if isinstance(document, dict):  # the file of a motion serves here too
-        document = {name: value for name, value in document.items() if name not in _OF_MOTIONS}
+    document = _without_motion(_document(file))
     request = read_request(TorusRequest, document)
     with _within_budget(document):
         answer = torus_request(request)
@@ -220,6 +218,29 @@ def torus(file: _File, json: _Json = False) -> None:
         print_json(answer.as_dict())
     else:
         print_torus(terminal(), answer, request.problem.problem_class.time)
+
+
+@app.command("closed-form")
+def closed_form(
+    file: _File,
+    output: Annotated[Path | None, typer.Option(help="write the document to a .json file")] = None,
+) -> None:
+    """Give a motion in closed form as data: a document that any language can evaluate."""
+    from veselova.service.api.request_models import read_request
+    from veselova.service.api.toolkit_requests import ClosedFormRequest
+    from veselova.service.cli.console import print_json
+    from veselova.service.workers.tasks import closed_form_request
+
+    document = _without_motion(_document(file))
+    request = read_request(ClosedFormRequest, document)
+    _check_file("--output", output, (".json",))
+    with _within_budget(document):
+        answer = closed_form_request(request)
+    if output:
+        output.write_text(answer.to_json() + "\n", encoding="utf-8")
+        print(f"{answer}: {output}")
+    else:
+        print_json(answer.document)
 
 
 @app.command()
@@ -279,23 +300,35 @@ def _document(file: str) -> Any:
 #: Fields of a motion's request that say nothing of its torus.
 _OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
 
+
+def _without_motion(document: Any) -> Any:
+    """Return a request without the fields of a motion: its file serves for its torus too."""
+    if not isinstance(document, dict):
+        return document
+    return {name: value for name, value in document.items() if name not in _OF_MOTIONS}
+
+
 _WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
 
 
 def _check_files(output: Path | None, plot: Path | None) -> None:
-    """Refuse a file name before the work, not after it."""
+    """Refuse file names before the work, not after it."""
+    for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
+        _check_file(option, path, suffixes)
+
+
+def _check_file(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
     from veselova.mechanics.core.errors import InvalidInput
 
-    for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
-        if path is not None and path.suffix.lower() not in suffixes:
-            raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
-        if path is not None and not path.parent.is_dir():
-            raise InvalidInput((option,), "a file in an existing folder", str(path))
-        if path is not None and (
-            path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK)
-        ):
-            raise InvalidInput((option,), "a file that can be written", str(path))
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
+    if not path.parent.is_dir():
+        raise InvalidInput((option,), "a file in an existing folder", str(path))
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InvalidInput((option,), "a file that can be written", str(path))
 
 
 def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:

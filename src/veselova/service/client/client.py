@@ -31,8 +31,11 @@ from veselova.mechanics.core.problem import Problem
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
 from veselova.service.client.requests import (
     Call,
+    closed_form_call,
     compare_call,
+    curve_call,
     download_call,
+    theta_call,
     torus_call,
     trajectory_call,
 )
@@ -226,6 +229,9 @@ class Client(_Core):
     download = _method(download_call)
     compare = _method(compare_call)
     torus = _method(torus_call)
+    closed_form = _method(closed_form_call)
+    curve = _method(curve_call)
+    theta = _method(theta_call)
 
     def run(self, flow: Flow) -> Any:
         """Carry out a flow of calls and pauses, and return what it ends with."""
@@ -322,6 +328,9 @@ class AsyncClient(_Core):
     download = _method(download_call)
     compare = _method(compare_call)
     torus = _method(torus_call)
+    closed_form = _method(closed_form_call)
+    curve = _method(curve_call)
+    theta = _method(theta_call)
 
     async def run(self, flow: Flow) -> Any:
         """Carry out a flow of calls and pauses, and return what it ends with."""

@@ -9,19 +9,35 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
+from veselova.mechanics.core.curve_arguments import curve_arguments, points_with_sheets
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.core.times import as_request
+from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.curve import CurveData
 from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.complex_numbers import to_pairs
 from veselova.service.api.json_documents import comparison_of, torus_of, trajectory_of
 from veselova.service.client.download import DownloadTarget, media_type_of, provenance_of, sink_of
 
-__all__ = ["Call", "compare_call", "download_call", "torus_call", "trajectory_call"]
+__all__ = [
+    "Call",
+    "closed_form_call",
+    "compare_call",
+    "curve_call",
+    "download_call",
+    "theta_call",
+    "torus_call",
+    "trajectory_call",
+]
 
 T = TypeVar("T")
 
@@ -143,6 +159,67 @@ def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) 
         budget_s,
         torus_of,
     )
+
+
+def closed_form_call(
+    problem: Problem | Mapping[str, Any], accuracy: float = 1e-12, *, budget_s: float = 10.0
+) -> Call[ClosedForm]:
+    """Return the motion of a problem as data (see ``veselova.closed_form``)."""
+    body = {
+        "problem": _problem(problem).as_request(),
+        "accuracy": require_accuracy(accuracy),
+        "budget_s": budget_s,
+    }
+    return Call("/v1/closed-forms", body, budget_s, ClosedForm)
+
+
+def curve_call(
+    branch_points: Any, sign: int = -1, points: Any = None, w: Any = None, *, budget_s: float = 10.0
+) -> Call[CurveData]:
+    """Return the data of a hyperelliptic curve with real branch points, with the images of points
+    (λ, w) where they are given (see ``veselova.curves.RealHyperelliptic``).
+    """
+    exact, sign = curve_arguments(branch_points, sign)
+    body = {"branch_points": plain(exact), "sign": sign, "budget_s": budget_s}
+    if points is not None or w is not None:
+        places, sheets = points_with_sheets(points, w)
+        body["points"] = [_in_json(place) for place in places]
+        body["w"] = to_pairs(sheets).tolist()
+    return Call("/v1/curves", body, budget_s, CurveData.from_dict)
+
+
+def theta_call(
+    z: Any,
+    tau: Any,
+    characteristic: Any = None,
+    derivatives: int = 0,
+    *,
+    budget_s: float = 10.0,
+) -> Call[ScaledTheta]:
+    """Return theta functions or their derivatives as mantissas and exponents (see
+    ``veselova.theta.scaled_riemann_theta``); ``values`` of the answer multiplies them.
+    """
+    asked = ThetaArguments.of(z, tau, characteristic, derivatives)
+    take = 0 if asked.single_characteristic else slice(None)
+    body = {
+        "z": to_pairs(asked.points).tolist(),
+        "tau": to_pairs(asked.tau).tolist(),
+        "characteristic": asked.characteristics[take].tolist(),
+        "derivatives": asked.derivatives,
+        "budget_s": budget_s,
+    }
+    return Call("/v1/theta", body, budget_s, partial(_theta_of, asked.single_point))
+
+
+def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
+    found = ScaledTheta.from_dict(document)
+    if not single_point:
+        return found
+    return ScaledTheta(found.mantissa[0], found.exponent[0], found.error[0])
+
+
+def _in_json(point: Any) -> Any:
+    return [point.real, point.imag] if isinstance(point, complex) else plain(point)
 
 
 def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:

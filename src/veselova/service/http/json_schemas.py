@@ -12,12 +12,13 @@ import orjson
 from pydantic.json_schema import models_json_schema
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_document import JobDocument, JobList
 from veselova.service.workers.tasks import TASKS
 
-__all__ = ["PREFIX", "component_schemas", "schema_document", "schema_names"]
+__all__ = ["PREFIX", "answer_name", "component_schemas", "schema_document", "schema_names"]
 
 #: Where the schemas stand in the OpenAPI document.
 PREFIX = "#/components/schemas/"
@@ -41,6 +42,10 @@ _TEXT = {"type": "string"}
 _TEXTS = {"type": "array", "items": _TEXT}
 _DECIMAL = {"type": "string", "pattern": r"^-?\d", "description": "a decimal"}
 _NUMBER_OR_DECIMAL = {"anyOf": [{"type": "number"}, _DECIMAL]}
+_PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_NUMBER_OR_NUMBERS = {"anyOf": [{"type": "number"}, _NUMBERS]}
+_MATRIX_OR_NULL = {"anyOf": [_MATRIX, {"type": "null"}]}
+_NESTED = {"type": "array", "items": {}, "description": "nested arrays of pairs"}
 _BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 
 
@@ -151,6 +156,64 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "regime": {"type": "string"},
         }
     ),
+    "ClosedForm": {name: part for name, part in CLOSED_FORM.items() if name != "$schema"},
+    "Curve": _object(
+        {
+            "genus": {"type": "integer"},
+            "sign": {"type": "integer"},
+            "branch_points": {**_NUMBERS, "description": "increasing"},
+            "cuts": {**_MATRIX, "description": "the intervals round which a_1 … a_g go"},
+            "gaps": {**_MATRIX, "description": "the intervals that b_1 … b_g are made of"},
+            "a_periods": {
+                **_MATRIX_OR_NULL,
+                "description": "∮ λ^{k−1}dλ/w over a_s, column s; null beyond the range of a "
+                "double",
+            },
+            "b_periods": {
+                **_MATRIX_OR_NULL,
+                "description": "the same over b_s, without the factor i",
+            },
+            "normalized_differentials": {
+                **_MATRIX_OR_NULL,
+                "description": "c: v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js",
+            },
+            "riemann_matrix": {**_MATRIX, "description": "T; the Riemann matrix is iT"},
+            "riemann_matrix_error": {"type": "number"},
+            "characteristics": {
+                "type": "array",
+                "items": _MATRIX,
+                "description": "[ε, δ] of each branch point: τε + δ is its image",
+            },
+            "abel": {
+                "type": "array",
+                "items": {"type": "array", "items": _PAIR},
+                "description": "images of the points from the last branch point, as pairs "
+                "[real, imaginary]; left out without points",
+            },
+        },
+        required=["genus", "riemann_matrix", "riemann_matrix_error", "characteristics"],
+    ),
+    "Theta": _object(
+        {
+            "values": {
+                "type": "array",
+                "items": {"type": "array", "items": {"anyOf": [{"type": "number"}, _NESTED]}},
+                "description": "by points, then characteristics where several were given, then "
+                "derivatives, as pairs [real, imaginary]",
+            },
+            "exponent": {
+                "type": "array",
+                "items": _NUMBER_OR_NUMBERS,
+                "description": "θ = values·exp(exponent), by points and characteristics; 0 where "
+                "the value is in the range of a double",
+            },
+            "error": {
+                "type": "array",
+                "items": _NUMBER_OR_NUMBERS,
+                "description": "by how much the values are off at most",
+            },
+        }
+    ),
     "Problem": _object(
         {
             "type": {"type": "string", "examples": ["urn:veselova:problem:invalid-input"]},
@@ -176,6 +239,10 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                     {
                         **dict.fromkeys(("system", "title", "schema", "time"), _TEXT),
                         **dict.fromkeys(("fields", "formulations", "outputs"), _TEXTS),
+                        "closed_form": {
+                            "type": "boolean",
+                            "description": "whether motions run on tori and are given as data",
+                        },
                         "engines": {
                             "type": "object",
                             "additionalProperties": _TEXTS,
@@ -183,6 +250,13 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                         },
                     }
                 ),
+            },
+            "toolkit": {
+                "type": "array",
+                "items": _object(
+                    {**dict.fromkeys(("path", "title", "schema"), _TEXT), "fields": _TEXTS}
+                ),
+                "description": "what is served besides motions",
             },
             "version": _TEXT,
             "limits": {**_BY_NAME, "description": "largest dimension, most times, longest budget"},
@@ -218,6 +292,11 @@ def component_schemas() -> dict[str, Any]:
     return dict(orjson.loads(_components()))
 
 
+def answer_name(kind: str) -> str:
+    """Return the name of the schema of a kind of answer: ClosedForm for closed_form."""
+    return "".join(word.capitalize() for word in kind.split("_"))
+
+
 def schema_names() -> dict[str, str]:
     """Return the names of all schemas, and what each is of, in a sentence (of an
     answer, its name).
@@ -231,8 +310,13 @@ def schema_names() -> dict[str, str]:
 def schema_document(name: str) -> dict[str, Any]:
     """Return one schema by its name, those that it refers to among its ``$defs``;
     raises KeyError.
+
+    ``closed-form.json`` is another name of ClosedForm, and so are those of the others.
     """
     schemas = component_schemas()
+    if name not in schemas:
+        files = {_file_name(known): known for known in schemas}
+        name = files[name]
     schema = schemas[name]
     needed = {name}
     found = set[str]()
@@ -242,6 +326,10 @@ def schema_document(name: str) -> dict[str, Any]:
     text = orjson.dumps({**schema, "$defs": definitions}).decode().replace(PREFIX, "#/$defs/")
     dialect = "https://json-schema.org/draft/2020-12/schema"
     return {"$schema": dialect, "$id": f"urn:veselova:schema:{name}", **orjson.loads(text)}
+
+
+def _file_name(name: str) -> str:
+    return re.sub("(?<=[a-z])(?=[A-Z])", "-", name).lower() + ".json"
 
 
 def _references(schema: dict[str, Any]) -> list[str]:

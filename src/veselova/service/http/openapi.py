@@ -10,10 +10,10 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from veselova.service.answers.endpoint import PROVENANCE
-from veselova.service.api.examples import ANSWERS, BODY4_PROBLEM
+from veselova.service.api.examples import ANSWERS, BODIES
 from veselova.service.api.media_types import FORMATS
 from veselova.service.api.problem_details import MEDIA_TYPE
-from veselova.service.http.json_schemas import PREFIX, component_schemas
+from veselova.service.http.json_schemas import PREFIX, answer_name, component_schemas
 from veselova.service.http.routes import KEPT, RESOURCES, SCHEMA
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
@@ -125,14 +125,9 @@ def _refusals(path: str) -> dict[int, str]:
 
 def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     """Put the body, the answer and the refusals of one resource into its operation."""
-    example = (
-        {"problem": BODY4_PROBLEM}
-        if kind == "torus"
-        else {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}
-    )
-    body = {"schema": {"$ref": f"{PREFIX}{TASKS[kind][0].__name__}"}, "example": example}
+    body = {"schema": {"$ref": f"{PREFIX}{TASKS[kind][0].__name__}"}, "example": BODIES[kind]}
     operation["requestBody"] = {"required": True, "content": {"application/json": body}}
-    answer: dict[str, Any] = {"schema": {"$ref": f"{PREFIX}{kind.capitalize()}"}}
+    answer: dict[str, Any] = {"schema": {"$ref": f"{PREFIX}{answer_name(kind)}"}}
     if kind in ANSWERS:
         answer["example"] = ANSWERS[kind]
     refusals = _REFUSALS

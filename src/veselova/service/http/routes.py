@@ -17,6 +17,7 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
+from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
 __all__ = ["KEPT", "RESOURCES", "SCHEMA", "router"]
@@ -44,6 +45,21 @@ RESOURCES = {
         "Describe the invariant torus of a motion",
         "Curve, periods, frequencies, phases",
     ),
+    "/v1/closed-forms": (
+        "closed_form",
+        "Give a motion in closed form as data",
+        "The motion at all times as a document",
+    ),
+    "/v1/curves": (
+        "curve",
+        "Compute the periods of a hyperelliptic curve",
+        "Periods, Riemann matrix, characteristics, images of points",
+    ),
+    "/v1/theta": (
+        "theta",
+        "Evaluate Riemann theta functions",
+        "Values or derivatives, with their errors",
+    ),
 }
 
 #: Kind of answer → operation id: names of functions in generated clients, which never change.
@@ -51,7 +67,13 @@ _OPERATIONS = {
     "trajectory": "solve_trajectory",
     "comparison": "compare_engines",
     "torus": "compute_torus",
+    "closed_form": "compute_closed_form",
+    "curve": "compute_curve",
+    "theta": "evaluate_theta",
 }
+
+#: Kinds that are asked of curves and theta functions, not of motions.
+_TOOLKIT = ("curve", "theta")
 
 
 def _systems() -> list[dict[str, Any]]:
@@ -68,8 +90,23 @@ def _systems() -> list[dict[str, Any]]:
             "formulations": list(model.problem_class.formulations),
             "outputs": list(model.problem_class.outputs),
             "time": model.problem_class.time,
+            "closed_form": model.problem_class.has_tori,
         }
         for name, model in SYSTEMS.items()
+    ]
+
+
+def _toolkit() -> list[dict[str, Any]]:
+    """Return what is served besides motions."""
+    return [
+        {
+            "path": path,
+            "title": summary,
+            "schema": SCHEMA.format(name=TASKS[kind][0].__name__),
+            "fields": list(TASKS[kind][0].model_fields),
+        }
+        for path, (kind, summary, _) in RESOURCES.items()
+        if kind in _TOOLKIT
     ]
 
 
@@ -86,7 +123,7 @@ def router(
             "operation_id": _OPERATIONS[kind],
             "summary": summary,
             "name": kind,
-            "tags": ["motions"],
+            "tags": ["toolkit" if kind in _TOOLKIT else "motions"],
         }
         routes.add_api_route(
             path, answer, methods=["POST"], route_class_override=_Direct, **described
@@ -112,7 +149,12 @@ class _ServiceEndpoints:
     async def systems(self) -> Response:
         """Return the systems, the version and the limits."""
         return _json(
-            {"systems": _systems(), "version": __version__, "limits": self._settings.limits}
+            {
+                "systems": _systems(),
+                "toolkit": _toolkit(),
+                "version": __version__,
+                "limits": self._settings.limits,
+            }
         )
 
     async def schemas(self) -> Response:

@@ -7,16 +7,30 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from veselova.engines import Prepared, compare, torus
+from veselova.engines import Prepared, closed_form, compare, torus
 from veselova.mechanics.core.errors import Faults
+from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.examples import BODY4
+from veselova.service.api.examples import BODY4, CURVE, THETA
 from veselova.service.api.json_documents import comparison_document, encode, trajectory_document
-from veselova.service.api.request_models import ComparisonRequest, TorusRequest, TrajectoryRequest
+from veselova.service.api.request_models import (
+    BudgetedRequest,
+    ComparisonRequest,
+    TorusRequest,
+    TrajectoryRequest,
+)
+from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
 
-__all__ = ["TASKS", "compare_request", "solve_request", "torus_request", "warm_up"]
+__all__ = [
+    "TASKS",
+    "closed_form_request",
+    "compare_request",
+    "solve_request",
+    "torus_request",
+    "warm_up",
+]
 
 
 def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
@@ -56,11 +70,36 @@ def _torus(request: Any) -> dict[str, Any]:
     return torus_request(request).as_dict()
 
 
+def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
+    """Return the closed form that a request asks for."""
+    return closed_form(request.problem.problem(), request.accuracy)
+
+
+def _closed_form(request: Any) -> dict[str, Any]:
+    return dict(closed_form_request(request).document)
+
+
+def _curve(request: CurveRequest) -> dict[str, Any]:
+    from veselova.curves import RealHyperelliptic
+
+    curve = RealHyperelliptic(request.branch_points, request.sign)
+    return curve.data(*request.places).as_dict()
+
+
+def _theta(request: ThetaRequest) -> dict[str, Any]:
+    from veselova.theta import evaluate_theta
+
+    return evaluate_theta(request.arguments).as_dict()
+
+
 #: Kind of answer → (model of the request, what computes its document).
-TASKS: Mapping[str, tuple[type[TorusRequest], Callable[[Any], dict[str, Any]]]] = {
+TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]]] = {
     "trajectory": (TrajectoryRequest, _trajectory),
     "comparison": (ComparisonRequest, _comparison),
     "torus": (TorusRequest, _torus),
+    "closed_form": (ClosedFormRequest, _closed_form),
+    "curve": (CurveRequest, _curve),
+    "theta": (ThetaRequest, _theta),
 }
 
 
@@ -71,3 +110,5 @@ def warm_up() -> None:
     request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
     encode(_comparison(request))
     _torus(request)
+    _curve(CurveRequest.model_validate(CURVE))
+    _theta(ThetaRequest.model_validate(THETA))

@@ -1,0 +1,116 @@
+"""The arguments of a hyperelliptic curve with real branch points, and points on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.complex_input import complex_array, complex_number
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_number
+
+__all__ = ["LARGEST_GENUS", "curve_arguments", "exact_points", "points_with_sheets"]
+
+#: Genera that are served; higher ones are right too, but were not tested.
+LARGEST_GENUS = 16
+
+
+def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...], int]:
+    """Return branch points as rationals, increasing, and the sign of w² = sign·Π(λ−b_j).
+
+    Raises InvalidInput, with all faults.
+    """
+    faults = Faults()
+    points = faults.attempt(_branch_points, branch_points)
+    if isinstance(sign, bool) or sign not in (-1, 1):
+        faults.add(("sign",), "1 or −1", show(sign))
+    faults.require_none()
+    assert points is not None
+    return points, int(sign)
+
+
+def _branch_points(given: Any) -> tuple[Fraction, ...]:
+    path = ("branch_points",)
+    required = f"3 to {2 * LARGEST_GENUS + 2} real numbers"
+    items = _items(given, path, required)
+    if not 3 <= len(items) <= 2 * LARGEST_GENUS + 2:
+        raise InvalidInput(path, required, f"{len(items)} entries")
+    faults = Faults()
+    found = [faults.attempt(_real_number, item, (*path, i)) for i, item in enumerate(items)]
+    numbers = {i: value for i, value in enumerate(found) if value is not None}
+    order = sorted(numbers, key=lambda i: numbers[i])
+    for i, j in pairwise(order):
+        if numbers[i] == numbers[j]:
+            first, second = sorted((i, j))
+            required = (
+                "distinct numbers (drop a pair: the curve of the others has the same differentials)"
+            )
+            given = f"{float(numbers[i]):.6g} twice, as entry {first} too"
+            faults.add((*path, second), required, given)
+    faults.require_none()
+    return tuple(numbers[i] for i in order)
+
+
+def _real_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
+    """Return an exact real number; one that is complex is refused as such."""
+    if isinstance(value, (complex, np.complexfloating)):
+        if value.imag:
+            required = "a real number (curves with complex branch points are not served)"
+            raise InvalidInput(path, required, show(value))
+        value = value.real
+    return exact_number(value, path)
+
+
+def _items(given: Any, path: tuple[str | int, ...], required: str) -> list[Any]:
+    if isinstance(given, np.ndarray):
+        given = given.tolist()
+    if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
+        raise InvalidInput(path, required, show(given))
+    return list(given)
+
+
+def exact_points(given: Any, path: tuple[str | int, ...] = ("points",)) -> list[Fraction | complex]:
+    """Return points λ: exact where they are real, else complex; raises InvalidInput, with all
+    faults.
+    """
+    if isinstance(given, (int, float, complex, str, np.generic)):
+        given = [given]
+    faults = Faults()
+    found: list[Fraction | complex] = []
+    for i, item in enumerate(_items(given, path, "a list of numbers")):
+        number = faults.attempt(_point, item, (*path, i))
+        found.append(Fraction(0) if number is None else number)
+    faults.require_none()
+    return found
+
+
+def _point(item: Any, path: tuple[str | int, ...]) -> Fraction | complex:
+    if isinstance(item, (complex, np.complexfloating)):
+        number = complex_number(item, path)
+        return number if number.imag else Fraction(number.real)
+    return exact_number(item, path)
+
+
+def points_with_sheets(
+    points: Any, w: Any
+) -> tuple[list[Fraction | complex], NDArray[np.complex128]]:
+    """Return points λ and the w that name their sheets, one for each; raises InvalidInput, with all
+    faults.
+    """
+    faults = Faults()
+    found = faults.attempt(exact_points, points)
+    sheets = faults.attempt(complex_array, w, ("w",), "a list of numbers")
+    if found is not None and sheets is not None:
+        sheets = np.atleast_1d(sheets)
+        if sheets.shape != (len(found),):
+            required = f"{len(found)} numbers, one for each point"
+            faults.add(("w",), required, f"shape {sheets.shape}")
+    faults.require_none()
+    assert found is not None
+    assert sheets is not None
+    return found, sheets

@@ -1,0 +1,35 @@
+"""Complex numbers in JSON: a real number, or a pair [real, imaginary]."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.complex_input import complex_number
+from veselova.mechanics.core.errors import InvalidInput
+
+__all__ = ["from_pairs", "to_pairs"]
+
+
+def from_pairs(value: Any, depth: int) -> Any:
+    """Return nested lists whose entries, ``depth`` levels inside, were numbers or pairs.
+
+    What is neither stays as it is, for those who know what is required there.
+    """
+    if depth and isinstance(value, list):
+        return [from_pairs(item, depth - 1) for item in value]
+    if depth or not isinstance(value, list) or len(value) != 2:
+        return value
+    try:
+        real, imaginary = (complex_number(part, ()) for part in value)
+    except InvalidInput:
+        return value
+    return complex(real.real, imaginary.real) if imaginary.real else value[0]
+
+
+def to_pairs(array: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return complex numbers as pairs, one axis more."""
+    values = np.ascontiguousarray(array, dtype=np.complex128)
+    return values.view(np.float64).reshape(*values.shape, 2)

@@ -1,0 +1,269 @@
+"""Motions as data, curves and theta functions over HTTP, by the clients and the command line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema_rs
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import veselova as vs
+from conftest import Server
+from hostile import BUDGET_S
+from test_http import is_problem, post
+from veselova import curves, theta
+from veselova.mechanics.results.closed_form_schema import SCHEMA
+from veselova.service.api.examples import BODY3_PROBLEM, CURVE, THETA
+from veselova.service.cli.main import app
+
+BODY3 = vs.Veselova(BODY3_PROBLEM["A"], BODY3_PROBLEM["q"], BODY3_PROBLEM["q_dot"])
+MOTION = {"problem": BODY3_PROBLEM, "budget_s": BUDGET_S}
+POINTS = [0.25 + 0.5j, "1.2", 2]
+SHEETS = [1, -1, 1j]
+
+
+def pairs(values: Any) -> Any:
+    """Return complex numbers of a document."""
+    array = np.array(values)
+    return array[..., 0] + 1j * array[..., 1]
+
+
+def test_a_document_over_http_is_the_one_of_the_library(server: Server) -> None:
+    document = post(server, "/v1/closed-forms", MOTION).json()
+    assert document == json.loads(vs.closed_form(BODY3).to_json())
+    jsonschema_rs.validator_for(SCHEMA).validate(document)
+    coarse = post(server, "/v1/closed-forms", {**MOTION, "accuracy": 1e-5}).json()
+    assert coarse == json.loads(vs.closed_form(BODY3, 1e-5).to_json())
+
+
+def test_the_schema_of_documents_is_published_under_its_file_name(server: Server) -> None:
+    answer = server.get("/v1/schemas/closed-form.json")
+    assert answer.headers["content-type"] == "application/schema+json"
+    validator = jsonschema_rs.validator_for(answer.json())
+    document = json.loads(vs.closed_form(BODY3).to_json())
+    validator.validate(document)
+    assert not validator.is_valid({**document, "genus": "2"})
+    assert not validator.is_valid({k: v for k, v in document.items() if k != "modes"})
+    assert answer.json() == server.get("/v1/schemas/ClosedForm").json()
+
+
+def test_a_curve_over_http_is_the_one_of_the_library(server: Server) -> None:
+    found = post(server, "/v1/curves", {**CURVE, "budget_s": BUDGET_S}).json()
+    curve = curves.RealHyperelliptic(CURVE["branch_points"])
+    assert np.array_equal(found["riemann_matrix"], curve.riemann_matrix.imag)
+    assert np.array_equal(found["a_periods"], curve.periods.a)
+    assert np.array_equal(found["b_periods"], curve.periods.b.imag)
+    assert np.array_equal(found["characteristics"], np.array(curve.characteristics))
+    assert np.array_equal(pairs(found["abel"]), curve.abel(["1.2", 2], [1, 1j]))
+    bare = post(server, "/v1/curves", {"branch_points": [3, 0, 1], "sign": 1}).json()
+    assert bare["genus"] == 1
+    assert "abel" not in bare
+
+
+def test_periods_beyond_a_double_are_null(server: Server) -> None:
+    found = post(server, "/v1/curves", {"branch_points": [1e250, 2e250, 4e250, 5e250, 7e250]})
+    other = post(server, "/v1/curves", {"branch_points": [1, 2, 4, 5, 7]}).json()
+    assert found.json()["a_periods"] is None
+    assert np.allclose(found.json()["riemann_matrix"], other["riemann_matrix"], rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("derivatives", [0, 1, 2])
+def test_theta_functions_over_http_are_those_of_the_library(
+    server: Server, derivatives: int
+) -> None:
+    body = {**THETA, "derivatives": derivatives, "budget_s": BUDGET_S}
+    found = post(server, "/v1/theta", body).json()
+    tau = [[0.3 + 0.9j, 0.2], [0.2, 1.1j]]
+    expected = theta.riemann_theta([[0.1, 0.2j], [0, 0]], tau, THETA["characteristic"], derivatives)
+    assert np.allclose(pairs(found["values"]), expected, rtol=1e-15, atol=0)
+    assert found["exponent"] == [0, 0]
+    assert np.max(found["error"]) < 1e-10
+
+
+def test_a_real_matrix_of_a_curve_serves_for_theta(server: Server) -> None:
+    T = post(server, "/v1/curves", CURVE).json()["riemann_matrix"]
+    several = [[[0, 0], [0, 0]], [[0.5, 0], [0, 0.5]]]
+    body = {"z": [["1/10", 0.2]], "T": T, "characteristic": several}
+    found = post(server, "/v1/theta", body).json()
+    expected = theta.riemann_theta([[0.1, 0.2]], 1j * np.array(T), several)
+    assert np.allclose(pairs(found["values"]), expected, rtol=1e-14, atol=1e-14)
+
+
+def test_a_value_beyond_a_double_has_an_exponent(server: Server) -> None:
+    found = post(server, "/v1/theta", {"z": [[[0, 30]], [0]], "tau": [[[0, 1]]]}).json()
+    assert found["exponent"][0] == pytest.approx(np.pi * 900)
+    assert found["exponent"][1] == 0
+    assert pairs(found["values"])[1] == pytest.approx(1.086434811213308)
+
+
+FAULTS: list[tuple[str, dict[str, Any], list[str], str]] = [
+    (
+        "curves",
+        {"branch_points": [0, 1, 1, 2, 2]},
+        ["/branch_points/2", "/branch_points/4"],
+        "drop",
+    ),
+    ("curves", {"branch_points": [0, [1, 2], 2]}, ["/branch_points/1"], "real number"),
+    ("curves", {"branch_points": [0, 1]}, ["/branch_points"], "3 to 34"),
+    (
+        "curves",
+        {"branch_points": [0, "x", None], "sign": 2},
+        ["/branch_points/1", "/branch_points/2", "/sign"],
+        "",
+    ),
+    ("curves", {"branch_points": [0, 1e-200, 1]}, ["/branch_points"], "1e-100"),
+    ("curves", {**CURVE, "w": [1]}, ["/w"], "2 numbers, one for each point"),
+    ("curves", {**CURVE, "w": None}, ["/w"], "together"),
+    ("curves", {**CURVE, "points": ["x", 2]}, ["/points/0"], ""),
+    ("curves", {}, ["/branch_points"], "this field"),
+    ("theta", {**THETA, "tau": [[[0, 1], 1], [0, [0, 1]]]}, ["/tau"], "symmetric"),
+    (
+        "theta",
+        {**THETA, "tau": [[[0, 1], [0, 1.5]], [[0, 1.5], [0, 1]]]},
+        ["/tau"],
+        "least eigenvalue -0.5",
+    ),
+    ("theta", {**THETA, "z": [[1]]}, ["/z"], "2 numbers"),
+    ("theta", {**THETA, "z": [[1, "x"], [None, 1]]}, ["/z/0/1", "/z/1/0"], ""),
+    ("theta", {**THETA, "z": [1, 2]}, ["/z"], "list of points"),
+    ("theta", {**THETA, "characteristic": [0.5, 0]}, ["/characteristic"], "of 2 real numbers"),
+    ("theta", {**THETA, "derivatives": 3}, ["/derivatives"], "0, 1 or 2"),
+    ("theta", {**THETA, "T": [[1]]}, ["/tau"], "not both"),
+    ("theta", {"z": [[0]], "T": [[-1]]}, ["/T"], "least eigenvalue -1"),
+    (
+        "theta",
+        {"z": [["x"]], "tau": [["y"]], "characteristic": [["u"], [0]], "derivatives": True},
+        ["/tau/0/0", "/z/0/0", "/characteristic/0/0", "/derivatives"],
+        "",
+    ),
+    ("closed-forms", {**MOTION, "accuracy": 1}, ["/accuracy"], "1e-15"),
+    (
+        "closed-forms",
+        {
+            "problem": {
+                "system": "lr",
+                "n": 3,
+                "rank": 1,
+                "inertia": {"special": [3, 2, 1]},
+                "omega": [[0, 1, 0], [-1, 0, 0], [0, 0, 0]],
+            }
+        },
+        ["/problem"],
+        "torus",
+    ),
+    ("closed-forms", {**MOTION, "times": [0]}, ["/times"], "no field of this name"),
+]
+
+
+@pytest.mark.parametrize(("path", "body", "pointers", "words"), FAULTS)
+def test_faults_come_back_by_their_places(
+    server: Server, path: str, body: Any, pointers: list[str], words: str
+) -> None:
+    document = is_problem(post(server, f"/v1/{path}", body), 422, "invalid-input")
+    assert [error["pointer"] for error in document["errors"]] == pointers
+    assert words in document["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "outcome"),
+    [
+        ("theta", {"z": [[[0, 1e300]]], "tau": [[[0, 1]]]}, "beyond-floats"),
+        ("theta", {"z": [[0]], "tau": [[[0, 1e-300]]]}, "beyond-floats"),
+        ("closed-forms", {"problem": {**BODY3_PROBLEM, "q_dot": [0, 0, 0]}}, "at-rest"),
+        ("closed-forms", {"problem": {**BODY3_PROBLEM, "q": [1, 0, 0], "q_dot": [0, 1, 0]}}, None),
+    ],
+)
+def test_what_cannot_be_served_is_named(
+    server: Server, path: str, body: Any, outcome: str | None
+) -> None:
+    answer = post(server, f"/v1/{path}", body)
+    if outcome is None:
+        assert answer.status_code == 200
+    else:
+        assert is_problem(answer, 422, "unsolved")["outcome"] == outcome
+
+
+def test_more_numbers_than_an_answer_has_are_refused_before_the_work(server: Server) -> None:
+    genus = 8
+    body = {
+        "z": [[0] * genus] * 5000,
+        "T": np.eye(genus).tolist(),
+        "characteristic": [[[0] * genus] * 2] * 100,
+        "derivatives": 2,
+    }
+    document = is_problem(post(server, "/v1/theta", body), 422, "invalid-input")
+    assert document["errors"][0]["pointer"] == "/z"
+    assert "16000000" in document["detail"]
+
+
+def test_work_ends_with_its_budget(server: Server) -> None:
+    body = {"z": [[0.1] * 6] * 5000, "T": (0.05 * np.eye(6) + 0.05).tolist(), "budget_s": 0.05}
+    is_problem(post(server, "/v1/theta", body), 504, "over-budget")
+
+
+def test_the_systems_page_lists_the_toolkit(server: Server) -> None:
+    page = server.get("/v1/systems").json()
+    assert {item["path"] for item in page["toolkit"]} == {"/v1/curves", "/v1/theta"}
+    for item in page["toolkit"]:
+        assert set(server.get(item["schema"]).json()["properties"]) == set(item["fields"])
+    served = {item["system"] for item in page["systems"] if item["closed_form"]}
+    assert served == {"veselova", "neumann", "ellipsoid-geodesic", "veselova-so3"}
+
+
+def test_the_clients_give_what_the_library_gives(server: Server) -> None:
+    curve = curves.RealHyperelliptic(CURVE["branch_points"], 1)
+    with vs.Client(server.url) as client:
+        motion = client.closed_form(BODY3, budget_s=BUDGET_S)
+        data = client.curve(CURVE["branch_points"], 1, POINTS, SHEETS)
+        single = client.theta([0.1, 0.2j], curve.riemann_matrix)
+        several = client.theta([[0.1, 0.2j]], curve.riemann_matrix, [[[0.5, 0], [0, 0]]], 1)
+        with pytest.raises(vs.InvalidInput, match="least eigenvalue"):
+            client.theta([0], [[-1j]])
+    assert isinstance(motion, vs.ClosedForm)
+    assert motion.to_json() == vs.closed_form(BODY3).to_json()
+    expected = curve.data(POINTS, SHEETS)
+    for name, value in vars(expected).items():
+        assert np.array_equal(getattr(data, name), value), name
+    tau = curve.riemann_matrix
+    assert np.allclose(single.values, theta.riemann_theta([0.1, 0.2j], tau), rtol=1e-14, atol=0)
+    assert single.values.shape == ()
+    gradients = theta.riemann_theta([[0.1, 0.2j]], tau, [[[0.5, 0], [0, 0]]], 1)
+    assert several.values.shape == (1, 1, 2)
+    assert np.allclose(several.values, gradients, rtol=1e-13, atol=1e-14)
+
+
+def test_the_asynchronous_client_gives_the_same(server: Server) -> None:
+    async def ask() -> Any:
+        async with vs.AsyncClient(server.url) as client:
+            return await asyncio.gather(
+                client.closed_form(BODY3, 1e-6, budget_s=BUDGET_S),
+                client.curve([0, 1, 2]),
+                client.theta([0.5], [[1j]]),
+            )
+
+    motion, data, values = asyncio.run(ask())
+    assert motion.to_json() == vs.closed_form(BODY3, 1e-6).to_json()
+    assert data.riemann_matrix == pytest.approx(np.array([[1j]]), abs=1e-15)
+    assert values.values == pytest.approx(theta.riemann_theta([0.5], [[1j]]))
+
+
+def test_the_command_line_gives_the_document(tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    body = {"problem": BODY3_PROBLEM, "times": [0, 1]}  # the file of a motion serves as well
+    printed = run(app, ["closed-form", "-"], input=json.dumps(body))
+    assert printed.exit_code == 0
+    document = json.loads(printed.stdout)
+    assert document == json.loads(vs.closed_form(BODY3).to_json())
+    file = tmp_path / "motion.json"
+    written = run(app, ["closed-form", "-", "--output", str(file)], input=json.dumps(body))
+    assert "ClosedForm(veselova, genus 2" in written.stdout
+    assert vs.ClosedForm.from_json(file.read_text()).document == document
+    for options in (["--output", "x.csv"], ["--output", str(tmp_path / "no" / "x.json")]):
+        refused = run(app, ["closed-form", "-", *options], input=json.dumps(body))
+        assert refused.exit_code
+        assert "--output" in str(refused.exception)
