@@ -25,7 +25,7 @@ def _matrix(rng: np.random.Generator, n: int, condition: float) -> Any:
     return ((matrix + matrix.T) / 2).tolist()
 
 
-@pytest.mark.parametrize("n", [2, 3, 5, 9])
+@pytest.mark.parametrize("n", [2, 3, 5, 9, 24])
 def test_principal_axes_have_sixty_digits(n: int, rng: np.random.Generator) -> None:
     for condition in (1.0, 1e4, 1e8, 1e12):
         matrix = [list(map(Fraction, row)) for row in _matrix(rng, n, condition)]
