@@ -25,10 +25,10 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.dense_output.interpolation import Windows
-from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
+from veselova.analytic.time_map.cost_model import Costs
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import UniformTimeMap
 
@@ -90,7 +90,8 @@ def along_orbit(genus: int, count: int) -> str:
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     clock = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
-    fewest = EvaluationPlan(solution, times).costs.fewest_in_window(32, "panels")
+    costs = Costs(solution.curve.genus, solution.modes, solution.fastest * SPAN)
+    fewest = costs.fewest_in_window(32, "panels")
 
     def evaluation(_: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)

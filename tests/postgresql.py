@@ -80,7 +80,7 @@ def postgresql_server() -> Iterator[str]:
         options = f"-k {folder} -c listen_addresses= -c fsync=off"
         run("pg_ctl", "-w", "-l", str(folder / "log"), "-o", options, "start")
         try:
-            yield f"postgresql://veselova./{{name}}?host={folder}"
+            yield f"postgresql://veselova@/{{name}}?host={folder}"
         finally:
             run("pg_ctl", "-w", "-m", "immediate", "stop")
 

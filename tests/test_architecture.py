@@ -44,7 +44,7 @@ ALLOWED_LATER = {
         "mpmath",
         "flint",
     },
-    "analytic": {"finufft"},
+    "analytic": set(),
     "numeric": {"heyoka"},
 }
 
@@ -286,7 +286,6 @@ def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
         "scipy",
         "mpmath",
         "flint",
-        "finufft",
         "heyoka",
         "matplotlib",
         "pydantic",

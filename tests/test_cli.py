@@ -77,7 +77,7 @@ def test_the_taylor_method_agrees_to_eleven_digits() -> None:
     assert max(deviation[name] for name in ("q", "frame", "omega")) <= 1e-11
 
 
-@pytest.mark.parametrize("method", ["theta", "products", "nufft", "angles"])
+@pytest.mark.parametrize("method", ["theta", "angles"])
 def test_the_method_of_the_closed_form_can_be_chosen(method: str) -> None:
     document = json.loads(run("solve", "-", "--json", stdin=request(method=method)).stdout)
     assert document["provenance"]["method"] == method

@@ -460,8 +460,7 @@ def test_decimals_turn_into_numbers_of_both_libraries() -> None:
         ({"certified": 1}, "certified"),
         ({"certified": True, "engine": "numeric"}, "certified"),
         ({"certified": True, "method": "theta"}, "method"),
-        ({"certified": True, "method": "nufft"}, "method"),
-        ({"digits": 20, "method": "nufft"}, "method"),
+        ({"digits": 20, "method": "products"}, "method"),
     ],
 )
 def test_precision_that_an_engine_has_not_is_refused_by_name(

@@ -107,7 +107,7 @@ def test_named_tests_exist() -> None:
 
 def test_one_version_stands_everywhere() -> None:
     assert f"version: {__version__}" in (ROOT / "CITATION.cff").read_text()
-    assert f"## {__version__}" in (ROOT / "CHANGELOG.md").read_text()
+    assert f"## [{__version__}] - " in (ROOT / "CHANGELOG.md").read_text()
 
 
 def test_no_lock_file_names_an_address() -> None:

@@ -46,7 +46,7 @@ def true_error(problem: EllipsoidGeodesic, arcs: Any, **options: Any) -> tuple[A
 
 
 @pytest.mark.parametrize("n", range(2, 7))
-@pytest.mark.parametrize("method", ["theta", "products", "nufft", "angles"])
+@pytest.mark.parametrize("method", ["theta", "angles"])
 def test_theta_functions_follow_geodesics_to_twelve_digits(
     n: int, method: str, rng: Generator
 ) -> None:

@@ -21,6 +21,7 @@ from veselova.analytic.time_map.fourier import ColumnsForModes, FourierTimeMap
 from veselova.analytic.time_map.fourier_modes import find_significant_modes
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 DIMENSIONS = range(2, 9)
@@ -99,14 +100,16 @@ def test_normals_change_sign_analytically_with_their_cycles(
         assert all((signs[:, i] < 0).all() == (i in flipped) for i in range(n))
 
 
+def time_map_at(solution: Solution, times: np.ndarray, name: str) -> TimeMap:
+    return EvaluationPlan.of(solution, times, time_map=name).make_time_map(solution)
+
+
 @pytest.mark.parametrize("n", range(2, 6))
 def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> None:
     for _ in range(3):
         solution = Solution(random_problem(rng, n))
         times = np.sort(rng.uniform(-80, 80, 30))
-        fourier, panels = (
-            EvaluationPlan(solution, times).clock(name) for name in ("fourier", "panels")
-        )
+        fourier, panels = (time_map_at(solution, times, name) for name in ("fourier", "panels"))
         (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
         scale = np.max(np.abs(tau_panels))
         assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
@@ -120,8 +123,7 @@ def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Gen
     solution = Solution(random_problem(rng, n))
     means = np.sort(rng.uniform(-40, 40, 30))
     clocks = [
-        EvaluationPlan(solution, np.array([-80.0, 80.0])).clock(name)
-        for name in ("fourier", "panels")
+        time_map_at(solution, np.array([-80.0, 80.0]), name) for name in ("fourier", "panels")
     ]
     (fourier, z_fourier), (panels, z_panels) = (clock.ahead(means) for clock in clocks)
     assert np.allclose(fourier, panels, rtol=0, atol=1e-12)
@@ -137,7 +139,7 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     once.
     """
     solution = Solution(random_problem(rng, n))
-    clock = EvaluationPlan(solution, np.array([1.0])).clock("fourier")
+    clock = time_map_at(solution, np.array([1.0]), "fourier")
     assert isinstance(clock, FourierTimeMap)
     z = rng.uniform(-1, 1, (40, n - 1))
     series = clock._sum.at(z - solution.in_tau1.start)[1]
@@ -220,7 +222,7 @@ def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
     solution = Solution(near_separatrix(gap).problem())
     times = np.linspace(-30, 30, 41)
     tau_fourier, tau_panels = (
-        EvaluationPlan(solution, times).clock(name).tau1(times)[0] for name in ("fourier", "panels")
+        time_map_at(solution, times, name).tau1(times)[0] for name in ("fourier", "panels")
     )
     assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
 
@@ -322,9 +324,7 @@ def test_the_inverse_clock_leaves_rounding_after_two_sums(
         return plain(modes, advance)
 
     for _ in range(12):
-        clock = EvaluationPlan(Solution(random_problem(rng, n, spread)), np.array([1.0])).clock(
-            "fourier"
-        )
+        clock = time_map_at(Solution(random_problem(rng, n, spread)), np.array([1.0]), "fourier")
         assert isinstance(clock, FourierTimeMap)
         times = np.sort(rng.uniform(-20, 20, 40))
         together, _ = clock.tau1(times)
@@ -394,10 +394,7 @@ def test_modes_of_nearly_coinciding_phases_are_found(
     """
     A = 1.7 * (1 + gap * np.cumsum(rng.uniform(0.5, 2, n)))
     solution = Solution(Veselova(A, rng.normal(size=n), rng.normal(size=n), normalize=True))
-    clocks = [
-        EvaluationPlan(solution, np.array([0.0, 30.0])).clock(name)
-        for name in ("fourier", "panels")
-    ]
+    clocks = [time_map_at(solution, np.array([0.0, 30.0]), name) for name in ("fourier", "panels")]
     fourier, panels = (clock.tau1(np.linspace(0, 30, 50))[0] for clock in clocks)
     assert np.max(np.abs(fourier - panels)) < 1e-13
 

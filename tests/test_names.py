@@ -19,7 +19,7 @@ from veselova.service.api.request_models import TrajectoryRequest, read_request
 VARY = {"/A/0": {"start": 3, "stop": 4, "count": 3}}
 NAMES = [
     ({"method": "theeta"}, "/method", "theta"),
-    ({"method": "nufft", "engine": "numeric"}, "/method", None),
+    ({"method": "theta", "engine": "numeric"}, "/method", None),
     ({"method": "dop583", "engine": "numeric"}, "/method", "dop853"),
     ({"engine": "numeric", "formulation": "reducde"}, "/formulation", "reduced"),
     ({"formulation": "reduced"}, "/formulation", None),

@@ -133,7 +133,7 @@ def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
     # What is imported at a call may be of any extra, or is named by the error that says that it is
     # missing.
-    declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"finufft", "sympy"}
+    declared = _libraries(CHAPTERS[folder]) | _libraries("all") | {"sympy"}
     for path in sorted((SOURCE / folder).rglob("*.py")):
         for module in _third_party(path):
             names = {_name(name) for name in distributions.get(module, [module])}
@@ -222,7 +222,7 @@ def _without(extra: str | None, statement: str) -> subprocess.CompletedProcess[s
         module for module, names in everything.items() if not {_name(name) for name in names} & kept
     }
     # What the libraries that are kept need themselves stays.
-    declared = _libraries("all") | {"finufft", "sympy"}
+    declared = _libraries("all") | {"sympy"}
     missing = {
         module for module in missing if {_name(name) for name in everything[module]} & declared
     }
@@ -258,7 +258,6 @@ print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, many.strings("q")
         ("vs.solve(problem, [1]).to_xarray()", "xarray", "xarray"),
         ("vs.solve(problem, [1]).to_parquet('motion.parquet')", "pyarrow", "pyarrow"),
         ("vs.solve(problem, [1], 'numeric', 'taylor')", "heyoka", "heyoka"),
-        ("vs.solve(problem, [1], method='nufft')", "finufft", "finufft"),
     ],
 )
 def test_a_missing_library_is_named_with_what_installs_it(

@@ -169,12 +169,6 @@ def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
         solve(tagged("generic")[1].problem(), [1.0], "numeric", "taylor")
 
 
-def test_missing_transforms_are_named(monkeypatch: Any) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "finufft", None)
-    with pytest.raises(BackendMissing, match="finufft"):
-        solve(tagged("generic")[1].problem(), [1.0], method="nufft")
-
-
 @pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable", "lr", "stiefel"])
 def test_a_dataset_is_written_to_netcdf_and_read_again(case: str, tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic
-from veselova.analytic.arithmetic.trigonometric_sums import powers, turns, waves, waves_at
+from veselova.analytic.arithmetic.trigonometric_sums import exponentials, powers, turns, waves_at
 
 
 def test_powers_are_as_exact_as_multiples_of_the_angle(rng: np.random.Generator) -> None:
@@ -18,7 +18,7 @@ def test_powers_are_as_exact_as_multiples_of_the_angle(rng: np.random.Generator)
 @pytest.mark.parametrize("dimension", [1, 2, 4])
 def test_waves_are_products_of_powers(dimension: int, rng: np.random.Generator) -> None:
     angles, orders = rng.uniform(-3, 3, (30, dimension)), rng.integers(-9, 10, (50, dimension))
-    found = waves(turns(angles, 9), orders)
+    found = exponentials(turns(angles, 9), orders)
     assert found.shape == (50, 30)
     assert np.max(np.abs(found - np.exp(1j * (orders @ angles.T)))) < 3e-14
 
@@ -33,7 +33,7 @@ def test_few_waves_are_those_of_many(count: int, rng: np.random.Generator) -> No
 
 def test_no_order_but_zero_is_a_constant(rng: np.random.Generator) -> None:
     assert np.array_equal(
-        waves(turns(rng.uniform(-3, 3, (6, 2)), 0), np.zeros((3, 2), dtype=np.int64)),
+        exponentials(turns(rng.uniform(-3, 3, (6, 2)), 0), np.zeros((3, 2), dtype=np.int64)),
         np.ones((3, 6)),
     )
 

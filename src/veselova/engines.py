@@ -54,8 +54,8 @@ def solve(
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``;
     None takes the closed form where the problem has one, ``problem.default_engine``. ``method``:
-    None for the engine's default; analytic: ``theta``, ``products``, ``nufft`` or ``angles``;
-    numeric: ``dop853`` or ``taylor``; ``nufft`` and ``taylor`` with the extra ``fast``.
+    None for the engine's default; analytic: ``theta`` or ``angles``;
+    numeric: ``dop853`` or ``taylor``; ``taylor`` with the extra ``fast``.
     ``formulation`` (numeric): which of ``problem.formulations`` is integrated.
     ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal
     with that many digits after the point in q and frame, ``trajectory.decimals``. Data are taken at

@@ -41,11 +41,6 @@ _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 #: An error above this leaves no digit of the attitude.
 _NO_DIGIT = 0.1
 
-#: What else may leave none.
-_OR_CANCELLATION = (
-    ", or the sums of nufft cancel beyond the digits of a double; those of theta do not"
-)
-
 
 def solve(
     problem: TorusProblem | VeselovaSO3 | SeparableVeselova,
@@ -60,20 +55,17 @@ def solve(
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
-    ``method``: ``theta`` (every entry of the attitude a theta quotient; many times from few, in
-    windows), ``products`` (the same at every time, by products of matrices), ``nufft`` (at every
-    time, by nonuniform FFTs, extra ``fast``) or ``angles`` (Abel–Jacobi inversion, then the
-    algebraic frame; windows too); None takes the cheaper of ``theta`` and ``angles``.
+    ``method``: ``theta`` (every entry of the attitude a theta quotient) or ``angles`` (Abel–Jacobi
+    inversion, then the algebraic frame); None takes the cheaper.
     ``time_map``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same by
-    ``fourier``. ``clock`` is its name in version 0.1. Every start is
-    served: equal A's, frozen directions, coinciding constants, rest. On a separatrix the error is
-    that of starts a rounding away, and grows like e^(rate·t); near one sums by ``nufft`` cancel,
-    which is in their error.
+    ``fourier``. ``clock`` is its name in version 0.1.
+    Every start is served: equal A's, frozen directions, coinciding constants, rest. On a separatrix
+    the error is that of starts a rounding away, and grows like e^(rate·t).
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see
     Trajectory.decimals.
-    ``solution``: that of the problem in double precision, where it is known already. Raises
-    InvalidInput for bad times or names, Unsolved where a time is too far or the data leave no digit
-    of the answer, BackendMissing for ``nufft`` without finufft.
+    ``solution``: that of the problem in double precision, where it is known already.
+    Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave
+    no digit of the answer.
     ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about
     1e-14 at t of order 10².
     """
@@ -99,11 +91,7 @@ def solve(
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         return _separable_motion(problem, grid, method, time_map, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
-        motion = _TorusMotion(problem, method, time_map)
-        # no field of the motion: pickling leaves behind what can be computed again
-        if solution is not None:
-            vars(motion)["_solution"] = solution
-        return motion.evaluate(grid)
+        return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
     served = ("angles",) if certified else ("theta", "angles")
     if method is not None and method not in served:
         precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
@@ -158,12 +146,18 @@ def _separable_motion(
 
 @dataclass(frozen=True)
 class _TorusMotion(Motion[TorusProblem]):
+    """known: the solution of the problem, where it is known already; pickling leaves it behind."""
+
     method: str | None
     time_map: str | None
+    known: Solution | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "known": None}
 
     @cached_property
     def _solution(self) -> Solution:
-        return Solution(self.problem)
+        return self.known or Solution(self.problem)
 
     @cached_property
     def _rests(self) -> bool:
@@ -210,9 +204,8 @@ class _TorusMotion(Motion[TorusProblem]):
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         evaluator = self._evaluator
-        plan = evaluator.to(grid)
-        time_map = plan.time_map(self.time_map)
-        along, error = evaluator.evaluate(plan, time_map)
+        plan = evaluator.plan(grid, self.time_map)
+        along, error = evaluator.evaluate(plan, plan.make_time_map(evaluator.solution))
         if self._departure is not None:
             apart, on_the_way = self._departure.at(grid.doubles)
             apart = self.problem.bound({"frame": along.series[1]}, apart)
@@ -220,20 +213,15 @@ class _TorusMotion(Motion[TorusProblem]):
         if not error.max() <= _NO_DIGIT:  # or it is no number
             lost = grid.doubles[~(error <= _NO_DIGIT)]
             first = lost[np.argmin(np.abs(lost))]
-            cause = self._cause + _OR_CANCELLATION * (evaluator.method == "nufft")
-            raise Unsolved(
-                "no-digit-left",
-                f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}: {cause}",
-            )
+            reached = f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}"
+            raise Unsolved("no-digit-left", f"{reached}: {self._cause}")
         solution = evaluator.solution
         details = {
             "regime": solution.regime,
-            "time_map": time_map.name,
-            "time_map_size": time_map.size,
+            "time_map": plan.time_map,
+            "time_map_size": along.time_map.size,
             "evaluations": along.evaluations,
-            "time_map_estimates": plan.costs.estimates(plan.inversions)
-            if time_map.name != "uniform"
-            else {},
+            "time_map_estimates": dict(plan.estimates),
             "guard_digits": plan.is_guarded,
             "quadrature_nodes": solution.periods.quadrature_nodes,
             "theta_terms": evaluator.terms,
@@ -254,10 +242,10 @@ def _with_neighbours(
     first, by its sensitivities at these times.
     """
     grid = TimeGrid.of(instants)
-    plans = [evaluator.to(grid) for evaluator in evaluators]
     local = [instants.size, *(0 for _ in evaluators[1:])]
-    (first, error), *others = (
-        evaluator.evaluate(plan, plan.time_map(time_map), most_local)
-        for evaluator, plan, most_local in zip(evaluators, plans, local, strict=True)
-    )
-    return [first.series[1], *(other.series[1] for other, _ in others)], error
+    found = []
+    for evaluator, most_local in zip(evaluators, local, strict=True):
+        plan = evaluator.plan(grid, time_map)
+        made = plan.make_time_map(evaluator.solution)
+        found.append(evaluator.evaluate(plan, made, most_local))
+    return [samples.series[1] for samples, _ in found], found[0][1]

@@ -132,7 +132,8 @@ class Windows:
         """Return the motion; ``rates`` are f, cycles per unit of τ₁."""
         if not self._stretches.windows and self._times.size <= AT_ONCE:
             tau1, z = time_map.tau1(self._times, self._remainders)
-            return Samples(tau1, evaluation(tau1, z)[1], np.zeros(tau1.size), int(tau1.size))
+            series = evaluation(tau1, z)[1]
+            return Samples(tau1, series, np.zeros(tau1.size), int(tau1.size), time_map)
         output = OutputArray(
             self._times, self._fewest, time_map, rates, evaluation, self._remainders
         )
@@ -164,7 +165,7 @@ class Windows:
     def _fill_adjoining(
         self, output: OutputArray, time_map: ChebyshevTimeMap, evaluation: Evaluation
     ) -> bool:
-        """Fill all times by windows that adjoin, and give their dt/dτ₁ to the clock; return whether
+        """Fill all times by windows that adjoin, and take t(τ₁) from their dt/dτ₁; return whether
         that could be done.
         """
         ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
@@ -201,7 +202,7 @@ class Windows:
                 else window_grid[:0]
             )
             window_grid = WindowGrid.concatenate([before, after])
-        time_map.panels = panels
+        output.take_time_map(time_map.on(panels))
         adjoining.fill(self._times, panels)
         return True
 

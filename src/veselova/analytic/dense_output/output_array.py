@@ -34,12 +34,14 @@ class Samples:
     relative to their size.
 
     evaluations: how often the motion was evaluated
+    time_map: the one that was used, on the panels of the intervals where these adjoin
     """
 
     tau1: Array
     series: tuple[Array, ...]
     error: Array
     evaluations: int
+    time_map: TimeMap
 
 
 class OutputArray:
@@ -91,7 +93,11 @@ class OutputArray:
             np.moveaxis(self._states[a:b].reshape(*shape, -1), -1, 0)
             for a, b, shape in zip(ends[:-1], ends[1:], self._shapes, strict=True)
         )
-        return Samples(self._states[0], series, self._error, self._evaluations)
+        return Samples(self._states[0], series, self._error, self._evaluations, self._time_map)
+
+    def take_time_map(self, time_map: TimeMap) -> None:
+        """Use another time map of the same orbit from now on."""
+        self._time_map = time_map
 
     def batch(self, window_grid: WindowGrid, z: Array | None = None) -> WindowBatch:
         """Return windows of mean time; z (W, g) are the phases at their starts."""

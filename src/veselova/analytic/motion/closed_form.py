@@ -186,9 +186,9 @@ def _error(solution: Solution, accuracy: float) -> dict[str, float]:
     far = _CYCLES / solution.fastest
     errors = []
     for time in (0.0, far):
-        plan = evaluator.to(TimeGrid.of([time]))
-        name = None if solution.problem.time == "tau1" else "fourier"
-        errors.append(_OWN_ROUNDING * float(evaluator.evaluate(plan, plan.time_map(name))[1][0]))
+        plan = evaluator.plan(TimeGrid.of([time]), "fourier")
+        error = evaluator.evaluate(plan, plan.make_time_map(solution))[1]
+        errors.append(_OWN_ROUNDING * float(error[0]))
     growth = max(0.0, errors[1] - errors[0])
     return {
         "at_start": errors[0] + accuracy,

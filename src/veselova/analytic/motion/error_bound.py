@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, combine_bounds
+from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.rate import TimeMap
 
 __all__ = ["ErrorBound"]
 
@@ -23,8 +23,11 @@ _EPSILON = float(np.finfo(float).eps)
 
 #: Rounding of one evaluation of the attitude, in ε, largest seen over the problem tables: 8 by
 #: angles, 20 by theta quotients, and there for each unit of the largest entry of T, whose rounding
-#: stands in an exponent. That of transforms comes on top.
-_EVALUATION = {"angles": 8.0, "theta": 20.0, "products": 20.0, "nufft": 20.0}
+#: stands in an exponent.
+_EVALUATION = {
+    "angles": 8.0,
+    "theta": 20.0,
+}
 
 #: The same of the point of a geodesic, relative to the longest semi-axis; largest seen 2, at the
 #: tips of needles.
@@ -32,7 +35,7 @@ _EVALUATION_OF_POINT = 8.0
 
 #: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of
 #: different phases add in squares.
-_PHASE = {"angles": 4.0, "theta": 2.0, "products": 2.0, "nufft": 2.0}
+_PHASE = {"angles": 4.0, "theta": 2.0}
 
 #: Rounding of a phase at the start in ε, the Abel map, as clocks take it.
 _START_PHASE = 4.0
@@ -63,17 +66,16 @@ class ErrorBound:
     solution: Solution
     method: str
 
-    def at(
-        self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap, most_local: int = MOST_LOCAL
-    ) -> Array:
-        """Return the bound at each time of a plan, (N,), from the Neumann times there.
+    def at(self, plan: EvaluationPlan, samples: Samples, most_local: int = MOST_LOCAL) -> Array:
+        """Return the bound at each time of a plan, (N,).
 
         Up to ``most_local`` times the sensitivities are those at the times, where the samples do
         not represent the orbit; for more times they are the largest ones.
         """
         solution = self.solution
+        tau1 = samples.tau1
         of_frame, of_point = solution.sensitivity, self._largest_of_point
-        moved = self._moved(plan, tau1, time_map)
+        moved = self._moved(plan, samples)
         if not self._is_looked_at:
             return self._along_axes(self._by(of_frame, of_point, moved))
         count = tau1.size if tau1.size <= most_local else min(tau1.size, MOST_LOCAL)
@@ -87,19 +89,20 @@ class ErrorBound:
             result = combine_bounds(result, local)
         return self._along_axes(result)
 
-    def _moved(self, plan: EvaluationPlan, tau1: Array, time_map: TimeMap) -> _Moved:
+    def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.
 
         The rounding of dt/dτ₁ is one of the time elapsed, not of F_0|τ₁|. A rounding of f_k moves
         phase k alone; an error of the time map moves all phases along the flow.
         """
+        tau1 = samples.tau1
         solution = self.solution
         rounding = _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
-        of_map, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
+        of_map, drift = samples.time_map.error(tau1, self._of_start, rounding * self._frequencies)
         lag = np.abs(plan.times / solution.mean_rate)
         lag *= rounding + drift
         lag += of_map
-        slowness = _slowness(solution, tau1, solution.takes_rate_from_angles(self.method))
+        slowness = _slowness(solution, tau1, plan.rate_in_angles)
         return _Moved(lag, lag if slowness is None else lag * slowness, rounding * np.abs(tau1))
 
     def _by(self, of_frame: Sensitivity, of_point: Sensitivity | None, moved: _Moved) -> Array:

@@ -1,10 +1,13 @@
-"""What given times ask of a solution: how many cycles off they lie, by which clock they are
-reached, and in which windows.
+"""The evaluation plan: by which method, time map and interpolation one solution serves given times.
+
+It is decided here and nowhere else. Values, error bound and provenance read it.
 """
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,92 +24,109 @@ __all__ = ["EvaluationPlan"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which guarded frequencies leave no digit of the phases.
+#: Cycles from which frequencies in extended precision leave no digit of the phases.
 _MOST_CYCLES = 1e28
 
 
+@dataclass(frozen=True)
 class EvaluationPlan:
-    """Times (N,), increasing, at which one solution is wanted; ``method``: the route to the
-    attitude, None for the default.
+    """How one solution serves increasing times.
 
-    remainders: what exact times are beyond the doubles · cycles: the most that any phase makes
-    between t = 0 and the times
+    times (N,), remainders: the doubles, and what exact times are beyond them
+    method: ``theta`` or ``angles``, from phases to the attitude
+    time_map: ``fourier``, ``panels`` or ``uniform``
+    rate_in_angles: whether dt/dτ₁ along the orbit comes from angles, not from theta functions
+    cycles: the most that any phase makes between t = 0 and the times
+    intervals: those of the Chebyshev interpolant, none where every time is evaluated by itself
+    estimates: the seconds of each time map that were compared
     """
 
-    def __init__(
-        self,
+    times: Array
+    remainders: Array | None
+    method: str
+    time_map: str
+    rate_in_angles: bool
+    cycles: float
+    intervals: Windows
+    estimates: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls,
         solution: Solution,
         times: Array,
         method: str | None = None,
+        time_map: str | None = None,
         remainders: Array | None = None,
-    ) -> None:
-        self.solution = solution
-        self.times = times
-        self.method = method
-        self.remainders = remainders
-        self.cycles = solution.fastest * max(abs(times.item(0)), abs(times.item(-1)))
+    ) -> EvaluationPlan:
+        """Return the plan for times (N,): with the given method and time map, or the cheapest.
+
+        Raises Unsolved (``too-far``) where neither time map reaches the times.
+        """
+        cycles = solution.fastest * max(abs(times.item(0)), abs(times.item(-1)))
+        in_angles = solution.takes_rate_from_angles(method, cycles)
+        costs = Costs(solution.curve.genus, solution.modes, cycles, in_angles)
+
+        def intervals(name: str) -> Windows:
+            few = times.size < FEW_TIMES
+            fewest = times.size + 1 if few else costs.fewest_in_window(NODES, name)
+            return Windows(times, solution.fastest, fewest, remainders)
+
+        estimates: Mapping[str, float] = {}
+        if solution.problem.time == "tau1":
+            _require_known_phases(cycles)
+            chosen = "uniform"
+        else:
+            # The Fourier map is inverted at every time, or at the starts of intervals.
+            inversions = times.size if times.size < FEW_TIMES else intervals("fourier").inversions
+            estimates = costs.estimates(inversions)
+            chosen = _choose(solution, costs, inversions, time_map)
+        return cls(
+            times,
+            remainders,
+            method or solution.default_method(),
+            chosen,
+            in_angles,
+            cycles,
+            intervals(chosen),
+            estimates,
+        )
 
     @property
     def is_guarded(self) -> bool:
-        """Return whether frequencies for these times carry guard digits."""
+        """Return whether frequencies for these times are those in extended precision."""
         return self.cycles > GUARDED_FROM
 
-    @cached_property
-    def costs(self) -> Costs:
-        """Return what the clocks cost."""
-        solution = self.solution
-        return Costs(solution.curve.genus, solution.modes, self.cycles, self._in_angles)
-
-    @cached_property
-    def _in_angles(self) -> bool:
-        """Return whether panels take dt/dτ₁ from angles."""
-        return self.solution.takes_rate_from_angles(self.method, self.cycles)
-
-    @cached_property
-    def inversions(self) -> int:
-        """Return how often a Fourier clock is asked at least: at every time, or at the starts of
-        windows.
-        """
-        return (
-            self.times.size if self.times.size < FEW_TIMES else self.windows("fourier").inversions
-        )
-
-    def windows(self, time_map: str) -> Windows:
-        """Return the windows in which many times are interpolated where that is cheaper with the
-        clock and the method has any.
-        """
-        none = self.times.size < FEW_TIMES or self.method in ("products", "nufft")
-        fewest = self.times.size + 1 if none else self.costs.fewest_in_window(NODES, time_map)
-        return Windows(self.times, self.solution.fastest, fewest, self.remainders)
-
-    def time_map(self, name: str | None = None) -> TimeMap:
-        """Return a clock for the times: ``fourier`` or ``panels``, by cost where no name is given.
-
-        Panels take dt/dτ₁ along the orbit by the method that is given, or by the cheaper one.
-        Raises Unsolved (``too-far``, ``beyond-floats``).
-        """
-        solution = self.solution
-        if not self.cycles <= _MOST_CYCLES:
-            known = f"frequencies are known to {GUARD_DIGITS} digits"
-            raise Unsolved("too-far", f"{self.cycles:.3g} cycles of the fastest phase; {known}")
-        if solution.problem.time == "tau1":
-            return UniformTimeMap(
-                solution.precise_flows[1] if self.is_guarded else solution.in_time,
-                solution.mean_rate,
-            )
-        if name is None and solution.moving.rate_variation > WIDEST_RATE:
-            name = "fourier" if self.cycles > PANEL_CYCLES else "panels"
-        if (
-            name or self.costs.cheaper_clock(self.inversions, not solution.near_separatrix)
-        ) == "fourier":
+    def make_time_map(self, solution: Solution) -> TimeMap:
+        """Return the time map of the plan; raises Unsolved (``beyond-floats``)."""
+        if self.time_map == "fourier":
             return solution.fourier_time_map(self.is_guarded)
-        if self.cycles > PANEL_CYCLES:
-            reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier clocks to n = 6"
-            raise Unsolved(
-                "too-far",
-                f"{self.cycles:.3g} cycles of the fastest phase at n = {solution.problem.n}; "
-                f"{reached}",
-            )
+        if self.time_map == "uniform":
+            flow = solution.precise_flows[1] if self.is_guarded else solution.in_time
+            return UniformTimeMap(flow, solution.mean_rate)
         in_tau1 = solution.precise_flows[0] if self.is_guarded else solution.in_tau1
-        rate = partial(solution.rate_at, in_angles=self._in_angles)
-        return ChebyshevTimeMap(rate, solution.mean_rate, in_tau1, *self.windows("panels").span)
+        rate = partial(solution.rate_at, in_angles=self.rate_in_angles)
+        return ChebyshevTimeMap(rate, solution.mean_rate, in_tau1, *self.intervals.span)
+
+
+def _require_known_phases(cycles: float) -> None:
+    """Raise Unsolved where frequencies leave no digit of the phases."""
+    if not cycles <= _MOST_CYCLES:
+        known = f"frequencies are known to {GUARD_DIGITS} digits"
+        raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; {known}")
+
+
+def _choose(solution: Solution, costs: Costs, inversions: int, given: str | None) -> str:
+    """Return ``fourier`` or ``panels``: the one given, else the cheaper one."""
+    cycles = costs.cycles
+    _require_known_phases(cycles)
+    if given is None and solution.moving.rate_variation > WIDEST_RATE:
+        given = "fourier" if cycles > PANEL_CYCLES else "panels"
+    chosen = given or costs.cheaper_time_map(inversions, not solution.near_separatrix)
+    if chosen == "panels" and cycles > PANEL_CYCLES:
+        reached = f"panels go to {PANEL_CYCLES:.0e} and Fourier time maps to n = 6"
+        raise Unsolved(
+            "too-far",
+            f"{cycles:.3g} cycles of the fastest phase at n = {solution.problem.n}; {reached}",
+        )
+    return chosen

@@ -4,7 +4,7 @@ depend on times is kept.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,9 +22,8 @@ __all__ = ["METHODS", "Evaluator"]
 
 Array = NDArray[np.float64]
 
-#: The routes from phases to attitude; sums at every time, by products of matrices or transforms,
-#: are never cheaper than windows.
-METHODS = ("theta", "products", "nufft", "angles")
+#: The routes from phases to the attitude.
+METHODS = ("theta", "angles")
 
 
 @dataclass(frozen=True)
@@ -39,9 +38,11 @@ class Evaluator:
         """Return the method."""
         return self.given or self.solution.default_method()
 
-    def to(self, times: TimeGrid) -> EvaluationPlan:
-        """Return what the times ask for."""
-        return EvaluationPlan(self.solution, times.doubles, self.given, times.remainders)
+    def plan(self, times: TimeGrid, time_map: str | None = None) -> EvaluationPlan:
+        """Return the plan for times, with the time map given or the cheaper one."""
+        return EvaluationPlan.of(
+            self.solution, times.doubles, self.given, time_map, times.remainders
+        )
 
     def evaluate(
         self, plan: EvaluationPlan, time_map: TimeMap, most_local: int = MOST_LOCAL
@@ -53,16 +54,21 @@ class Evaluator:
         they turn sharply, and the rest does not. The error is that by sensitivities at the times
         themselves up to ``most_local`` of them.
         """
-        windows = plan.windows(time_map.name)
-        with_coordinates = self.method == "angles" and windows.inversions == plan.times.size
-        evaluation = self._with_coordinates if with_coordinates else self._states
-        along = windows.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
-        error = self._bound.at(plan, along.tau1, time_map, most_local)
-        error += along.error
-        if self.method == "nufft":
-            error += along.series[2]
-            along = replace(along, series=along.series[:2])
-        return along, error
+        at_every_time = plan.intervals.inversions == plan.times.size
+        with_coordinates = plan.method == "angles" and at_every_time
+
+        def evaluation(_: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
+            """Return dt/dτ₁, and the series, at phases z (N, g)."""
+            attitude = self.solution.attitude(z, plan.method)
+            rate, *series = self.solution.states(attitude)
+            if with_coordinates:
+                series.append(self.solution.spheroconic(attitude))
+            if plan.method == "theta" and plan.rate_in_angles:
+                return self.solution.rate_at(z, in_angles=True), tuple(series)
+            return 1 / rate, tuple(series)
+
+        samples = plan.intervals.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
+        return samples, self._bound.at(plan, samples, most_local) + samples.error
 
     @cached_property
     def _bound(self) -> ErrorBound:
@@ -70,36 +76,5 @@ class Evaluator:
 
     @cached_property
     def terms(self) -> int:
-        """Return the terms of a theta sum, or of the transforms; zero in angles."""
-        if self.method == "angles":
-            return 0
-        return (
-            self.solution.transforms if self.method == "nufft" else self.solution.quotients.theta
-        ).size
-
-    @cached_property
-    def _pace_in_angles(self) -> bool:
-        # Windows alone ask for dt/dτ₁: products and nufft have none, and angles have it from the
-        # attitude.
-        return self.method == "theta" and self.solution.takes_rate_from_angles(self.method)
-
-    def _states(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
-        """Return dt/dτ₁, and q̇ and the frame, after them the rounding of transforms."""
-        solution = self.solution
-        further: tuple[Array, ...] = ()
-        if self.method == "nufft":
-            attitude, rounding = solution.transforms.at(tau1, z)
-            further = (rounding,)
-        else:
-            attitude = solution.attitude(z, self.method)
-        rate, *series = solution.states(attitude)
-        return solution.rate_at(z, in_angles=True) if self._pace_in_angles else 1 / rate, (
-            *series,
-            *further,
-        )
-
-    def _with_coordinates(self, tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
-        """Return dt/dτ₁, and q̇, the frame and λ, in angles."""
-        attitude = self.solution.attitude(z, self.method)
-        rate, *series = self.solution.states(attitude)
-        return 1 / rate, (*series, self.solution.spheroconic(attitude))
+        """Return the terms of a theta sum; zero in angles."""
+        return 0 if self.method == "angles" else self.solution.quotients.theta.size

@@ -85,8 +85,8 @@ class MotionInBalls:
         ):
             return self._resting(asked, began)
         solution = Solution(self.problem)
-        plan = EvaluationPlan(solution, grid)
-        time_map = plan.time_map()
+        plan = EvaluationPlan.of(solution, grid)
+        time_map = plan.make_time_map(solution)
         reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
         method = self.method or self._cheaper(solution)
         working = self.digits + _SPARE + math.ceil(math.log10(1 + plan.cycles))

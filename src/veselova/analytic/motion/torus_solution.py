@@ -27,7 +27,6 @@ from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.theta.nufft import Transforms
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.cost_model import estimate_modes
 from veselova.analytic.time_map.fourier import FourierTimeMap
@@ -298,11 +297,6 @@ class Solution:
         return replace(
             ThetaQuotients.of(T, self.frame), at_half_periods=self._sampling.at_half_periods
         )
-
-    @cached_property
-    def transforms(self) -> Transforms:
-        """Return the same along the orbit by nonuniform FFTs."""
-        return Transforms(self.quotients, self.in_tau1.rates)
 
     @cached_property
     def largest_period(self) -> float:

@@ -123,7 +123,9 @@ class Costs:
         seconds = {name: self.seconds(name, inversions) for name in ("fourier", "panels")}
         return {name: round(value, 5) for name, value in seconds.items() if math.isfinite(value)}
 
-    def cheaper_clock(self, inversions: int, keeping: bool = True) -> Literal["fourier", "panels"]:
+    def cheaper_time_map(
+        self, inversions: int, keeping: bool = True
+    ) -> Literal["fourier", "panels"]:
         """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the
         one that keeps the digits.
 

@@ -5,7 +5,6 @@ with the genus.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -52,15 +51,27 @@ class ChebyshevTimeMap(TimeMap):
         in_tau1: LinearFlow,
         earliest: float,
         latest: float,
+        panels: Panels | None = None,
     ) -> None:
         self._rate = rate
         self._mean = mean
         self.in_tau1 = in_tau1
         self._earliest, self._latest = min(earliest, 0.0), max(latest, 0.0)
+        self._panels = panels
 
-    @cached_property
+    def on(self, panels: Panels) -> ChebyshevTimeMap:
+        """Return the same time map on panels that are known."""
+        span = self._earliest, self._latest
+        return ChebyshevTimeMap(self._rate, self._mean, self.in_tau1, *span, panels)
+
+    @property
     def panels(self) -> Panels:
-        """Return the panels; whoever has them already may set them."""
+        """Return the panels, which are made when they are first needed."""
+        if self._panels is None:
+            self._panels = self._integrate()
+        return self._panels
+
+    def _integrate(self) -> Panels:
         low = self._earliest / self._mean
         high = self._latest / self._mean
         panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
@@ -87,7 +98,7 @@ class ChebyshevTimeMap(TimeMap):
         if tau1[0] < low or tau1[-1] > high:
             low = 1.5 * float(tau1[0]) if tau1[0] < low else low
             high = 1.5 * float(tau1[-1]) if tau1[-1] > high else high
-            self.panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
+            self._panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
         return self.time(tau1) - means, self.in_tau1.phases(tau1)
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:

@@ -41,7 +41,7 @@ class TorusProblem(Problem):
 
     has_tori: ClassVar[bool] = True
     engines: ClassVar = {
-        "analytic": ("theta", "products", "nufft", "angles"),
+        "analytic": ("theta", "angles"),
         "numeric": ("dop853", "taylor"),
     }
 

@@ -106,7 +106,7 @@ class ComparisonRequest(TorusRequest):
     ]
     method: Annotated[
         str | None,
-        Field(description="analytic: theta, products, nufft, angles; numeric: dop853, taylor"),
+        Field(description="analytic: theta, angles; numeric: dop853, taylor"),
     ] = None
     formulation: Annotated[
         str | None, Field(description="numeric: which equations of the system are integrated")
