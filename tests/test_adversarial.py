@@ -147,6 +147,16 @@ def test_beside_an_equilibrium_the_point_stays(
     assert compare(problem, [-1, 0, 2]).agrees
 
 
+def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
+    """Beside an equilibrium no phase matters, and entries of the frame are products of n ratios."""
+    _, make = adversarial_system(np.random.default_rng([901, 314]), "neumann", 8)
+    problem = make()
+    found = solve(problem, np.array([-3, 0, 0.3]) * time_unit(problem))
+    off, allowed = against_truth("near a saddle", found, PATIENCE_S)
+    assert found.provenance.method == "angles"
+    assert np.all(off <= 0.5 * allowed)
+
+
 def test_two_closed_cuts_beside_one_another_are_served() -> None:
     """Widths of 1e-200 have no product among doubles; half as narrow counts as closed."""
     problem = NeumannSystem(["1", "1/2", "1/3"], [1, "1e-100", 0], [0, 0, "1e-100"])

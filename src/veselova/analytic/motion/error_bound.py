@@ -29,8 +29,12 @@ _EVALUATION = {
     "theta": 20.0,
 }
 
-#: The same of the point of a geodesic, relative to the longest semi-axis; largest seen 2, at the
-#: tips of needles.
+#: The same for each factor of a product of n ratios, by angles, where that is more; largest seen
+#: 1.6, beside an equilibrium.
+_FOR_EACH_FACTOR = 3.0
+
+#: The same of the point of a geodesic, relative to the longest semi-axis, or n where that is more;
+#: largest seen 2, at the tips of needles.
 _EVALUATION_OF_POINT = 8.0
 
 #: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of
@@ -113,12 +117,16 @@ class ErrorBound:
         """
         result = moved.along_flow * of_frame.along_flow
         result += moved.frequencies * of_frame.by_rates
-        result += self._of_one_evaluation(of_frame, _EVALUATION[self.method])
+        n = self.solution.problem.n
+        evaluation = _EVALUATION[self.method]
+        if self.method == "angles":
+            evaluation = max(evaluation, _FOR_EACH_FACTOR * n)
+        result += self._of_one_evaluation(of_frame, evaluation)
         if of_point is not None:
             size = float(np.sqrt(np.max(self.solution.problem.A)))
             error = moved.lag * self.solution.mean_rate
             error += moved.frequencies * of_point.by_rates
-            error += self._of_one_evaluation(of_point, _EVALUATION_OF_POINT, size)
+            error += self._of_one_evaluation(of_point, max(_EVALUATION_OF_POINT, n), size)
             np.maximum(result, error, out=result)
         return np.asarray(result)
 
