@@ -343,3 +343,32 @@ def test_no_file_imports_itself_by_way_of_others() -> None:
         for name in leaves:
             del remaining[name]
     assert not remaining
+
+
+#: Words that are no terms of numerical analysis, mechanics or HTTP, and so name nothing here.
+PRIVATE = """
+    bells clock crossings counts_as_one delivery displaced drawn_apart enclosed filling
+    fourier_clock grown guarded hidden horizon left_by noted panel_clock pieces settled steepness
+    stretch survey track turned twofold waves whole_file widened around_zero at_most along_axes
+"""
+
+#: Names that a contract fixes: a field of closed-form documents; an alias of ``time_map``.
+CONTRACTS = {"closed_form_schema.py": {"waves"}, "solve.py": {"clock"}}
+
+
+def test_no_name_is_a_private_word() -> None:
+    private = set(PRIVATE.split())
+    for path in FILES:
+        names = set()
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+                names.add(node.name)
+            elif isinstance(node, ast.arg):
+                names.add(node.arg)
+            elif isinstance(node, ast.Attribute):
+                names.add(node.attr)
+            elif isinstance(node, ast.Name):
+                names.add(node.id)
+        found = {name for name in names if name.strip("_").lower() in private}
+        found -= CONTRACTS.get(path.name, set())
+        assert not found, f"{path.name} names {sorted(found)}"

@@ -21,7 +21,7 @@ __all__ = ["HeyokaPeer"]
 Array = NDArray[np.float64]
 
 #: Radians between two projections, the starting speed being one.
-_STRETCH = 10.0
+_SEGMENT = 10.0
 
 #: States that turn into attitudes at once: their arrays stay in the processor's cache.
 _BLOCK = 4096
@@ -83,7 +83,7 @@ class HeyokaPeer:
         integrator = self._integrator
         integrator.time, integrator.state[:] = 0.0, self._start
         found = np.empty((times.size, self._start.size))
-        ends = np.append(np.arange(_STRETCH, times[-1], _STRETCH), times[-1])
+        ends = np.append(np.arange(_SEGMENT, times[-1], _SEGMENT), times[-1])
         begins = np.append(0, np.searchsorted(times, ends, side="right"))
         for end, first, last in zip(ends, begins[:-1], begins[1:], strict=True):
             grid = np.concatenate([[integrator.time], times[first:last], [end]])

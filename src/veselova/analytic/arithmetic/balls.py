@@ -142,7 +142,7 @@ class Balls(Arithmetic):
 
     def add_error(self, values: Any, bound: Any) -> Any:
         """Return the balls with their radii enlarged by |bound|."""
-        return values + _around_zero(bound)
+        return values + _zero_ball(bound)
 
     def at(self, digits: int) -> Balls:
         """Return the ball arithmetic of other digits."""
@@ -150,7 +150,7 @@ class Balls(Arithmetic):
 
     def zero_ball(self, values: Values) -> Values:
         """Return balls around zero that hold the values."""
-        return np.asarray(_around_zero(values))
+        return np.asarray(_zero_ball(values))
 
     def upper_bound(self, values: Values) -> Values:
         """Return exact upper bounds of |values|."""
@@ -256,9 +256,9 @@ class _Series:
         ]
         with arithmetic.at(_COARSE_DIGITS):
             size = np.abs(middle + flint.arb(0))
-            self._slack = np.sum(_around_zero(coefficients - middle), axis=1).T
+            self._slack = np.sum(_zero_ball(coefficients - middle), axis=1).T
             self._sensitivity = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
-            self._beyond = _around_zero(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
+            self._beyond = _zero_ball(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
 
     def __call__(self, psi: Values, part: str) -> Values:
         """Return the real or imaginary parts, shape (N, K, g)."""
@@ -266,7 +266,7 @@ class _Series:
         number = len(self._polynomials[0])
         result = np.empty((psi.shape[0], number, genus), dtype=object)
         centre = _midpoint(psi)
-        spread = _around_zero(psi - centre)
+        spread = _zero_ball(psi - centre)
         digits = math.ceil(flint.ctx.prec * math.log10(2))
         terms = math.ceil(self._terms * digits / self._arithmetic.digits) + _EXTRA_TERMS
         with self._arithmetic.at(digits + math.ceil(min(terms, self._terms) * _DIGITS_PER_TURN)):
@@ -286,7 +286,7 @@ _turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
 _conjugate = np.frompyfunc(flint.acb.conjugate, 1, 1)
 _real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 _imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
-_around_zero = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
+_zero_ball = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 

@@ -34,7 +34,7 @@ _LOST_DIGITS = 2
 
 #: A residual of this many ε per unit of z is rounding, and one of this many times that, which no
 #: step betters.
-_SETTLED = 8.0
+_CONVERGED = 8.0
 _STALLED = 1e4
 
 #: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each
@@ -109,7 +109,7 @@ class AbelJacobi(Generic[P]):
         residual = self.map(psi) - z
         open_ = np.arange(z.shape[0])
         step_fraction = np.ones(z.shape[0])
-        tolerance = _SETTLED * DOUBLE.epsilon
+        tolerance = _CONVERGED * DOUBLE.epsilon
         for _ in range(_MOST_STEPS):
             size = np.max(np.abs(residual[open_]), axis=1)
             open_ = open_[size > tolerance]
@@ -185,7 +185,7 @@ class AbelJacobi(Generic[P]):
         """Return the angles to which plain Newton steps from nearby settle, None
         where they do not.
         """
-        tolerance = _SETTLED * DOUBLE.epsilon
+        tolerance = _CONVERGED * DOUBLE.epsilon
         last = np.inf
         for _ in range(_NEAR_STEPS):
             residual = self.map(psi[None])[0] - z

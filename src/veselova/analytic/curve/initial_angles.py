@@ -27,12 +27,12 @@ class Start:
     signs: Values
 
 
-def start(spectrum: Spectrum, curve: Curve, enclosed: Spectrum | None = None) -> Start:
+def start(spectrum: Spectrum, curve: Curve, enclosure: Spectrum | None = None) -> Start:
     """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum.
 
     ``enclosed`` is the same spectrum in the arithmetic of a curve in balls, which decides nothing.
     """
-    numbers = spectrum if enclosed is None else enclosed
+    numbers = spectrum if enclosure is None else enclosure
     ends = [value for value, _, _ in numbers.branch_points]
     with spectrum.working():
         increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]

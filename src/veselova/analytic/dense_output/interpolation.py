@@ -45,7 +45,7 @@ _MOST_LENGTHS = 16
 _CLOSE_LENGTHS = 6
 
 #: Pieces of a window, the fewest that serve.
-_PIECES = (6, 8, 16, 32)
+_PARTS = (6, 8, 16, 32)
 
 #: Lengths of a window from t = 0 at which times have too few bits left to lie densely in one.
 _FARTHEST = 2.0**32
@@ -217,7 +217,7 @@ def _resolving(
     before.
     """
     tail = np.inf
-    count = _PIECES[-1]
+    count = _PARTS[-1]
     for k in range(_MOST_LENGTHS):
         window_grid = over(length, tail)
         tried = batch(
@@ -225,7 +225,7 @@ def _resolving(
         )
         enough = 1.0 if k < _CLOSE_LENGTHS else 0.5
         if np.mean(tried.is_resolved(tried.tails)) >= enough:
-            for count in _PIECES:
+            for count in _PARTS:
                 if np.mean(tried.is_resolved(tried.in_pieces(count)[1])) >= enough:
                     return window_grid, count
         tail = float(np.max(tried.tails))

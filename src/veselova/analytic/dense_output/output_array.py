@@ -101,7 +101,7 @@ class OutputArray:
 
     def batch(self, window_grid: WindowGrid, z: Array | None = None) -> WindowBatch:
         """Return windows of mean time; z (W, g) are the phases at their starts."""
-        z = self._time_map.ahead(window_grid.starts)[1] if z is None else z
+        z = self._time_map.periodic_part(window_grid.starts)[1] if z is None else z
         mean = self._time_map.mean
         return self.count_evaluations(
             WindowBatch.of(
@@ -128,8 +128,8 @@ class OutputArray:
             np.concatenate([window_grid.starts, window_grid.starts + window_grid.length]),
             return_inverse=True,
         )
-        ahead, z = self._time_map.ahead(ends)
-        first, last = np.searchsorted(self._times, ends + ahead)[places].reshape(2, -1)
+        periodic_part, z = self._time_map.periodic_part(ends)
+        first, last = np.searchsorted(self._times, ends + periodic_part)[places].reshape(2, -1)
         held = last - first >= self._fewest
         if not np.any(held):
             return window_grid[held]
@@ -147,7 +147,7 @@ class OutputArray:
             first[done],
             last[done],
             window_grid.starts[done],
-            ahead[places][done],
+            periodic_part[places][done],
             tails[done],
         )
         return WindowGrid(window_grid.length, window_grid.starts, tails)[~done]
@@ -158,18 +158,20 @@ class OutputArray:
         first: Places,
         last: Places,
         starts: Array,
-        ahead: Array,
+        periodic_part: Array,
         tails: Array,
     ) -> None:
         """Fill the times, from the first up to the last, of W windows, which start at starts +
-        ahead; (W,) all of them.
+        periodic_part; (W,) all of them.
         """
         begins = np.flatnonzero(first != np.append(-1, last[:-1])).tolist()
         for run in map(slice, begins, [*begins[1:], first.size]):  # windows that adjoin
             rows = slice(first[run][0], last[run][-1])
             out = self._states[:, rows]
             remainders = self._remainders_at(rows)
-            polynomials[run].fill(self._times[rows], starts[run], ahead[run], out, remainders)
+            polynomials[run].fill(
+                self._times[rows], starts[run], periodic_part[run], out, remainders
+            )
             self._open[rows] = False
             self._error[rows] = np.repeat(2 * tails[run] + SUM_ROUNDING, (last - first)[run])
 

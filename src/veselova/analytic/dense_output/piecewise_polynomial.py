@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 ORDER = 20
 
 #: A Newton step of this size, in half pieces, leaves an error of a quarter of its square at most.
-_SETTLED = 2e-8
+_CONVERGED = 2e-8
 
 #: Times that are placed in their pieces at once, and of which powers are formed at once: they stay
 #: in the cache. No power of two: rows so far apart take turns in the same places of a cache.
@@ -107,7 +107,7 @@ class PiecewisePolynomial:
                 -1,
                 1,
             )
-        x = increasing_root(excess, guess, -one, one, _SETTLED)
+        x = increasing_root(excess, guess, -one, one, _CONVERGED)
         in_tau1 = (restriction.reshape(-1, nodes) @ series).reshape(windows * count, ORDER, -1)
         # Points first: the matrices that are the same for all pieces take them at once.
         at_times = np.empty((ORDER, windows * count, 1 + in_tau1.shape[2]))
@@ -131,16 +131,21 @@ class PiecewisePolynomial:
         return PiecewisePolynomial(self.borders[chosen], self.tables[chosen], self.tails[chosen])
 
     def fill(
-        self, times: Array, starts: Array, ahead: Array, out: Array, remainders: Array | None = None
+        self,
+        times: Array,
+        starts: Array,
+        periodic_part: Array,
+        out: Array,
+        remainders: Array | None = None,
     ) -> None:
         """Fill ``out`` (C, N) with the series at increasing times in windows that adjoin, and start
-        at starts + ahead, (W,) both.
+        at starts + periodic_part, (W,) both.
 
         Starts of few bits are taken from the times exactly; only then comes what has all its
         digits, remainders of times too.
         """
         begins = np.repeat(starts, self.borders.shape[1] - 1)
-        offsets = (ahead[:, None] + self.borders[:, :-1]).ravel()
+        offsets = (periodic_part[:, None] + self.borders[:, :-1]).ravel()
         scales = (2 / np.diff(self.borders)).ravel()
         ends = np.append(_first_from(times, begins[1:], offsets[1:]), times.size)
         for first in range(0, times.size, _PLACED):

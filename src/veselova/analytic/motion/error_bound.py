@@ -81,7 +81,7 @@ class ErrorBound:
         of_frame, of_point = solution.sensitivity, self._largest_of_point
         moved = self._moved(plan, samples)
         if not self._is_looked_at:
-            return self._along_axes(self._by(of_frame, of_point, moved))
+            return self._to_axes(self._by(of_frame, of_point, moved))
         count = tau1.size if tau1.size <= most_local else min(tau1.size, MOST_LOCAL)
         rows = np.linspace(0, tau1.size - 1, count).astype(int)
         frame_there, point_there = solution.sensitivities_at(solution.in_tau1.phases(tau1[rows]))
@@ -91,7 +91,7 @@ class ErrorBound:
         if tau1.size <= most_local:
             local = self._by(frame_there, of_point and point_there, moved)
             result = combine_bounds(result, local)
-        return self._along_axes(result)
+        return self._to_axes(result)
 
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.
@@ -130,7 +130,7 @@ class ErrorBound:
             np.maximum(result, error, out=result)
         return np.asarray(result)
 
-    def _along_axes(self, error: Array) -> Array:
+    def _to_axes(self, error: Array) -> Array:
         """Return the error back along the body axes: of scalar products of n terms."""
         if self.solution.problem.axes is None:
             return error

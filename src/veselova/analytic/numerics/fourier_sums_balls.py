@@ -36,7 +36,7 @@ _ROWS = 30
 _TABLE = 4_000_000
 
 #: Waves in balls that are in memory at once.
-_WAVES = 1_000_000
+_EXPONENTIALS = 1_000_000
 
 #: What rounding makes of a power, in both parts (see Fixed.turns); and of a term of a sum with all
 #: products behind it: up to four axes 12 at most, and a third of that, since no operation is off by
@@ -66,7 +66,7 @@ def sums_over_modes(
     if _fit(coefficients[:, None], arithmetic):
         fixed = _OverModes(part, modes, coefficients, arithmetic)
     result = np.empty(len(turns), dtype=object)
-    points = max(1, _WAVES // max(1, len(modes)) if fixed is None else fixed.points)
+    points = max(1, _EXPONENTIALS // max(1, len(modes)) if fixed is None else fixed.points)
     for first in range(0, len(turns), points):
         some = slice(first, first + points)
         if fixed is None or (found := fixed(turns[some])) is None:

@@ -36,7 +36,7 @@ _CONVERGING = Decimal("1e-3")
 
 #: Iterations settle at this relative change, or at so many roundings; from there every plain Newton
 #: step doubles the digits.
-_SETTLED = Decimal("1e-300")
+_CONVERGED = Decimal("1e-300")
 _SETTLED_DIGITS = 300
 _ROUNDINGS = 4
 
@@ -133,7 +133,7 @@ def _distance(
             new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
         change = abs(new - own)
         own = new
-        if change <= _ROUNDINGS * max(arithmetic.epsilon, _SETTLED) * own:
+        if change <= _ROUNDINGS * max(arithmetic.epsilon, _CONVERGED) * own:
             for _ in range(math.ceil(math.log2(max(1.0, arithmetic.digits / _SETTLED_DIGITS)))):
                 value, derivative = _scaled_secular(near, far, constant, width, own)
                 own = own - value / derivative

@@ -61,7 +61,7 @@ _BLOCK = 32_000
 #: Cycles that the last step of the inverse clock may leave open; and a step that leaves so much
 #: where no slope is known to be the least, and the error is of the order of its square.
 _OPEN = 1e-17
-_SETTLED = 1e-9
+_CONVERGED = 1e-9
 
 
 class FourierTimeMap(TimeMap):
@@ -138,7 +138,7 @@ class FourierTimeMap(TimeMap):
         """Return F_0."""
         return self._mean
 
-    def ahead(self, means: Array) -> tuple[Array, Array]:
+    def periodic_part(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
         return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[
@@ -184,7 +184,7 @@ class FourierTimeMap(TimeMap):
         """
         least = self._mean - 2 * float(np.sum(np.abs(coefficients)))
         if least < _LEAST_SLOPE * self._mean:
-            return _SETTLED / self._fastest
+            return _CONVERGED / self._fastest
         a, b, c = (
             float(np.sum(np.abs(coefficients * pace**k))) / (least * d)
             for k, d in ((1, 1), (2, 3), (3, 12))
@@ -217,7 +217,7 @@ class FourierTimeMap(TimeMap):
                 -reach,
             )
         delta = increasing_root(
-            excess, delta, -reach, reach, self._converged, _SETTLED / self._fastest
+            excess, delta, -reach, reach, self._converged, _CONVERGED / self._fastest
         )
         z = self._in_time.start + uniform + delta[:, None] * rates
         return times / mean + delta, z[:, : self._genus]

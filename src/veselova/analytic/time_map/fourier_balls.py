@@ -26,7 +26,7 @@ MOST_MODES = 200_000
 
 #: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double;
 #: and waves in memory at once.
-_SETTLED = 1e-7
+_CONVERGED = 1e-7
 _BLOCK = 2_000_000
 
 #: Digits of modes, and of slopes, beyond those of a step.
@@ -162,7 +162,7 @@ class FourierTimeMapInBalls:
         mean = float(self._mean)
         begin = np.sum(amplitudes * np.sin(2 * np.pi * (modes @ self._orbit.start.astype(float))))
         reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
-        converged = _SETTLED / float(np.max(np.abs(frequencies)))
+        converged = _CONVERGED / float(np.max(np.abs(frequencies)))
         highest = int(np.max(np.abs(modes), initial=0))
         block = max(1, _BLOCK // max(1, len(modes)))
 

@@ -33,7 +33,7 @@ _AVERAGED = 16.0
 _HIGHEST = 8
 
 #: A Newton step of this size, in half panels, leaves an error of its square.
-_SETTLED = 1e-9
+_CONVERGED = 1e-9
 
 
 class ChebyshevTimeMap(TimeMap):
@@ -91,7 +91,7 @@ class ChebyshevTimeMap(TimeMap):
         """Return F_0."""
         return self._mean
 
-    def ahead(self, means: Array) -> tuple[Array, Array]:
+    def periodic_part(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u within the panels, or near."""
         tau1 = means / self._mean
         low, high = self.panels.borders[[0, -1]].tolist()
@@ -164,7 +164,7 @@ class ChebyshevTimeMap(TimeMap):
             value, slope = panels.within(panel[rows], x)
             return value - target[rows], slope
 
-        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _SETTLED)
+        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
         offset = (x + 1) * (panels.lengths[panel] / 2)
         z = self.in_tau1.phases(panels.borders[panel]) + offset[:, None] * self.in_tau1.rates
         return panels.borders[panel] + offset, z

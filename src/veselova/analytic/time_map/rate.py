@@ -195,7 +195,7 @@ class TimeMap(ABC):
         """Return F_0, the mean of dt/dτ₁."""
 
     @abstractmethod
-    def ahead(self, means: Array) -> tuple[Array, Array]:
+    def periodic_part(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z modulo 2) at mean times u = F_0τ₁."""
 
     @abstractmethod
@@ -231,7 +231,7 @@ class UniformTimeMap(TimeMap):
         """Return F_0, a change of units."""
         return self._rate
 
-    def ahead(self, means: Array) -> tuple[Array, Array]:
+    def periodic_part(self, means: Array) -> tuple[Array, Array]:
         """Return (0, z): the mean time is the time."""
         return np.zeros_like(means), self._in_time.phases(means)
 

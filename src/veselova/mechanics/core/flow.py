@@ -105,16 +105,16 @@ class Flow(ABC):
         return np.asarray(self.field(state, self.parameters, FLOATS), dtype=np.float64)
 
 
-def restoring_step(excess: Array, steepness: Array, size: Array) -> Array:
+def restoring_step(excess: Array, slope_squared: Array, size: Array) -> Array:
     """Return s = excess/(|∇E|² + (size/10)²): the step −s∇E takes the excess of energy from a state
     as far as E tells, shape (…).
 
-    steepness = |∇E|²; size: the sum of the absolute values of E's parts, so that E is rounded to
-    ε·size. At a distance δ from an equilibrium ∇E is of order δ, and excess/|∇E|² would move the
+    slope_squared = |∇E|²; size: the sum of the absolute values of E's parts, so that E is rounded
+    to ε·size. At a distance δ from an equilibrium ∇E is of order δ, and excess/|∇E|² would move the
     state by ε·size/δ, which may be all of δ. Least squares over both roundings move it by at most 5
     ε for each ε·size of excess: where E tells nothing, the state is left as integrated.
     """
-    weight = np.asarray(steepness + (_ENERGY_ROUNDING * size) ** 2)
+    weight = np.asarray(slope_squared + (_ENERGY_ROUNDING * size) ** 2)
     return np.divide(
         excess, weight, out=np.zeros_like(weight), where=weight >= np.finfo(float).tiny
     )

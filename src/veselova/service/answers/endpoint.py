@@ -84,7 +84,7 @@ class Answers:
 
         async def work() -> Response:
             with self._metrics.work(kind, asked.system, asked.engine):
-                delivery = await self._workers.run(
+                rendering = await self._workers.run(
                     render_answer,
                     kind,
                     asked.content,
@@ -92,7 +92,7 @@ class Answers:
                     budget_s=asked.budget_s,
                     caller=caller_of(request).name,
                 )
-            return _response(delivery, wanted, {"Vary": "Accept-Encoding"})
+            return _response(rendering, wanted, {"Vary": "Accept-Encoding"})
 
         return await self._run_while_connected(request, work, wanted.place)
 
@@ -117,15 +117,17 @@ class Answers:
         async def work() -> Response:
             with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
-                    delivery = await self._workers.run(
+                    rendering = await self._workers.run(
                         *task, budget_s=asked.budget_s, caller=caller_of(request).name
                     )
-                    ending.cached = delivery.cached
+                    ending.cached = rendering.cached
                 finally:
                     self._metrics.count_cached(hit=ending.cached)
-            headers = _headers(name, form, await self._keep(kept_as, delivery))
+            headers = _headers(name, form, await self._keep(kept_as, rendering))
             return _response(
-                delivery, wanted, {**headers, "Cache-Status": _HIT} if delivery.cached else headers
+                rendering,
+                wanted,
+                {**headers, "Cache-Status": _HIT} if rendering.cached else headers,
             )
 
         return await self._run_while_connected(
@@ -151,19 +153,19 @@ class Answers:
         """
         return self._write_behind.find(name) or await to_thread.run_sync(self._cache.find, name)
 
-    async def _keep(self, name: str, delivery: Rendering) -> bool:
+    async def _keep(self, name: str, rendering: Rendering) -> bool:
         """See to what the cache has to do with an answer, and return whether it can
         be had again.
         """
-        if delivery.damaged:
-            await to_thread.run_sync(self._cache.discard, name, delivery.stored == 0)
-        if delivery.not_stored is not None:
-            self._cache.report(delivery.not_stored)
-        if delivery.stored and self._cache.is_full(delivery.stored):
+        if rendering.damaged:
+            await to_thread.run_sync(self._cache.discard, name, rendering.stored == 0)
+        if rendering.not_stored is not None:
+            self._cache.report(rendering.not_stored)
+        if rendering.stored and self._cache.is_full(rendering.stored):
             await to_thread.run_sync(self._cache.make_room)
-        if delivery.entry is not None:
-            return await self._write_behind.keep(name, delivery.entry)
-        return delivery.cached or delivery.stored > 0
+        if rendering.entry is not None:
+            return await self._write_behind.keep(name, rendering.entry)
+        return rendering.cached or rendering.stored > 0
 
     async def get_kept(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not
@@ -186,10 +188,10 @@ class Answers:
         )
 
         async def work() -> Response:
-            delivery = await self._restore(kept_as, cached, wanted, caller_of(request).name)
-            if delivery is None:
+            rendering = await self._restore(kept_as, cached, wanted, caller_of(request).name)
+            if rendering is None:
                 raise _not_kept(name)
-            return _response(delivery, wanted, {**headers, "Cache-Status": _HIT})
+            return _response(rendering, wanted, {**headers, "Cache-Status": _HIT})
 
         return await self._run_while_connected(request, work, wanted.place)
 
@@ -224,14 +226,14 @@ class Answers:
             raise
 
 
-def _response(delivery: Rendering, wanted: Representation, headers: Mapping[str, str]) -> Response:
+def _response(rendering: Rendering, wanted: Representation, headers: Mapping[str, str]) -> Response:
     fields = {**headers, "Content-Type": FORMATS[wanted.format].media_type}
-    if delivery.coding != "identity":
-        fields["Content-Encoding"] = delivery.coding
-    if delivery.provenance is not None:
-        fields[PROVENANCE] = delivery.provenance
-    if delivery.body is not None:
-        return Response(delivery.body, headers=fields)
+    if rendering.coding != "identity":
+        fields["Content-Encoding"] = rendering.coding
+    if rendering.provenance is not None:
+        fields[PROVENANCE] = rendering.provenance
+    if rendering.body is not None:
+        return Response(rendering.body, headers=fields)
     return SpooledResponse(str(wanted.place), fields)
 
 

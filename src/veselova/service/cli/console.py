@@ -81,13 +81,13 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
         for index in np.ndindex(series.shape[1:])
     ]
     more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
-    clock = ["tau1"] if "tau1" in problem.outputs else []
-    table = _table(problem.time, *clock, *names[:_SHOWN_COMPONENTS], *more, "error")
+    neumann_time = ["tau1"] if "tau1" in problem.outputs else []
+    table = _table(problem.time, *neumann_time, *names[:_SHOWN_COMPONENTS], *more, "error")
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
     for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
         components = [
-            *(f"{trajectory.series(name)[i]:z.6f}" for name in clock),
+            *(f"{trajectory.series(name)[i]:z.6f}" for name in neumann_time),
             *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
         ]
         table.add_row(time, *components, *more, f"{error[i]:.1e}")
