@@ -489,5 +489,5 @@ def test_no_fourier_clock_is_taken_for_rates_that_it_would_round_away() -> None:
 
 def test_a_clock_of_many_digits_that_would_take_too_long_is_refused_before_it_is_begun() -> None:
     problem = Veselova([2.97e58, 1.76e-22], [-0.15, -0.99], [-0.042, 0.0064], normalize=True)
-    with pytest.raises(Unsolved, match="too-far: a clock of 34 digits would take"):
+    with pytest.raises(Unsolved, match="too-far: a time map of 34 digits would take"):
         solve(problem, [2.0], digits=25)

@@ -1,5 +1,5 @@
 """The closed-form engine: curve, periods, Abel–Jacobi inversion, theta functions,
-frame and clock.
+frame and time map.
 """
 
 from __future__ import annotations

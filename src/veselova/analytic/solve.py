@@ -124,7 +124,7 @@ def _separable_motion(
     time_map: str | None,
     beyond: bool,
 ) -> Trajectory:
-    """Return the motion in a separable potential; it has one method, one choice of clocks and 15
+    """Return the motion in a separable potential; it has one method, one choice of time maps and 15
     digits.
     """
     for field, given, allowed in (

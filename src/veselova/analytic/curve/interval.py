@@ -1,5 +1,5 @@
 """One cut or gap of the curve in the elliptic angle of its four nearest branch points
-(analytic.four_points).
+(analytic.curve.elliptic_angle).
 
 All other branch points then lie at distance K' from the real v-axis or farther, so sums over ψ =
 πv/K converge like e^(−2πN K'/K) however closely branch points cluster: a closing gap costs

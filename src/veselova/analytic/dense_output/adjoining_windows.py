@@ -1,4 +1,4 @@
-"""Windows that adjoin from τ₁ = 0 on: dt/dτ₁ at their nodes tells the time, and no clock needs
+"""Windows that adjoin from τ₁ = 0 on: dt/dτ₁ at their nodes tells the time, and no time map needs
 nodes of its own.
 """
 

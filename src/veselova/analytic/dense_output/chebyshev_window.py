@@ -42,7 +42,7 @@ _TO_COEFFICIENTS = DOUBLE.cosine_series(np.eye(NODES)).T
 
 @dataclass(frozen=True)
 class WindowGrid:
-    """W windows of one length: the times u at which they start, of any clock; ``tails`` (W,) of
+    """W windows of one length: the times u at which they start, of any time map; ``tails`` (W,) of
     longer ones there.
     """
 

@@ -1,13 +1,15 @@
 """A motion at many times from few: Chebyshev windows of time along its orbit.
 
 Windows are of mean time u = F_0τ₁. They begin at multiples of their length, a number of few bits: t
-− u and the phases there come from the clock, exact however far out, and no window hands its error
-to the next. A window takes one sum of the clock, at its start, and one evaluation of the motion at
-each of its nodes; on its pieces the series become polynomials in t (analytic.pieces). All times in
-it are sums of these, whatever the genus and the route.
+− u and the phases there come from the time map, exact however far out, and no window hands its
+error to the next. A window takes one sum of the time map, at its start, and one evaluation of the
+motion at each of its nodes; on its pieces the series become polynomials in t
+(analytic.dense_output.piecewise_polynomial). All times in it are sums of these, whatever the genus
+and the route.
 
-A clock by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time
-then, and t is the running sum of their dt/dτ₁ (analytic.track), as it is of panels.
+A time map by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time
+then, and t is the running sum of their dt/dτ₁ (analytic.dense_output.adjoining_windows), as it is
+of panels.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ _FARTHEST = 2.0**32
 #: Windows tried before all of the same length.
 _FIRST_WINDOWS = 8
 
-#: Part of the windows from t = 0 on that have times enough, from which a clock by panels takes
+#: Part of the windows from t = 0 on that have times enough, from which a time map by panels takes
 #: dt/dτ₁ from them.
 _COVERED = 0.7
 
@@ -117,14 +119,14 @@ class Windows:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Return the stretch of time over which the clock will be asked."""
+        """Return the stretch of time over which the time map will be asked."""
         margin = 2 * self._length if self._stretches.windows else 0.0
         return float(self._times[0]) - margin, float(self._times[-1]) + margin
 
     @property
     def inversions(self) -> int:
-        """Return how often the clock will be asked at least: at the starts of windows, and at times
-        in none.
+        """Return how often the time map will be asked at least: at the starts of windows, and at
+        times in none.
         """
         return int(self._times.size) - self._stretches.held + self._stretches.windows
 
@@ -190,7 +192,7 @@ class Windows:
                 window_grid.length,
                 np.rint(panels.borders[[0, -1]] / window_grid.length).astype(int).tolist(),
             )
-            more = max(1, (last - first) // 8)  # the ends were those of the mean clock
+            more = max(1, (last - first) // 8)  # the ends were those of the mean time map
             before = (
                 WindowGrid.uniform(length, first - more, first)
                 if panels.values[0] > self._times[0]

@@ -1,5 +1,5 @@
-"""The states of a motion at many times while they are filled in: by windows (analytic.windows)
-first, then time by time.
+"""The states of a motion at many times while they are filled in: by windows
+(analytic.dense_output.interpolation) first, then time by time.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ E = (q',q') + (aq,q) constant. For u = q₀−q₁ and w = u', with |a₀−a₁
     |w'| ≤ M|u| + f,   M = max|β−a_i| + 2(max a − min a),   f = 3δ + |E₀−E₁|,
 
 so |u| ≤ D, |w| ≤ μD with D = (|u(0)| + |w(0)|/μ + f/M) e^{μ|τ₁|}, μ = √M. The frame turns with E' =
-(q'qᵀ − qq'ᵀ)E, skew: two frames part by at most ∫2(|w| + |q'||u|). Clocks part by ∫|ρ₀−ρ₁|, ρ =
+(q'qᵀ − qq'ᵀ)E, skew: two frames part by at most ∫2(|w| + |q'||u|). Time maps part by ∫|ρ₀−ρ₁|, ρ =
 d(time)/dτ₁ (see _Rates), and every series by what it moves in that time. F_0 may have any value:
 only E enters. Coarse numbers are doubles, rounded up by far more than they are rounded.
 """
@@ -45,7 +45,7 @@ class PerturbationBound:
     eigenvectors natural frames are
     frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| ·
     bend: one of |q''|
-    time_maps, clock_slope: |ρ₀−ρ₁| ≤ clocks + clock_slope·|u| · slowest: the least d(time)/dτ₁ ·
+    time_maps, time_slope: |ρ₀−ρ₁| ≤ time maps + clock_slope·|u| · slowest: the least d(time)/dτ₁ ·
     inverses: δ · highest: max a
     """
 
@@ -56,7 +56,7 @@ class PerturbationBound:
     speed: float
     bend: float
     time_maps: Any
-    clock_slope: float
+    time_slope: float
     slowest: float
     inverses: Any
     highest: float
@@ -105,18 +105,19 @@ class PerturbationBound:
             "highest": high,
         }
         return cls(
-            frames=arithmetic.number(0), clock_slope=2 * steepest / low * _UP, **coarse, **small
+            frames=arithmetic.number(0), time_slope=2 * steepest / low * _UP, **coarse, **small
         )
 
     def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
         """Return how far τ₁, q̇, the frame (as an operator, so each entry) and the λ's may be from
-        those at Neumann times (N,) of the moved start, at the same times of the clock, each (N,).
+        those at Neumann times (N,) of the moved start, at the same times of the time map, each
+        (N,).
         """
         steps = xp.upper_bound(np.abs(tau1))
         apart = self.apart * xp.exp(self.growth * steps)
-        late = (steps * self.time_maps + self.clock_slope * apart / self.growth) / self.slowest
+        late = (steps * self.time_maps + self.time_slope * apart / self.growth) / self.slowest
         rotated = self.frames + 2 * (1 + self.speed / self.growth) * apart + self.speed * late
-        slope = (self.time_maps + self.clock_slope * rotated) / self.slowest / self.slowest
+        slope = (self.time_maps + self.time_slope * rotated) / self.slowest / self.slowest
         velocity = (self.growth * apart + self.bend * late) / self.slowest + self.speed * slope
         return late, velocity, rotated, 4 * self.highest * rotated + self.inverses
 

@@ -41,10 +41,10 @@ _EVALUATION_OF_POINT = 8.0
 #: different phases add in squares.
 _PHASE = {"angles": 4.0, "theta": 2.0}
 
-#: Rounding of a phase at the start in ε, the Abel map, as clocks take it.
+#: Rounding of a phase at the start in ε, the Abel map, as time maps take it.
 _START_PHASE = 4.0
 
-#: Relative rounding of f, F_0 and the clock in ε; periods of random problems agree with extended
+#: Relative rounding of f, F_0 and the time map in ε; periods of random problems agree with extended
 #: precision to 2 ε.
 _RATE = 2.0
 
@@ -190,7 +190,7 @@ def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:
     """Return F_0 over dt/dτ₁, where that is more than one, for A's by which the rate varies much;
     None for others.
 
-    An error of t is one of τ₁ divided by the rate at that time, and clocks state theirs by the
+    An error of t is one of τ₁ divided by the rate at that time, and time maps state theirs by the
     mean.
     """
     if solution.moving.rate_variation < _WIDE:

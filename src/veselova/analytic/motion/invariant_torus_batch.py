@@ -1,5 +1,5 @@
-"""The invariant tori of many Veselova problems of one dimension at once: what analytic.torus finds
-for one, without its matrices.
+"""The invariant tori of many Veselova problems of one dimension at once: what
+analytic.motion.invariant_torus finds for one, without its matrices.
 
 Curves whose branch points come in one order, with one number of nodes, are computed as one stack of
 arrays. No number depends on which other problems are in it.
@@ -174,7 +174,7 @@ def _numbers(
     unit = spectra.unit[members, None]
     spheroconic = spectra.spheroconic[members]
     root = np.sqrt(unit)
-    rate = _clock_rate(spectra.time_rate[members], spheroconic, periods)
+    rate = _time_rate(spectra.time_rate[members], spheroconic, periods)
     mean = np.asarray(rate.mean)[:, None]
     frequencies = periods.frequencies
     start = _phases(_angles(spheroconic, points, spectra.increasing[members], periods), periods)
@@ -200,7 +200,7 @@ def _numbers(
     }
 
 
-def _clock_rate(at_start: Array, spheroconic: DoubleDouble, periods: Periods) -> TimeRate:
+def _time_rate(at_start: Array, spheroconic: DoubleDouble, periods: Periods) -> TimeRate:
     """Return dt/dτ₁ on each torus, from its value at the start."""
     product = at_start[:, None]
     for s in range(periods.genus):

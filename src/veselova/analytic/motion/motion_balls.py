@@ -34,7 +34,8 @@ from veselova.version import __version__
 
 __all__ = ["MotionInBalls"]
 
-#: Working digits beyond those asked for: what inversion, clock and frame of a generic motion lose.
+#: Working digits beyond those asked for: what inversion, time map and frame of a generic motion
+#: lose.
 _SPARE = 8
 
 #: Digits added beyond those that were missing, and attempts.

@@ -23,9 +23,9 @@ from veselova.mechanics.core.errors import Unsolved
 __all__ = ["TimeMap", "UniformTimeMap", "choose_time_map"]
 
 #: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the
-#: last for all above: a node of panels; a mode of the Fourier clock at once, where no cut takes
+#: last for all above: a node of panels; a mode of the Fourier time map at once, where no cut takes
 #: more than _NODES in doubles, and with every time, which costs more as the genus grows; and a time
-#: of that clock.
+#: of that time map.
 _NODE = {1: 0.05, 2: 0.1, 3: 0.35, 4: 0.8}
 _MODE = {1: 1.0, 2: 0.22, 3: 0.22, 4: 0.6}
 _MODE_AT_TIME = {1: 1.5e-4, 2: 1.5e-4, 3: 2e-4, 4: 6e-4}

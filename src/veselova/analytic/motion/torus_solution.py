@@ -62,7 +62,7 @@ _LARGE_CANCELLATION = 10.0
 _NARROW_GAP_HIGH_GENUS = 1e-12
 _SEPARATRIX_GENUS = 7
 
-#: By how much dt/dτ₁ may vary for a Fourier clock.
+#: By how much dt/dτ₁ may vary for a Fourier time map.
 WIDEST_RATE = 1e10
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
@@ -74,7 +74,7 @@ class Solution:
     frame around it.
 
     ``distance`` moves a start on a separatrix, where branch points coincide, by that much relative
-    to itself (see analytic.reduction). Raises Unsolved at rest, where there is no curve.
+    to itself (see analytic.spectrum.moving_part). Raises Unsolved at rest, where there is no curve.
     """
 
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
@@ -194,31 +194,31 @@ class Solution:
         return extended_precision_flows(self.spectrum, self._origin, self.problem.time)
 
     def fourier_time_map(self, precise_flows: bool) -> FourierTimeMap:
-        """Return the Fourier clock, with guard digits or without; raises Unsolved
+        """Return the Fourier time map, with guard digits or without; raises Unsolved
         (``beyond-floats``).
         """
         if (variation := self.moving.rate_variation) > WIDEST_RATE:
             raise Unsolved(
                 "beyond-floats",
-                f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier clock rounds it to 1e-16 "
+                f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier time map rounds it to 1e-16 "
                 "of its mean",
             )
-        if precise_flows not in self._fourier_clocks:
+        if precise_flows not in self._fourier_time_maps:
             flows = (
                 self.precise_flows
                 if precise_flows
                 else (self.in_tau1, self.in_time, self.mean_rate)
             )
-            self._fourier_clocks[precise_flows] = FourierTimeMap(self.rate, *flows)
-        return self._fourier_clocks[precise_flows]
+            self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows)
+        return self._fourier_time_maps[precise_flows]
 
     @cached_property
-    def _fourier_clocks(self) -> dict[bool, FourierTimeMap]:
+    def _fourier_time_maps(self) -> dict[bool, FourierTimeMap]:
         return {}
 
     @cached_property
     def modes(self) -> float:
-        """Return about how many modes a Fourier clock has."""
+        """Return about how many modes a Fourier time map has."""
         sign, logarithm = np.linalg.slogdet(self.periods.riemann_matrix)
         return estimate_modes(self.curve.genus, float(logarithm) if sign > 0 else -np.inf)
 

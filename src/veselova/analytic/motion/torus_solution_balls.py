@@ -134,7 +134,7 @@ class SolutionInBalls:
     ) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took.
 
-        times (N,) exact, increasing · coarse: the clock in double precision, in units where the
+        times (N,) exact, increasing · coarse: the time map in double precision, in units where the
         largest I is 1.
         """
         xp = self.arithmetic
@@ -214,7 +214,7 @@ class SolutionInBalls:
             self._coarse.moving.unit / self.moving.unit
         )
         # Zero is exactly that, and a time below the range of doubles, or below the rounding of a
-        # clock in doubles, is not.
+        # time map in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
         time_map = choose_time_map(self.orbit, approximate, self._coarse, self.moving)

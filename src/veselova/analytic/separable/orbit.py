@@ -1,4 +1,4 @@
-"""One orbit of a separable motion: its clock, phases, and what rounding of them does
+"""One orbit of a separable motion: its time map, phases, and what rounding of them does
 to positions.
 """
 
@@ -28,8 +28,8 @@ __all__ = ["SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which the Fourier clock is cheaper, to genus three; and those that panels are willing
-#: to cover.
+#: Cycles from which the Fourier time map is cheaper, to genus three; and those that panels are
+#: willing to cover.
 _FOURIER_FROM = 10.0
 _FOURIER_GENUS = 3
 _MOST_CYCLES = 5e4
@@ -37,7 +37,7 @@ _MOST_CYCLES = 5e4
 #: An error above this leaves no digit.
 _NO_DIGIT = 0.1
 
-#: Rounding in ε: of one evaluation; of a phase; of frequencies and the clock, relative.
+#: Rounding in ε: of one evaluation; of a phase; of frequencies and the time map, relative.
 _EVALUATION = 16.0
 _PHASE = 8.0
 _RATE = 4.0
@@ -70,8 +70,8 @@ class SeparableOrbit:
         return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
     def time_map(self, grid: Array) -> TimeMap:
-        """Return a clock for the given times, by cost; raises Unsolved (``too-far``) where it takes
-        too many panels.
+        """Return a time map for the given times, by cost; raises Unsolved (``too-far``) where it
+        takes too many panels.
         """
         if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
             return FourierTimeMap(self.rate, self.in_tau, self.in_time, self.rate.mean)

@@ -53,7 +53,7 @@ class Spectrum:
 
     inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime =
     dq/dτ₁
-    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · clock_rate dτ₁/d(time)
+    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · time_rate dτ₁/d(time)
     there
     """
 

@@ -1,5 +1,5 @@
-"""The spectra of many starts of one dimension at once, with thirty digits: what analytic.spectrum
-finds for one with any number.
+"""The spectra of many starts of one dimension at once, with thirty digits: what
+analytic.spectrum.branch_points finds for one with any number.
 
 Only starts with all A's apart and no q_i = 0 are of this kind, and of those the ones whose
 differences of branch points keep fifteen digits; the others are marked, and left to
@@ -32,7 +32,7 @@ class Spectra:
     (N,) h
     inverse (N, n) the I's, the last one 1 · constants (N, n−1) c_1 = 0 … c_{n−1} · spheroconic (N,
     n−1) λ's at the start
-    increasing (N, n−1) whether they increase there · clock_rate (N,) dτ₁/dt there · known (N,)
+    increasing (N, n−1) whether they increase there · time_rate (N,) dτ₁/dt there · known (N,)
     which starts are of this kind
     """
 

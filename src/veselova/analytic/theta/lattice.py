@@ -69,8 +69,8 @@ _HALF = 0.5 + 1e-9
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The rows of ``U`` are the basis, shape (g, g); ``waves`` is the set F of analytic.theta, the
-    others have Gaussians.
+    """The rows of ``U`` are the basis, shape (g, g); ``waves`` is the set F of
+    analytic.theta.riemann_theta, the others have Gaussians.
     """
 
     U: Integers

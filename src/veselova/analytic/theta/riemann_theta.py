@@ -12,7 +12,7 @@ T_GG⁻¹ and S = T_FF − C T_GF,
 F is kept to directions where S is not small, so θ(z) = θ[0;0](z) is a sum without cancellation, and
 its values are accurate relative to themselves. F = everything is the defining series, G =
 everything a lattice sum of Gaussians. Coordinates are those in which the sum is short
-(analytic.lattice).
+(analytic.theta.lattice).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Theta functions in balls: the sums of analytic.theta to any number of digits.
+"""Theta functions in balls: the sums of analytic.theta.riemann_theta to any number of digits.
 
 Every term is a constant times powers of a few numbers that depend on z, one for each coordinate.
 Characteristics with the same

@@ -4,7 +4,7 @@
         γ the case c_1 = 0.
 
 The constants κ come from half periods z = ½ν, where every λ_s is a branch point and the closed
-formula of analytic.frame is
+formula of analytic.attitude.frame is
 exact: for each function the half period at which it is largest against its denominator.
 """
 

@@ -1,5 +1,5 @@
-"""The tables of theta sums (analytic.theta): what Gaussians and waves are multiplied with, for many
-characteristics at once.
+"""The tables of theta sums (analytic.theta.riemann_theta): what Gaussians and waves are multiplied
+with, for many characteristics at once.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ _ABOVE_REAL = {"t": math.sqrt(2), "s": 2.0}
 
 @dataclass(frozen=True)
 class Orbit:
-    """The line z = start + τ₁·frequencies on the torus with the rate of the clock there; start,
+    """The line z = start + τ₁·frequencies on the torus with the rate of the time map there; start,
     frequencies (g,) are balls.
 
     stretch: √(q,Aq) at phases but for a constant, by theta functions, where angles are not to be

@@ -1,9 +1,9 @@
-"""What an orbit costs, and which clock is the cheaper for given times: seconds on one core, from
+"""What an orbit costs, and which time map is the cheaper for given times: seconds on one core, from
 measurements.
 
-The Fourier clock costs its modes once, and all of them again at every inversion; panels cost
+The Fourier time map costs its modes once, and all of them again at every inversion; panels cost
 evaluations all along the orbit, and their inversions nothing to speak of. A window of many times
-(analytic.windows) takes one sum of them, a single time an inversion.
+(analytic.dense_output.interpolation) takes one sum of them, a single time an inversion.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ GUARD_DIGITS = 30
 #: Cycles that panels are willing to cover: minutes.
 PANEL_CYCLES = 5e4
 
-#: Largest genus at which guard digits decide for the Fourier clock, which keeps them, whatever it
-#: costs.
+#: Largest genus at which guard digits decide for the Fourier time map, which keeps them, whatever
+#: it costs.
 _GUARDED_GENUS = 3
 
-#: Largest genus at which a Fourier clock is the last resort where panels do not reach, and modes
+#: Largest genus at which a Fourier time map is the last resort where panels do not reach, and modes
 #: with which it is chosen before.
 _LAST_RESORT_GENUS = 5
 _MOST_MODES = 2e5
@@ -39,7 +39,7 @@ _EXPONENT = 36.0
 _BODY = {1: 1.0, 2: 1.25, 3: 1.07, 4: 0.67}
 _HIGH_BODY = 0.29
 
-#: Modes of a clock that nobody takes: e to this, and no more are counted.
+#: Modes of a time map that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
 
 #: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels,
@@ -66,7 +66,7 @@ _PANEL_MARGIN = 1.0
 
 
 def estimate_modes(genus: int, log_determinant: float) -> float:
-    """Return about how many modes the Fourier clock has, for the Riemann matrix iT
+    """Return about how many modes the Fourier time map has, for the Riemann matrix iT
     with log det T.
     """
     exponent = genus * math.log(_EXPONENT / math.pi) - log_determinant
@@ -79,8 +79,8 @@ def estimate_modes(genus: int, log_determinant: float) -> float:
 class Costs:
     """The costs of an orbit over so many cycles of its fastest phase.
 
-    modes: about how many the Fourier clock has · in_angles: whether panels take dt/dτ₁ from angles,
-    not from theta functions
+    modes: about how many the Fourier time map has · in_angles: whether panels take dt/dτ₁ from
+    angles, not from theta functions
     """
 
     genus: int
@@ -97,8 +97,8 @@ class Costs:
         return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
 
     def seconds(self, time_map: str, inversions: int) -> float:
-        """Return the seconds of a clock that is inverted so often; infinite where it is not taken
-        of its own accord.
+        """Return the seconds of a time map that is inverted so often; infinite where it is not
+        taken of its own accord.
         """
         if time_map == "fourier":
             of_modes = self.modes * (_MODE + inversions * _MODE_INVERTED)
@@ -119,15 +119,15 @@ class Costs:
         return of_panels + inversions * _PANEL_INVERSION
 
     def estimates(self, inversions: int) -> dict[str, float]:
-        """Return the seconds of either clock, those out of the question left out."""
+        """Return the seconds of either time map, those out of the question left out."""
         seconds = {name: self.seconds(name, inversions) for name in ("fourier", "panels")}
         return {name: round(value, 5) for name, value in seconds.items() if math.isfinite(value)}
 
     def cheaper_time_map(
         self, inversions: int, keeping: bool = True
     ) -> Literal["fourier", "panels"]:
-        """Return the clock for so many inversions: the cheaper, but from GUARDED_FROM cycles on the
-        one that keeps the digits.
+        """Return the time map for so many inversions: the cheaper, but from GUARDED_FROM cycles on
+        the one that keeps the digits.
 
         Not ``keeping``: the cheaper there too, as next to a separatrix, where modes are many and
         take more nodes each.

@@ -1,4 +1,4 @@
-"""The clock in closed form: every Fourier coefficient of dt/dτ₁ is a determinant of one-variable
+"""The time map in closed form: every Fourier coefficient of dt/dτ₁ is a determinant of one-variable
 integrals.
 
     t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f)
@@ -44,12 +44,12 @@ _COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 #: Radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
 _SPARE_PACE = 16
 
-#: Modes that bring the inverse clock near its answer before all of them are summed: the fewest, and
-#: their part.
+#: Modes that bring the inverse time map near its answer before all of them are summed: the fewest,
+#: and their part.
 _FIRST_MODES = 64
 _FIRST_PART = 1 / 16
 
-#: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse clock divides by.
+#: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
 _LEAST_SLOPE = 0.05
 
 #: Cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
@@ -58,7 +58,7 @@ _SLOW = 4.0
 #: Entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
 
-#: Cycles that the last step of the inverse clock may leave open; and a step that leaves so much
+#: Cycles that the last step of the inverse time map may leave open; and a step that leaves so much
 #: where no slope is known to be the least, and the error is of the order of its square.
 _OPEN = 1e-17
 _CONVERGED = 1e-9

@@ -1,5 +1,5 @@
-"""The Fourier clock in balls, for any time at all: the determinants of analytic.fourier_clock to
-any number of digits.
+"""The Fourier time map in balls, for any time at all: the determinants of analytic.time_map.fourier
+to any number of digits.
 """
 
 from __future__ import annotations

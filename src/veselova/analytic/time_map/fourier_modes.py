@@ -62,7 +62,7 @@ def find_significant_modes(
         if looked_at > most:
             raise Unsolved(
                 "too-far",
-                f"the clock has more than {most} Fourier modes, and the time is too far for panels",
+                f"there are more than {most} Fourier modes, and the time is too far for panels",
             )
     modes = np.concatenate(kept_modes)
     values = np.concatenate(kept_values)

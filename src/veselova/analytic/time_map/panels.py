@@ -1,4 +1,4 @@
-"""The clock by quadrature: Chebyshev panels of dt/dτ₁ along the orbit. Cost grows with t, hardly
+"""The time map by quadrature: Chebyshev panels of dt/dτ₁ along the orbit. Cost grows with t, hardly
 with the genus.
 """
 
@@ -75,7 +75,7 @@ class ChebyshevTimeMap(TimeMap):
         low = self._earliest / self._mean
         high = self._latest / self._mean
         panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
-        # The mean clock's estimate; extended where that was short.
+        # The mean time map's estimate; extended where that was short.
         while panels.values[0] > self._earliest or panels.values[-1] < self._latest:
             low, high = (border and 1.5 * border for border in panels.borders[[0, -1]].tolist())
             panels = integrate_on_panels(self._rate, self.in_tau1, low, high)

@@ -1,4 +1,4 @@
-"""The clock in balls: Chebyshev series of dt/dτ₁ on panels along the orbit, to any number of
+"""The time map in balls: Chebyshev series of dt/dτ₁ on panels along the orbit, to any number of
 digits.
 """
 
@@ -41,7 +41,7 @@ _LONGEST_IN_STRIPS = 8.0
 #: Nodes per cycle and digit.
 _NODES_PER_DIGIT = 2.6
 
-#: Nodes that a clock is willing to evaluate: minutes.
+#: Nodes that a time map is willing to evaluate: minutes.
 _MOST_NODES = 100_000
 
 #: Panels looked at to see how fast series fall.
@@ -51,7 +51,7 @@ _SAMPLED_PANELS = 200
 _EXTRA_TERMS = 6
 
 #: Panels end a little beyond the last time, by a part of it and by cycles of the fastest phase: the
-#: end comes from a clock in doubles, which has a relative and an absolute error.
+#: end comes from a time map in doubles, which has a relative and an absolute error.
 _BEYOND = 1 + 1e-9
 _CYCLES_BEYOND = 1e-12
 
@@ -152,7 +152,7 @@ class ChebyshevTimeMapInBalls:
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
             wanted = (
-                f"a clock of {self._xp.digits} digits would take {nodes:.3g} evaluations or "
+                f"a time map of {self._xp.digits} digits would take {nodes:.3g} evaluations or "
                 "more at that time"
             )
             raise Unsolved("too-far", f"{wanted}; at most {_MOST_NODES} are made")
@@ -304,7 +304,7 @@ class _Panels:
         step, reach = interval_step(value - times, rate, self._sensitivity[p], xp)
         if self._certified and not is_shown(reach, rate, self.steepest, xp):
             raise Unsolved(
-                "not-enclosed", "the inverse clock: no interval could be shown to hold τ₁"
+                "not-enclosed", "the inverse time map: no interval could be shown to hold τ₁"
             )
         return np.asarray(x - step)
 

@@ -1,8 +1,8 @@
-"""The rate of the clock, d(time)/dτ₁ as a function on the torus, and what a clock is.
+"""The rate of the time map, d(time)/dτ₁ as a function on the torus, and what a time map is.
 
 dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper);
-for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent clocks integrate
-either along z = z⁰ + fτ₁: analytic.fourier_clock and analytic.panel_clock.
+for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent time maps
+integrate either along z = z⁰ + fτ₁: analytic.time_map.fourier and analytic.time_map.panels.
 """
 
 from __future__ import annotations
@@ -204,8 +204,8 @@ class TimeMap(ABC):
 
     @abstractmethod
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array | float, float]:
-        """Return a bound on the error in τ₁ that this clock adds to the rounding of F_0: what does
-        not grow, (N,) or one for all times, and what is to be multiplied with |τ₁|.
+        """Return a bound on the error in τ₁ that this time map adds to the rounding of F_0: what
+        does not grow, (N,) or one for all times, and what is to be multiplied with |τ₁|.
 
         of_start, of_rates (g,): errors of z⁰ and f, which shift the slow parts of dt/dτ₁ where some
         m·f nearly vanishes.
@@ -218,7 +218,7 @@ class TimeMap(ABC):
 
 
 class UniformTimeMap(TimeMap):
-    """The clock of a motion whose time is Neumann's, in its own unit."""
+    """The time map of a motion whose time is Neumann's, in its own unit."""
 
     name: ClassVar[str] = "uniform"
 
