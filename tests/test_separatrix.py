@@ -44,15 +44,15 @@ def umbilic_geodesic(digits: int) -> vs.EllipsoidGeodesic:
     return vs.EllipsoidGeodesic([3, 2, 1], [text[0], 0, text[1]], text[2:], normalize=True)
 
 
-def answered(problem: Any, time: float) -> tuple[Any, float] | None:
+def answered(problem: Any, time: float, engine: str | None = None) -> tuple[Any, float] | None:
     """Return the frame and its error at a time asked for alone, None where no digit is left."""
     try:
-        found = vs.solve(problem, [time])
+        found = vs.solve(problem, [time], engine)
     except vs.Unsolved as refusal:
         if refusal.outcome != "no-digit-left":
             raise
         return None
-    return found.frame[0], float(found.error[0])
+    return found.series(problem.bounded[-1])[0], float(found.error[0])
 
 
 @pytest.mark.parametrize("time", [120, -120, 50, 1000, 1e6, 1e12])
@@ -144,3 +144,87 @@ def test_systems_with_one_engine_have_the_floor() -> None:
     body = vs.EulerPoisson([1, 2, 3], [0, 0, 1], [1, 0.5, 0])
     found = vs.solve(body, [0, 10])
     assert (found.conditioning == body.conditioning_floor(found.times)).all()
+
+
+SEPARABLE_PENDULUM = vs.SeparableVeselova(["1", "1/2"], [1, 0], [0, 1], {"quadratic": "1/2"})
+
+
+@pytest.mark.parametrize("problem", [PENDULUM, SEPARABLE_PENDULUM, umbilic(3, 2)])
+def test_integration_refuses_far_times_on_a_separatrix_as_the_closed_form_does(
+    problem: Any,
+) -> None:
+    """Two runs that dwell at one equilibrium agree, and know nothing of the motion."""
+    scale = 1 / problem.turning
+    lost = False
+    for radians in (2.0, 10.0, 20.0, 45.0, 90.0, 150.0):
+        alone = answered(problem, scale * radians, "numeric")
+        assert not (lost and alone), radians
+        lost = alone is None
+        assert lost or alone[1] <= 0.1
+    assert lost
+    with pytest.raises(vs.Unsolved, match="no-digit-left"):
+        vs.solve(problem, [scale, scale * 150], "numeric")
+
+
+def test_integration_of_the_pendulum_is_tanh_within_its_error() -> None:
+    times = [-20.0, -3.0, 0.0, 1.0, 10.0, 20.0]
+    found = vs.solve(PENDULUM, times, "numeric")
+    assert (np.abs(found.q[:, 1] - np.tanh(times)) <= found.error).all()
+
+
+@pytest.mark.parametrize(
+    ("problem", "span"),
+    [(PENDULUM, 30.0), (SEPARABLE_PENDULUM, 20.0), (umbilic_geodesic(34), 3e4)],
+    ids=["neumann", "separable", "umbilic"],
+)
+def test_conditioning_never_falls_and_knows_no_other_time(problem: Any, span: float) -> None:
+    """Neighbours of a start on a separatrix dwell at one equilibrium again and again."""
+    digits = {} if problem is SEPARABLE_PENDULUM else {"digits": 30}
+    engine = "numeric" if problem is SEPARABLE_PENDULUM else None
+    times = np.linspace(0, span, 13) if engine or problem is PENDULUM else np.geomspace(1, span, 9)
+    options: Any = {"engine": engine, **(digits if problem is PENDULUM else {})}
+    together = vs.solve(problem, times, **options).conditioning
+    assert (np.diff(together) >= 0).all()
+    for i in (0, 4, len(times) - 1):
+        assert vs.solve(problem, [times[i]], **options).conditioning[0] == together[i]
+
+
+def test_conditioning_stays_lost_where_digits_serve() -> None:
+    """With 30 digits the exact pendulum is answered at any time; doubles say nothing of it."""
+    found = vs.solve(PENDULUM, [-60, 30, 50, 100, 120], digits=30)
+    assert found.error.max() < 1e-15
+    assert (found.conditioning[[0, 2, 3, 4]] >= 0.1).all()
+    assert 1e-5 < found.conditioning[1] < 1e-2
+
+
+def test_conditioning_is_that_of_the_problem_and_no_engine() -> None:
+    times = [0.5, 20]
+    by_engine = [vs.solve(PENDULUM, times, e).conditioning for e in ("analytic", "numeric")]
+    assert np.array_equal(*by_engine)
+
+
+def test_conditioning_is_known_before_a_collision() -> None:
+    body = vs.VeselovaSO3(["1", "2", "3"], [0.6, 0, 0.8], [0, 1, 0], {"family": [0, 0, -0.3, 0, 0]})
+    with pytest.raises(vs.Unsolved, match="collision") as refusal:
+        vs.solve(body, [1e3])
+    end = float(str(refusal.value).split("t = ")[1].split(",")[0])
+    found = vs.solve(body, [0.1 * end, 0.9 * end, 0.999 * end]).conditioning
+    assert 0 < found[0] <= found[1] <= found[2] < 1e-8
+
+
+def test_lost_digits_are_counted_against_the_size_of_an_ellipsoid() -> None:
+    """X of 10¹⁵ with an error of 10³ has twelve digits; an error of 0.1 is not the end of them."""
+    large, small = (
+        vs.EllipsoidGeodesic(
+            [3 * scale, 2 * scale, scale],
+            [0.6 * (3 * scale) ** 0.5, 0, 0.8 * scale**0.5],
+            [0, 1, 0],
+        )
+        for scale in (1e30, 1.0)
+    )
+    for engine in ("analytic", "numeric"):
+        there, here = vs.solve(large, [0, 1e15], engine), vs.solve(small, [0, 1], engine)
+        assert (
+            np.max(np.abs(there.X / 1e15 - here.X)) <= 1e-15 * np.max(there.error) + here.error[1]
+        )
+        assert np.max(there.error) < 1e-10 * 1e15

@@ -1,15 +1,18 @@
-"""How far the state of a motion moves when its data move by one rounding: what no method can
-better.
+"""How far the state of a motion moves when its data move by one rounding: no method is better.
 
-The data are moved by one rounding each, in two patterns of signs and both ways, in exact rationals.
-Half the difference of the two motions is measured. Where that is below their errors, the data are
-moved by a multiple of a rounding instead, and the
-difference is divided by it: as long as it is small it grows in proportion.
+The data are moved by multiples of one rounding each, in two patterns of signs and both ways, in
+exact rationals. Half the difference of the two motions, with their errors, is divided by the
+multiple. As long as the difference is small it grows in proportion. Where it is no longer small,
+the next smaller multiple takes over.
+
+The differences are those at fixed instants, and the largest so far counts. Neighbouring motions
+that dwell at the same equilibrium come near each other again, but what was lost stays lost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -18,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.engines import solve
-from veselova.mechanics.core.errors import VeselovaError
+from veselova.mechanics.core.checkpoints import checkpoints
+from veselova.mechanics.core.errors import Unsolved, VeselovaError
 from veselova.mechanics.core.exact_input import exact_number
-from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.problem import NO_DIGIT, Problem
 from veselova.mechanics.results.trajectory import Trajectory
 
 __all__ = ["conditioning", "perturb_by_roundings", "rounding_of"]
@@ -30,12 +34,13 @@ Array = NDArray[np.float64]
 #: One rounding of a double.
 _ROUNDING = Fraction(1, 2**53)
 
-#: Multiples of a rounding go up by this until the data move by so much of themselves.
-_LADDER = 10**6
+#: Multiples of a rounding are powers of this, up to those that move the data by so much of
+#: themselves. The error of a motion in double precision, over the largest, is far below a rounding.
+_LADDER = 10**3
 _LARGEST = Fraction(1, 10**9)
 
-#: A difference counts where it is so many times the errors of the two motions.
-_VISIBLE = 4.0
+#: Instants evaluated at once.
+_BLOCK = 32
 
 #: Fields of a problem that are data, and the names of those in which a whole number is no
 #: measurement.
@@ -43,44 +48,120 @@ _DATA = ("A", "q", "q_dot", "q_prime", "X", "X_dot", "inertia", "gamma", "Omega"
 
 
 def conditioning(trajectory: Trajectory) -> Array:
-    """Return the largest change of a bounded component at each time (N,) when all data move by one
-    rounding.
+    """Return how far a bounded component may have moved by each time (N,) when all data move by
+    one rounding.
 
-    One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller; where a
+    One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller. Where a
     text or a Decimal has more digits than a double, it is one unit of the last digit given. Whole
-    numbers and ratios are exact, and stay where they are, unless all data are. Problems whose data
-    cannot be moved (systems without a closed form) have ε·max(1, turning·|t|).
+    numbers and ratios are exact, and stay where they are, unless all data are.
+    On each side of t = 0 the result never falls with |t|, and no other time enters it. It is
+    measured until it reaches a tenth of the state's size: beyond, no digit is determined, and it
+    stays as it is. Problems whose data cannot be moved (rest, systems without a closed form) have
+    the formula ``problem.conditioning_floor``.
     """
     problem = trajectory.problem
     times = trajectory.times
-    engine = trajectory.provenance.engine
     if "analytic" not in problem.engines or not problem.moves:
         return problem.conditioning_floor(times)
-    found = np.zeros(times.size)
-    finest = max(_relative_roundings(problem.given), default=_ROUNDING)
-    scale = 1
-    seen = False
-    while True:
-        for pattern in (0, 1) if scale == 1 else (0,):
-            pair = []
-            for side in (1, -1):
-                try:
-                    pair.append(
-                        solve(perturb_by_roundings(problem, side * scale, pattern), times, engine)
-                    )
-                except VeselovaError:
-                    break
-            if len(pair) == 2:
-                seen = True
-                difference = _largest_difference(*pair) / 2
-                visible = (difference >= _VISIBLE * (pair[0].error + pair[1].error)) | (
-                    finest * scale * _LADDER > _LARGEST
+    found = np.empty(times.size)
+    for side, rows in ((1.0, times >= 0), (-1.0, times < 0)):
+        if rows.any():
+            found[rows] = _Departure(problem, side).at(np.abs(times[rows]))
+    return found
+
+
+@dataclass(frozen=True)
+class _Departure:
+    """How far moved motions part from each other on one side of t = 0."""
+
+    problem: Problem
+    side: float
+
+    def at(self, elapsed: Array) -> Array:
+        """Return what one rounding of the data has made at times |t| (N,)."""
+        instants, bounds, multiple, pairs = self._until(float(np.max(elapsed)))
+        if not bounds.size:
+            return self.problem.conditioning_floor(elapsed)
+        places = np.searchsorted(instants, elapsed)
+        found = bounds[np.minimum(places, bounds.size - 1)]
+        lost = self.problem.extent * NO_DIGIT
+        if bounds[-1] < lost:  # the motions could not be followed: they end, or no digit is left
+            for i in np.flatnonzero(places == bounds.size):
+                here = self._apart(pairs, elapsed[i : i + 1])
+                found[i] = max(found[i], here[0] / multiple if here.size else self.problem.extent)
+        return found
+
+    def _until(self, farthest: float) -> tuple[Array, Array, float, list[_Pair]]:
+        """Return the instants to the first after a time, or to where nothing is known any more, and
+        the bounds there; the multiple, and the pairs of motions, that were used last."""
+        instants = np.empty(0)
+        bounds = np.empty(0)
+        lost = self.problem.extent * NO_DIGIT
+        turning = max(self.problem.turning, float(np.finfo(float).tiny))
+        used = 1
+        pairs = list[_Pair]()
+        for multiple in self._multiples():
+            if instants.size and instants[-1] >= farthest:
+                break
+            used = multiple
+            pairs = self._pairs(multiple) or pairs
+            small = _BLOCK
+            while pairs and small == _BLOCK and not (instants.size and instants[-1] >= farthest):
+                block = checkpoints(instants.size, _BLOCK) / turning
+                apart = self._apart(pairs, block)
+                small = int(np.argmin(np.append(apart < lost, False)))
+                kept = small + (multiple == 1 and small < apart.size)
+                instants = np.append(instants, block[:kept])
+                bounds = np.append(bounds, apart[:kept] / multiple)
+        return instants, np.maximum.accumulate(bounds), float(used), pairs
+
+    def _multiples(self) -> list[int]:
+        """Return the multiples of a rounding by which data are moved, the largest first."""
+        finest = max(_relative_roundings(self.problem.given), default=_ROUNDING)
+        multiples = [1]
+        while finest * multiples[0] * _LADDER <= _LARGEST:
+            multiples.insert(0, multiples[0] * _LADDER)
+        return multiples
+
+    def _pairs(self, multiple: int) -> list[_Pair]:
+        """Return the motions of the moved data, for each pattern of signs the two ways."""
+        pairs = []
+        for pattern in (0, 1):
+            try:
+                moved = (
+                    perturb_by_roundings(self.problem, sign * multiple, pattern) for sign in (1, -1)
                 )
-                found = np.maximum(found, np.where(visible, difference / float(scale), 0.0))
-        if finest * scale * _LADDER > _LARGEST:
-            break
-        scale *= _LADDER
-    return found if seen else problem.conditioning_floor(times)
+                one, other = map(self._motion, moved)
+                pairs.append((one, other))
+            except VeselovaError:  # the data have no such neighbour
+                continue
+        return pairs
+
+    def _motion(self, problem: Problem) -> Trajectory:
+        """Return a motion that can be asked for times, by the first engine that serves it."""
+        for engine in dict.fromkeys((problem.default_engine, *problem.engines)):
+            try:
+                return solve(problem, [0.0], engine)
+            except Unsolved as error:
+                refusal = error
+        raise refusal
+
+    def _apart(self, pairs: list[_Pair], instants: Array) -> Array:
+        """Return half the largest difference in any pair, errors included, at the leading instants
+        at which all motions are known."""
+        try:
+            found = [[motion.at(self.side * instants) for motion in pair] for pair in pairs]
+        except VeselovaError:
+            half = instants.size // 2
+            first = self._apart(pairs, instants[:half]) if half else np.empty(0)
+            if first.size < half or not half:
+                return first
+            return np.append(first, self._apart(pairs, instants[half:]))
+        each = [_largest_difference(*pair) + pair[0].error + pair[1].error for pair in found]
+        return np.asarray(np.max(each, axis=0) / 2)
+
+
+_Pair = tuple[Trajectory, Trajectory]
 
 
 def _largest_difference(one: Trajectory, other: Trajectory) -> Array:

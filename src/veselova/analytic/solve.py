@@ -20,7 +20,7 @@ from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show, unknown_name
-from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -37,9 +37,6 @@ _DATA_ROUNDING = Fraction(1, 2**50)
 
 #: The series that states are, along the principal axes; the last may be left to the problem.
 _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
-
-#: An error above this leaves no digit of the attitude.
-_NO_DIGIT = 0.1
 
 
 def solve(
@@ -113,7 +110,7 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
     """
     if problem.axes is not None and beyond_double(digits, certified):
         field = "digits" if digits > FEWEST_DIGITS else "certified"
-        required = "inertia as 3 principal moments (a matrix is diagonalised in double precision)"
+        required = "inertia as 3 principal moments (those of a matrix are no exact numbers)"
         raise InvalidInput((field,), required, "inertia as a matrix")
 
 
@@ -187,7 +184,7 @@ class _TorusMotion(Motion[TorusProblem]):
         )
         evaluators = (self._evaluator, *neighbours)
         return DepartureBound(
-            partial(_with_neighbours, evaluators, self.time_map), self.problem.turning, _NO_DIGIT
+            partial(_with_neighbours, evaluators, self.time_map), self.problem.turning, NO_DIGIT
         )
 
     @property
@@ -210,11 +207,7 @@ class _TorusMotion(Motion[TorusProblem]):
             apart, on_the_way = self._departure.at(grid.doubles)
             apart = self.problem.bound({"frame": along.series[1]}, apart)
             error = np.maximum(error, on_the_way) + apart
-        if not error.max() <= _NO_DIGIT:  # or it is no number
-            lost = grid.doubles[~(error <= _NO_DIGIT)]
-            first = lost[np.argmin(np.abs(lost))]
-            reached = f"at {self.problem.time} = {first:.6g} the error reaches {_NO_DIGIT}"
-            raise Unsolved("no-digit-left", f"{reached}: {self._cause}")
+        self.problem.require_digit(grid.doubles, error, self._cause)
         solution = evaluator.solution
         details = {
             "regime": solution.regime,

@@ -14,15 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.checkpoints import checkpoints
+
 __all__ = ["DepartureBound"]
 
 Array = NDArray[np.float64]
-
-#: Radians of turning between instants, how many are equally far apart, and by how much the
-#: following ones are farther off.
-_STEP = 0.25
-_EVEN = 256
-_GROWTH = 1.02
 
 #: Instants evaluated at once.
 _BLOCK = 128
@@ -68,7 +64,7 @@ class DepartureBound:
         """
         instants, bounds = self._known.get(side, (np.zeros(0), np.zeros((0, 2))))
         while not instants.size or (instants[-1] < farthest and bounds[-1, 0] <= self.lost):
-            further = _instants(len(instants), _BLOCK) / self.turning
+            further = checkpoints(len(instants), _BLOCK) / self.turning
             in_order = slice(None, None, int(side))
             (first, *others), error = self.motions(further[in_order] * side)
             differences = np.max(
@@ -82,14 +78,3 @@ class DepartureBound:
             bounds = np.vstack([bounds, largest[:selected]])
         self._known[side] = instants, bounds
         return instants, bounds
-
-
-def _instants(first: int, count: int) -> Array:
-    """Return the instants from number ``first`` on, in radians of turning: evenly apart, then
-    farther and farther.
-    """
-    numbers = np.arange(first, first + count)
-    return np.asarray(
-        _STEP
-        * np.where(numbers <= _EVEN, numbers, _EVEN * _GROWTH ** np.maximum(numbers - _EVEN, 0))
-    )

@@ -19,7 +19,7 @@ from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
-from veselova.analytic.separable.orbit import SeparableOrbit
+from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -90,7 +90,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
         along = orbit.slopes_along(self._turning_at, panels, tau)
         error = error + orbit.integral_error(tau, slopes, along)
-        error = orbit.require_digit(error, grid.doubles)
+        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(time_map)
 

@@ -24,7 +24,7 @@ from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SeparableOrbit"]
+__all__ = ["PHASES_LOST", "SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,8 @@ _FOURIER_FROM = 10.0
 _FOURIER_GENUS = 3
 _MOST_CYCLES = 5e4
 
-#: An error above this leaves no digit.
-_NO_DIGIT = 0.1
+#: Why an error leaves no digit.
+PHASES_LOST = "phases in double precision are not known better"
 
 #: Rounding in ε: of one evaluation; of a phase; of frequencies and the time map, relative.
 _EVALUATION = 16.0
@@ -98,17 +98,6 @@ class SeparableOrbit:
 
     def _cycles(self, grid: Array) -> float:
         return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
-
-    def require_digit(self, error: Array, grid: Array) -> Array:
-        """Return the error; raises Unsolved (``no-digit-left``) where it leaves no digit."""
-        lost = grid[~(error <= _NO_DIGIT)]
-        if lost.size:
-            first = lost[np.argmin(np.abs(lost))]
-            raise Unsolved(
-                "no-digit-left",
-                f"at t = {first:.6g} the error of phases in double precision reaches {_NO_DIGIT}",
-            )
-        return error
 
     def states(self, z: Array) -> tuple[Attitude, Array, Array]:
         """Return positions and coordinate lines at phases (N, g), q̇ = q'/(dt/dτ), (N, n), and

@@ -13,7 +13,7 @@ from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
-from veselova.analytic.separable.orbit import SeparableOrbit
+from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -60,7 +60,7 @@ class PointMotion(Motion[SeparableVeselova]):
         series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
         lag = orbit.lag(grid.doubles, tau, rate, time_map)
         error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _positions))
-        error = orbit.require_digit(error, grid.doubles)
+        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
 
 

@@ -12,12 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import Flow
 
-__all__ = ["Problem", "Series"]
+__all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
 
 Array = NDArray[np.float64]
+
+#: The output that is no series of a system: how far one rounding of the data moves the state. It is
+#: given where it is named, since it takes several solves.
+CONDITIONING = "conditioning"
+
+#: An error above this part of the state's extent leaves no digit of it.
+NO_DIGIT = 0.1
 
 #: Series by name, first axis the times.
 Series = Mapping[str, Array]
@@ -67,6 +75,11 @@ class Problem(ABC):
         follow from them.
         """
         return tuple(name for name in self.outputs if name not in self.derived)
+
+    @classmethod
+    def output_names(cls) -> list[str]:
+        """Return what can be asked for by name: the outputs, and ``conditioning``."""
+        return [*cls.outputs, CONDITIONING]
 
     @abstractmethod
     def flow(self, formulation: str) -> Flow:
@@ -119,6 +132,24 @@ class Problem(ABC):
         show one; None for a sphere.
         """
         return None
+
+    @property
+    def extent(self) -> float:
+        """Return how large entries of the bounded series may be: 1 on a sphere, else the longest
+        semiaxis where that is more.
+        """
+        return 1.0 if self.semiaxes is None else max(1.0, float(np.max(self.semiaxes)))
+
+    def require_digit(self, times: Array, error: Array, cause: str) -> None:
+        """Raise Unsolved (``no-digit-left``), with its cause, where the error of the bounded series
+        is above a tenth of their extent, or is no number.
+        """
+        limit = NO_DIGIT * self.extent
+        lost = times[~(error <= limit)]
+        if lost.size:
+            first = lost[np.argmin(np.abs(lost))]
+            reason = f"at {self.time} = {first:.6g} the error reaches {limit:.3g}: {cause}"
+            raise Unsolved("no-digit-left", reason)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return one of the ``derived`` series."""

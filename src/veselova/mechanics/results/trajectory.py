@@ -21,7 +21,7 @@ from veselova.mechanics.core.errors import (
     show,
     unknown_name,
 )
-from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.npz import decimal_arrays, read_decimals, write_archive
 from veselova.mechanics.results.provenance import Provenance
@@ -128,7 +128,11 @@ class Trajectory:
         return cls(problem, times, error, arrays, provenance, dense, decimals, remainders)
 
     def series(self, name: str) -> Array:
-        """Return one of the problem's outputs by name; raises InvalidInput for another."""
+        """Return one of the problem's outputs, or ``conditioning``, by name; raises InvalidInput
+        for another.
+        """
+        if name == CONDITIONING:
+            return self.conditioning
         if name not in self.arrays:
             self._choose([name])
             values = self.problem.derive(name, self.arrays)
@@ -167,13 +171,16 @@ class Trajectory:
 
     @cached_property
     def conditioning(self) -> Array:
-        """Return how far a bounded component moves at each time when the data move by one rounding,
-        (N,).
+        """Return how far a bounded component may have moved by each time when the data move by one
+        rounding, (N,).
 
         One rounding: 2^−53 of a number, or one unit of the last digit of a text with more digits
-        than a double; whole numbers and ratios are exact. It is measured by motions from moved
-        data, so it takes some solves when it is first asked for. ``error`` is that of the motion of
-        exactly these data; this says how much of the motion is that of others that read the same.
+        than a double; whole numbers and ratios are exact. On each side of t = 0 it never falls with
+        |t|, and depends on the problem and the time alone. From a tenth of the state's extent on it
+        stays as it is: no digit is determined there. It is measured by motions from moved data, so
+        it takes some solves when it is first asked for. ``error`` is that of the motion of exactly
+        these data; this says how much of the motion is that of others that read the same.
+        ``problem.conditioning_floor`` is the formula for doubles in a motion that loses nothing.
         """
         # By name, as engines are: what solves stands above results, and is loaded when it is asked
         # for.
@@ -190,6 +197,12 @@ class Trajectory:
             name: _drift(values, vanishes=name in self.problem.vanishing)
             for name, values in self.integrals.items()
         }
+
+    def with_conditioning(self, values: Array | None) -> Trajectory:
+        """Return the trajectory itself, which now knows its conditioning (N,) without solving."""
+        if values is not None:
+            vars(self)[CONDITIONING] = values
+        return self
 
     def at(self, times: Any) -> Trajectory:
         """Return the same motion at other times; raises Unsolved where the engine left no dense
@@ -210,18 +223,18 @@ class Trajectory:
         return self._table(self.error, {name: self.series(name) for name in self._choose(outputs)})
 
     def _choose(self, outputs: Iterable[str] | None) -> tuple[str, ...]:
-        """Return the names of the chosen series, all where none are named; raises InvalidInput for
-        others, and for none.
+        """Return the names of the chosen series, all of the problem's where none are named; raises
+        InvalidInput for others, and for none.
         """
-        names = self.problem.outputs
-        chosen = tuple(names if outputs is None else outputs)
+        names = self.problem.output_names()
+        chosen = tuple(self.problem.outputs if outputs is None else outputs)
         if isinstance(outputs, str) or not chosen:
             raise InvalidInput(
                 ("outputs",), f"a list of one or more of {', '.join(names)}", show(outputs)
             )
         for i, name in enumerate(chosen):
             if name not in names:
-                raise unknown_name(("outputs", i), name, list(names))
+                raise unknown_name(("outputs", i), name, names)
         return chosen
 
     def _table(
@@ -261,7 +274,7 @@ class Trajectory:
         yield "error", self.error
         for name in outputs:
             yield name, self.series(name)
-            if self.decimals is not None:
+            if self.decimals is not None and name in self.problem.outputs:
                 yield from decimal_arrays(name, self.decimals).items()
 
     @classmethod
@@ -278,7 +291,10 @@ class Trajectory:
             problem, archive, provenance.digits, bool(provenance.details.get("certified"))
         )
         # An open archive of NumPy has no ``get``.
-        remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401
+        remainders, known = (
+            archive[name] if name in archive else None  # noqa: SIM401
+            for name in ("remainders", CONDITIONING)
+        )
         series = {name: archive[name] for name in problem.stored}
         return cls(
             problem,
@@ -289,7 +305,7 @@ class Trajectory:
             None,
             decimals,
             remainders,
-        )
+        ).with_conditioning(known)
 
     def in_order_of_time(self) -> Trajectory:
         """Return the trajectory with its times in increasing order: itself, or its
@@ -312,9 +328,12 @@ class Trajectory:
         chosen = self._choose(outputs)
         table: Mapping[str, NDArray[Any]] = self.columns(chosen)
         if self.decimals is not None:
-            table = self._table(
-                self.decimals.error, {name: self.decimals.midpoints[name] for name in chosen}
-            )
+            known = self.decimals.midpoints
+            series = {
+                name: known[name] if name in self.problem.outputs else self.series(name)
+                for name in chosen
+            }
+            table = self._table(self.decimals.error, series)
         Table(table, self.provenance.as_dict()).to_csv(target)
 
     def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:
@@ -329,9 +348,9 @@ class Trajectory:
         """
         Table(self.columns(outputs), self.provenance.as_dict()).to_arrow(target)
 
-    def to_xarray(self) -> Any:
-        """Return an xarray Dataset of doubles with the time as its coordinate; raises
-        BackendMissing without xarray.
+    def to_xarray(self, outputs: Iterable[str] | None = None) -> Any:
+        """Return an xarray Dataset of all or the chosen series, doubles, with the time as its
+        coordinate; raises BackendMissing without xarray.
 
         Its attributes are the provenance. Texts and numbers stand as they are, anything else as
         JSON, as NetCDF asks: ``to_netcdf(path)`` writes it.
@@ -340,9 +359,10 @@ class Trajectory:
             from xarray import Dataset
         except ImportError:
             raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
+        axes = self.problem.outputs
         variables: dict[str, Any] = {
-            name: (("time", *axes), self.series(name))
-            for name, axes in self.problem.outputs.items()
+            name: (("time", *axes.get(name, ())), self.series(name))
+            for name in self._choose(outputs)
         }
         variables["error"] = (("time",), self.error)
         if self.remainders is not None:

@@ -14,7 +14,7 @@ import orjson
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import InternalContradiction
-from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
@@ -40,13 +40,14 @@ def trajectory_document(
     trajectory: Trajectory, outputs: Iterable[str] | None = None
 ) -> dict[str, Any]:
     """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's
-    start and drift.
+    start and drift, and ``conditioning`` stands beside ``error`` where it is chosen.
 
     Decimals are strings, and each series has one of radii beside it.
     """
     drift = trajectory.drift
     decimals = trajectory.decimals
-    names = tuple(outputs or trajectory.problem.outputs)
+    chosen = tuple(outputs or trajectory.problem.outputs)
+    names = tuple(name for name in chosen if name != CONDITIONING)
     error: Any
     if decimals is None:
         series = {name: trajectory.series(name) for name in names}
@@ -66,6 +67,7 @@ def trajectory_document(
             for name, values in trajectory.integrals.items()
         },
         "error": error,
+        **({CONDITIONING: trajectory.conditioning} if CONDITIONING in chosen else {}),
         "provenance": trajectory.provenance.as_dict(),
         **radii,
     }
@@ -85,13 +87,13 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         error,
         series,
         Provenance(**document["provenance"]),
-        remainders=_remainders(document),
-    )
+        remainders=_optional(document, "remainders"),
+    ).with_conditioning(_optional(document, CONDITIONING))
 
 
-def _remainders(document: Mapping[str, Any]) -> Any:
-    """Return what exact times are beyond the doubles of a document, None where that is nothing."""
-    return np.array(document["remainders"], dtype=np.float64) if "remainders" in document else None
+def _optional(document: Mapping[str, Any], name: str) -> Any:
+    """Return an array that a document need not have, None where it has none."""
+    return np.array(document[name], dtype=np.float64) if name in document else None
 
 
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
@@ -107,9 +109,10 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
     times = np.array(document["times"], dtype=np.float64)
-    return Trajectory.of_decimals(
-        problem, times, decimals, provenance, remainders=_remainders(document)
+    trajectory = Trajectory.of_decimals(
+        problem, times, decimals, provenance, remainders=_optional(document, "remainders")
     )
+    return trajectory.with_conditioning(_optional(document, CONDITIONING))
 
 
 def comparison_document(

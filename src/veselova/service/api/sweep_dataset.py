@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from veselova.mechanics.core.errors import BackendMissing, install_extra
+from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.sweep_parameters import components, to_table_value
@@ -86,7 +87,7 @@ def _times(sweep: SweepRequest) -> TimeGrid:
 def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str, Any]:
     import zarr
 
-    axes = {**SYSTEMS[sweep.problem.system].problem_class.outputs, "error": ()}
+    axes = {**SYSTEMS[sweep.problem.system].problem_class.outputs, "error": (), CONDITIONING: ()}
     group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
     return {
         f"trajectory.{name}": (

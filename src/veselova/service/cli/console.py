@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
@@ -70,8 +71,12 @@ def _format_distinct(times: Any) -> list[str]:
     return texts
 
 
-def print_trajectory(console: Console, trajectory: Trajectory) -> None:
-    """Print the motion at some of its times, the error and the drift of the integrals."""
+def print_trajectory(
+    console: Console, trajectory: Trajectory, outputs: Iterable[str] | None = None
+) -> None:
+    """Print the motion at some of its times, the error and the drift of the integrals; the
+    conditioning too where it is among the outputs that were asked for.
+    """
     console.print(_describe(trajectory), highlight=False)
     problem = trajectory.problem
     series = trajectory.series(problem.portrait)
@@ -81,8 +86,10 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
         for index in np.ndindex(series.shape[1:])
     ]
     more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
+    further = [CONDITIONING] if CONDITIONING in (outputs or ()) else []
     neumann_time = ["tau1"] if "tau1" in problem.outputs else []
-    table = _table(problem.time, *neumann_time, *names[:_SHOWN_COMPONENTS], *more, "error")
+    shown_names = names[:_SHOWN_COMPONENTS]
+    table = _table(problem.time, *neumann_time, *shown_names, *more, "error", *further)
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
     for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
@@ -90,7 +97,8 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
             *(f"{trajectory.series(name)[i]:z.6f}" for name in neumann_time),
             *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
         ]
-        table.add_row(time, *components, *more, f"{error[i]:.1e}")
+        bounds = [f"{error[i]:.1e}", *(f"{trajectory.series(name)[i]:.1e}" for name in further)]
+        table.add_row(time, *components, *more, *bounds)
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
 

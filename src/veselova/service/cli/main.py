@@ -160,7 +160,7 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
-        print_trajectory(terminal(), trajectory)
+        print_trajectory(terminal(), trajectory, request.outputs)
         _say_written(output, plot)
 
 

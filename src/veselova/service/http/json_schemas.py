@@ -107,6 +107,12 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                 "each time: true ≤ error; "
                 "bounded series of system veselova: q and frame",
             },
+            "conditioning": {
+                **_NUMBERS,
+                "description": "how far a bounded component may have moved by each time when the "
+                "data move by one rounding (of a text: one unit of its last digit); given where "
+                "outputs names it",
+            },
             "provenance": _PROVENANCE,
         },
         required=["engine", "times", "series", "integrals", "error", "provenance"],
@@ -123,7 +129,9 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             },
             "conditioning_floor": {
                 "type": "number",
-                "description": "what one rounding of the data moves at the last time",
+                "description": "the formula ε·max(1, |ω||t|) at the farthest time: what one "
+                "rounding of doubles moves in a motion that loses nothing; the output "
+                "conditioning is measured instead",
             },
             "error": _BY_NAME,
             "drift": {"type": "object", "additionalProperties": _BY_NAME},
