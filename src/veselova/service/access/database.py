@@ -8,6 +8,9 @@ same, and a test compares the two. ``engine.connect()`` reads; whatever writes d
 
 from __future__ import annotations
 
+import errno
+import os
+import sqlite3
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,6 +48,7 @@ __all__ = [
     "is_outage",
     "jobs",
     "metadata",
+    "public_reason",
     "reason_of",
     "schema_differences",
     "writing",
@@ -262,10 +266,25 @@ def in_utc(moment: datetime) -> datetime:
 
 
 def reason_of(error: Exception) -> str:
-    """Return what the disk or the database says, without statements, addresses or paths."""
+    """Return what the disk or the database says, without statements; for the log, since it may name
+    addresses and paths.
+    """
     return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(
         "."
     )
+
+
+def public_reason(error: Exception) -> str:
+    """Return why the disk, the database or the cluster does not answer, for everybody to read: no
+    address, port, path or role, which the messages of servers and libraries may have.
+    """
+    cause = getattr(error, "orig", None) or error
+    if isinstance(cause, sqlite3.Error):  # these messages name neither file nor statement
+        return str(cause).rstrip(".")
+    number = getattr(cause, "errno", None) or 0
+    if number in errno.errorcode:
+        return os.strerror(number)
+    return "it does not answer"
 
 
 def is_outage(error: Exception) -> bool:

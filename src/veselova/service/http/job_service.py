@@ -14,7 +14,7 @@ import anyio
 from sqlalchemy.exc import DataError, SQLAlchemyError
 
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra
-from veselova.service.access.database import is_outage, reason_of
+from veselova.service.access.database import is_outage, public_reason, reason_of
 from veselova.service.api.problem_details import Refused, problem_code
 from veselova.service.api.settings import Settings
 
@@ -96,10 +96,12 @@ class JobService:
         except (OSError, SQLAlchemyError) as error:
             if not is_outage(error):
                 raise
+            if self.failure != reason_of(error):
+                _LOG.error("no sweeps: %s", reason_of(error))
             self.failure = reason_of(error)
             raise Refused(
                 "storage-unavailable",
-                f"Jobs cannot be stored at present: {self.failure}.",
+                f"Jobs cannot be stored at present: {public_reason(error)}.",
                 retry_after=30,
             ) from None
         self.failure = ""
@@ -121,7 +123,7 @@ class JobService:
             if not is_outage(error):
                 raise
             _LOG.warning("the storage of jobs failed: %s", reason_of(error))
-            detail = f"Jobs cannot be stored or read at present: {reason_of(error)}."
+            detail = f"Jobs cannot be stored or read at present: {public_reason(error)}."
             raise Refused("storage-unavailable", detail, retry_after=30) from None
 
     def counts(self) -> dict[str, int]:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Any
 from uuid import uuid4
 
-from veselova.service.access.database import reason_of
+from veselova.service.access.database import public_reason
 from veselova.service.sweeps.chunk import Chunk, compute_chunk, lost_chunk
 from veselova.service.sweeps.in_process_cluster import ThisProcess
 from veselova.service.sweeps.job_store import Job
@@ -69,7 +69,7 @@ async def answers(
         if future.status != "error":  # it is the way to the scheduler that failed
             raise
         raise ChunkFailed(
-            f"a worker could not compute the problems {start} to {stop - 1}: {reason_of(error)}"
+            f"a worker could not compute the problems {start} to {stop - 1}: {public_reason(error)}"
         ) from error
     except asyncio.CancelledError:
         if not closing():

@@ -18,7 +18,7 @@ import anyio
 from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
-from veselova.service.access.database import is_outage, reason_of
+from veselova.service.access.database import is_outage, public_reason, reason_of
 from veselova.service.api.settings import Settings
 from veselova.service.sweeps.chunk import OtherVersion
 from veselova.service.sweeps.chunk_dispatch import ChunkFailed, answers
@@ -215,7 +215,7 @@ class Sweeps:
                 await self._compute(client, job, result, missing)
             except (OSError, TimeoutError) as error:
                 # The scheduler cannot be reached, or was lost with what it had.
-                self._progress[job_id].waits_for = f"the cluster ({error})"
+                self._progress[job_id].waits_for = f"the cluster ({public_reason(error)})"
                 _LOG.warning("job %s waits for the cluster: %s", job_id, error)
                 await self._close_cluster(client)
                 if tries == self._tries:
@@ -303,7 +303,7 @@ class Sweeps:
                 reason = reason_of(error)
                 _LOG.warning("job %s waits for its storage: %s", job_id, reason)
                 if progress := self._progress.get(job_id):
-                    progress.waits_for = f"its storage ({reason})"
+                    progress.waits_for = f"its storage ({public_reason(error)})"
                 await self._tell()
                 await asyncio.sleep(pause)
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
