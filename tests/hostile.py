@@ -83,9 +83,9 @@ INVALID: list[tuple[str, str, str]] = [
     (
         "times of an unknown field",
         changed(times={"start": 0, "stop": 1, "count": 3, "step": 1}),
-        "/times",
+        "/times/step",
     ),
-    ("times without a count", changed(times={"start": 0, "stop": 1}), "/times"),
+    ("times without a count", changed(times={"start": 0, "stop": 1}), "/times/count"),
     ("fractional count", changed(times={"start": 0, "stop": 1, "count": 2.5}), "/times/count"),
     ("boolean count", changed(times={"start": 0, "stop": 1, "count": True}), "/times/count"),
     ("negative count", changed(times={"start": 0, "stop": 1, "count": -1}), "/times/count"),

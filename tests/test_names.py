@@ -85,7 +85,7 @@ def test_times_without_end_are_not_made_for_the_sake_of_further_faults() -> None
         read_request(
             TrajectoryRequest, {"problem": BODY4_PROBLEM, "times": times, "method": "none"}
         )
-    assert [fault.field for fault in caught.value.faults] == ["method"]
+    assert [fault.field for fault in caught.value.faults] == ["method", "times.count"]
 
 
 def test_attributes_that_are_none_name_the_nearest() -> None:

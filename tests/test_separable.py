@@ -284,7 +284,7 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
     ("change", "path"),
     [
         ({"A": [1, 2, 2]}, "A[2]"),
-        ({"potential": {"cubic": 1}}, "potential"),
+        ({"potential": {"cubic": 1}}, "potential.cubic"),
         ({"potential": {"quartic": "x"}}, "potential.quartic"),
         ({"potential": {"centrifugal": [1, 2]}}, "potential.centrifugal"),
         (

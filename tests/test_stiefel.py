@@ -390,7 +390,7 @@ IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
         ({"P": [[0, 1e-300], [-1e-300, 0], [0, 0]]}, "P", "range of a float"),
         ({"inertia": [3, 2, 1]}, "inertia", "special"),
         ({"inertia": {"special": [3, 2, 1], "matrix": IDENTITY}}, "inertia", "special"),
-        ({"inertia": {"A": [3, 2, 1]}}, "inertia", "special"),
+        ({"inertia": {"A": [3, 2, 1]}}, "inertia.A", "special"),
         ({"inertia": {"special": [3, 2]}}, "inertia.special", "2 entries"),
         ({"inertia": {"special": [3, -2, 1]}}, "inertia.special[1]", "greater than 0"),
         ({"inertia": {"matrix": [[1, 0], [0, 1]]}}, "inertia.matrix", "2 rows"),

@@ -92,14 +92,18 @@ def _solve(
             else None
         )
         engine = engine or problem.default_engine
-    require_options(type(problem), engine, method, formulation, digits, certified)
+    faults = Faults()
+    faults.attempt(require_options, type(problem), engine, method, formulation, digits, certified)
+    beyond = not faults.found and beyond_double(digits, certified)
+    grid = faults.attempt(TimeGrid.of, times, beyond)
+    faults.require_none()
     named = {"method": method, "formulation": formulation}
     options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
     elif engine == "analytic" and solution is not None:
         options["solution"] = solution
-    answer: Trajectory = import_module(ENGINES[engine]).solve(problem, times, **options)
+    answer: Trajectory = import_module(ENGINES[engine]).solve(problem, grid, **options)
     return answer
 
 
@@ -157,7 +161,8 @@ def require_options(
             faults.add(("formulation",), "none (the closed form has one)", show(formulation))
         elif formulation is not None and formulation not in system.formulations:
             faults.found.append(unknown_name(("formulation",), formulation, system.formulations))
-        faults.attempt(_require_precision, engine, digits, certified)
+    served = engine if isinstance(engine, str) and engine in system.engines else "analytic"
+    faults.attempt(_require_precision, served, digits, certified)
     faults.require_none()
 
 
@@ -189,7 +194,11 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
     if isinstance(problem, Problem) and len(problem.engines) < len(ENGINES):
         given = f"{problem.system}, which {' and '.join(problem.engines)} alone solves"
         raise InvalidInput(("problem",), "a system that both engines solve", given)
-    grid = TimeGrid.of(times)
+    faults = Faults()
+    grid = faults.attempt(TimeGrid.of, times)
+    if isinstance(problem, Problem):
+        faults.attempt(require_options, type(problem), "numeric", method, None)
+    faults.require_none()
     return Comparison(solve(problem, grid, "analytic"), solve(problem, grid, "numeric", method))
 
 

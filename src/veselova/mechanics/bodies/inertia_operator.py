@@ -4,6 +4,7 @@ of (4.5).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,8 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_matrix, exact_vector, read_only, to_float
+from veselova.mechanics.core.errors import (
+    InvalidInput,
+    InvalidRequest,
+    show,
+    unknown_fields,
+)
+from veselova.mechanics.core.exact_input import (
+    exact_matrix,
+    exact_vector,
+    positive_number,
+    read_only,
+    to_float,
+)
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
@@ -55,14 +67,16 @@ class Inertia:
         ``{"special": [A_1, …, A_n]}`` is (4.5), 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j; ``{"matrix":
         …}`` any symmetric positive definite matrix of size n(n−1)/2. Raises InvalidInput.
         """
-        if not isinstance(value, Mapping) or len(value) != 1:
+        if not isinstance(value, Mapping):
+            raise InvalidInput(("inertia",), _FORMS, show(value))
+        if unknown := unknown_fields(("inertia",), value, ("special", "matrix")):
+            raise InvalidRequest(unknown)
+        if len(value) != 1:
             raise InvalidInput(("inertia",), _FORMS, show(value))
         ((form, data),) = value.items()
         if form == "special":
             return cls.special(data, n)
-        if form == "matrix":
-            return cls.of_matrix(data, n * (n - 1) // 2, ("inertia", "matrix"))
-        raise InvalidInput(("inertia",), _FORMS, f"the form {show(form)}")
+        return cls.of_matrix(data, n * (n - 1) // 2, ("inertia", "matrix"))
 
     @classmethod
     def special(cls, A: Any, n: int) -> Inertia:
@@ -70,12 +84,8 @@ class Inertia:
         data.
         """
         path = ("inertia", "special")
-        exact = exact_vector(A, path, n)
-        determinant = Fraction(1)
-        for i, value in enumerate(exact):
-            if value <= 0 or float(value) == 0:
-                raise InvalidInput((*path, i), "a finite number greater than 0", show(A[i]))
-            determinant = determinant * value
+        exact = exact_vector(A, path, n, positive_number)
+        determinant = math.prod(exact)
         entries = [exact[i] * exact[j] / determinant for i in range(n) for j in range(i + 1, n)]
         try:
             operator = to_float(entries)

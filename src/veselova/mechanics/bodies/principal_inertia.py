@@ -11,7 +11,13 @@ import numpy as np
 
 from veselova.mechanics.bodies.wide_axes import WideAxes, wide_axes
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_matrix, exact_vector, is_matrix, to_float
+from veselova.mechanics.core.exact_input import (
+    exact_matrix,
+    exact_vector,
+    is_matrix,
+    positive_number,
+    to_float,
+)
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["positive_numbers", "principal_inertia", "require_moderate", "symmetric_matrix"]
@@ -27,17 +33,19 @@ def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
     """Return the entries of A, two or more numbers above zero, exactly; ``name`` is that of the
     argument.
     """
-    diagonal = exact_vector(A, (name,))
+    diagonal = exact_vector(A, (name,), entry=_invertible_number)
     if len(diagonal) < 2:
         raise InvalidInput((name,), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
-    for i, value in enumerate(diagonal):
-        if value <= 0 or float(value) == 0:
-            raise InvalidInput((name, i), "a finite number greater than 0", show(A[i]))
-        if value < _LEAST:
-            raise InvalidInput(
-                (name, i), "a number whose inverse is within the range of a float", show(A[i])
-            )
     return diagonal
+
+
+def _invertible_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
+    number = positive_number(value, path)
+    if number < _LEAST:
+        raise InvalidInput(
+            path, "a number whose inverse is within the range of a float", show(value)
+        )
+    return number
 
 
 def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = _MODERATE) -> None:

@@ -35,8 +35,10 @@ __all__ = [
     "VeselovaError",
     "did_you_mean",
     "install_extra",
+    "missing_fields",
     "show",
     "summary",
+    "unknown_fields",
     "unknown_name",
 ]
 
@@ -235,6 +237,31 @@ def unknown_name(
     """
     required = " ".join(filter(None, (f"one of {', '.join(names)}", scope)))
     return InvalidInput(path, required, show(given) + did_you_mean(given, names))
+
+
+def unknown_fields(
+    path: Sequence[str | int], given: Iterable[object], names: Sequence[str]
+) -> list[InvalidInput]:
+    """Return the faults of fields at a place that are none of those known, one for each."""
+    return [
+        InvalidInput(
+            (*path, str(name)),
+            f"no field but {', '.join(names)}",
+            f"the field {show(name)}{did_you_mean(name, names)}",
+        )
+        for name in given
+        if name not in names
+    ]
+
+
+def missing_fields(
+    path: Sequence[str | int], given: Iterable[object], names: Sequence[str]
+) -> list[InvalidInput]:
+    """Return the faults of fields that an object must have and has not, one for each."""
+    known = set(given)
+    return [
+        InvalidInput((*path, name), "this field", "nothing") for name in names if name not in known
+    ]
 
 
 class Faults:

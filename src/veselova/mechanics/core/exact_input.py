@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
     "Number",
+    "entry_count",
     "exact_matrix",
     "exact_number",
     "exact_vector",
@@ -28,7 +29,9 @@ __all__ = [
     "is_matrix",
     "over_common_denominator",
     "plain",
+    "positive_number",
     "read_only",
+    "require_each",
     "require_truth_value",
     "to_float",
     "whole_number",
@@ -37,6 +40,8 @@ __all__ = [
 Number = int | float | str | Fraction | Decimal
 
 Path = tuple[str | int, ...]
+
+T = TypeVar("T")
 
 #: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other
 #: alphabets.
@@ -120,15 +125,48 @@ def _items(values: Any, path: Path, required: str) -> list[Any]:
     return list(values)
 
 
-def exact_vector(values: Any, path: Path, length: int | None = None) -> tuple[Fraction, ...]:
-    """Return the entries of a vector as exact rationals; raises InvalidInput when the length is not
-    ``length``.
+def positive_number(value: Any, path: Path) -> Fraction:
+    """Return the number greater than zero that ``value`` states exactly; raises InvalidInput."""
+    number = exact_number(value, path)
+    if number <= 0 or float(number) == 0:
+        raise InvalidInput(path, "a finite number greater than 0", show(value))
+    return number
+
+
+def exact_vector(
+    values: Any,
+    path: Path,
+    length: int | None = None,
+    entry: Callable[[Any, Path], Fraction] = exact_number,
+) -> tuple[Fraction, ...]:
+    """Return the entries of a vector as exact rationals, each read by ``entry``; raises
+    InvalidInput when the length is not ``length``, InvalidRequest with the faults of all entries.
     """
     required = "a list of numbers" if length is None else f"a list of {length} numbers"
     items = _items(values, path, required)
     if length is not None and len(items) != length:
         raise InvalidInput(path, required, f"{len(items)} entries")
-    return tuple(exact_number(item, (*path, i)) for i, item in enumerate(items))
+    return require_each(entry, items, path)
+
+
+def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Path) -> tuple[T, ...]:
+    """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
+    all.
+    """
+    try:
+        return tuple([call(item, (*path, i)) for i, item in enumerate(items)])
+    except InvalidInput:
+        faults = Faults()
+        for i, item in enumerate(items):
+            faults.attempt(call, item, (*path, i))
+        faults.require_none()
+        raise
+
+
+def entry_count(values: Any, otherwise: Any = ()) -> int:
+    """Return how many entries a list has, or the other one where the first is none."""
+    counted = (x for x in (values, otherwise) if hasattr(x, "__len__") and not isinstance(x, str))
+    return next(map(len, counted), 0)
 
 
 def exact_matrix(
@@ -144,7 +182,7 @@ def exact_matrix(
     rows = _items(values, path, required)
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
-    return tuple(exact_vector(row, (*path, i), width) for i, row in enumerate(rows))
+    return require_each(lambda row, place: exact_vector(row, place, width), rows, path)
 
 
 def whole_number(value: Any, path: Path, least: int, most: int) -> int:

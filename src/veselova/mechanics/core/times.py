@@ -19,7 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import (
+    Faults,
+    InvalidInput,
+    missing_fields,
+    show,
+    unknown_fields,
+)
 from veselova.mechanics.core.exact_input import (
     exact_number,
     exact_vector,
@@ -37,6 +43,9 @@ Exact = Fraction | float
 
 #: Times of one call: their frames alone take a gigabyte for n = 4.
 MOST_TIMES = 10_000_000
+
+#: The fields of a grid.
+_FIELDS = ("start", "stop", "count")
 
 #: Whole numbers up to here are doubles.
 _LARGEST_WHOLE_DOUBLE = 2**53
@@ -187,20 +196,18 @@ def _split(
 
 def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
     """Return the grid of a mapping with start, stop and count, both ends included."""
-    if set(grid) != {"start", "stop", "count"}:
-        given = f"the fields {', '.join(map(str, grid)) or 'none'}"
-        raise InvalidInput(
-            ("times",), "a list of numbers, or exactly the fields start, stop, count", show(given)
-        )
-    ends = [exact_number(grid[key], ("times", key)) for key in ("start", "stop")]
-    count = grid["count"]
-    if isinstance(count, (bool, np.bool_)) or not isinstance(count, (int, np.integer)):
-        raise InvalidInput(("times", "count"), "a whole number", show(count))
-    if count < 1:
-        raise InvalidInput(("times", "count"), "at least 1", str(count))
-    if count > MOST_TIMES:
-        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(count)[:30])
-    count, (start, stop) = int(count), ends
+    faults = Faults()
+    faults.found += unknown_fields(("times",), grid, _FIELDS)
+    faults.found += missing_fields(("times",), grid, _FIELDS)
+    start, stop = (
+        faults.attempt(exact_number, grid.get(key, 0), ("times", key)) for key in _FIELDS[:2]
+    )
+    count = faults.attempt(_count, grid.get("count", 1))
+    faults.require_none()
+    assert start is not None
+    assert stop is not None
+    assert count is not None
+    ends = (start, stop)
     if count > 1 and not start < stop:
         raise InvalidInput(
             ("times", "stop"),
@@ -216,6 +223,17 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
         return _of_doubles(np.linspace(low, high, count), [])
     step = (stop - start) / max(count - 1, 1)
     return _split(*split_grid(start, step, count), None, partial(_points, start, step, count))
+
+
+def _count(given: Any) -> int:
+    """Return the number of times of a grid."""
+    if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
+        raise InvalidInput(("times", "count"), "a whole number", show(given))
+    if given < 1:
+        raise InvalidInput(("times", "count"), "at least 1", str(given))
+    if given > MOST_TIMES:
+        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(given)[:30])
+    return int(given)
 
 
 def _points(start: Fraction, step: Fraction, count: int) -> list[Fraction]:

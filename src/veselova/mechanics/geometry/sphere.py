@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import exact_vector, over_common_denominator, to_float
 
 __all__ = [
@@ -99,13 +99,17 @@ def point_on_sphere(
     its largest entry to normalize.
 
     Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0
-    to the tolerance.
+    to the tolerance; InvalidRequest for faults of both.
     """
-    state = ExactState(
-        A, exact_vector(q, ("q",), len(A)), exact_vector(velocity, (name,), len(A)), None
-    )
-    if not any(state.q):
-        raise InvalidInput(("q",), "a vector of unit length", "the zero vector")
+    faults = Faults()
+    point = faults.attempt(exact_vector, q, ("q",), len(A))
+    exact_velocity = faults.attempt(exact_vector, velocity, (name,), len(A))
+    if point is not None and not any(point):
+        faults.add(("q",), "a vector of unit length", "the zero vector")
+    faults.require_none()
+    assert point is not None
+    assert exact_velocity is not None
+    state = ExactState(A, point, exact_velocity, None)
     position = to_float(over_largest(state.q) if normalize else state.q)
     if not normalize:
         _require_on_sphere(position, to_float(state.q_dot), name)
@@ -118,16 +122,20 @@ def _require_on_sphere(q: Array, velocity: Array, name: str) -> None:
     """
     with np.errstate(over="ignore"):
         length = float(np.linalg.norm(q))
-    if abs(length - 1) > INPUT_TOLERANCE:
-        raise InvalidInput(
+    faults = Faults()
+    if not abs(length - 1) <= INPUT_TOLERANCE:
+        faults.add(
             ("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
         )
     largest = float(np.max(np.abs(velocity)))
     if largest > 0:
-        slope = float((velocity / largest) @ q) / float(np.linalg.norm(velocity / largest))
+        direction = q / np.max(np.abs(q))
+        slope = float((velocity / largest) @ direction)
+        slope /= float(np.linalg.norm(velocity / largest) * np.linalg.norm(direction))
         if abs(slope) > INPUT_TOLERANCE:
-            raise InvalidInput(
+            faults.add(
                 (name,),
                 "a vector orthogonal to q to 1e-9 of its length (or normalize=True)",
                 f"cosine {slope:.3g} with q",
             )
+    faults.require_none()

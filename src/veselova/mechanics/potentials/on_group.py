@@ -6,13 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, plain, read_only
+from veselova.mechanics.core.errors import (
+    Faults,
+    InvalidInput,
+    missing_fields,
+    show,
+    unknown_fields,
+)
+from veselova.mechanics.core.exact_input import exact_number, plain, read_only, require_each
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
 
@@ -24,6 +31,9 @@ Array = NDArray[np.float64]
 _MOST_MONOMIALS = 1000
 _MOST_FACTORS = 64
 _LARGEST_POWER = 64
+
+#: The fields of a monomial.
+_FIELDS = ("coefficient", "powers")
 
 _MONOMIAL = 'an object {"coefficient": c, "powers": [[i, j, p], …]} for c Π g_ij^p'
 
@@ -59,18 +69,10 @@ class GroupPotential:
             raise InvalidInput(
                 path, f"null or a list of 1 to {_MOST_MONOMIALS} monomials", show(value)
             )
-        coefficients = []
-        powers = []
-        given = []
-        for k, monomial in enumerate(value):
-            if not isinstance(monomial, Mapping) or set(monomial) != {"coefficient", "powers"}:
-                raise InvalidInput((*path, k), _MONOMIAL, show(monomial))
-            coefficients.append(
-                float(exact_number(monomial["coefficient"], (*path, k, "coefficient")))
-            )
-            powers.append(_factors(monomial["powers"], size, (*path, k, "powers")))
-            given.append({name: plain(monomial[name]) for name in ("coefficient", "powers")})
-        return cls(read_only(np.array(coefficients)), tuple(powers), given)
+        terms = require_each(partial(_monomial, size), value, path)
+        coefficients, powers = zip(*terms, strict=True)
+        given = [{name: plain(monomial[name]) for name in _FIELDS} for monomial in value]
+        return cls(read_only(np.array(coefficients)), powers, given)
 
     def scale(self, factor: float) -> GroupPotential:
         """Return the potential times a factor."""
@@ -170,6 +172,21 @@ def _product(first: Any, factors: list[Any]) -> Any:
     for factor in factors:
         first = first * factor
     return first
+
+
+def _monomial(
+    size: int, item: Any, path: tuple[str | int, ...]
+) -> tuple[float, tuple[tuple[int, int, int], ...]]:
+    if not isinstance(item, Mapping):
+        raise InvalidInput(path, _MONOMIAL, show(item))
+    faults = Faults()
+    faults.found += unknown_fields(path, item, _FIELDS) + missing_fields(path, item, _FIELDS)
+    coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
+    powers = faults.attempt(_factors, item.get("powers", ()), size, (*path, "powers"))
+    faults.require_none()
+    assert coefficient is not None
+    assert powers is not None
+    return float(coefficient), powers
 
 
 def _factors(

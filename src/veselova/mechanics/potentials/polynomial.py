@@ -6,18 +6,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain
+from veselova.mechanics.core.errors import (
+    Faults,
+    InvalidInput,
+    missing_fields,
+    show,
+    unknown_fields,
+)
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    exact_vector,
+    plain,
+    require_each,
+    whole_number,
+)
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.potentials.laurent import LaurentPolynomial
 
-__all__ = ["Potential", "duality_defect", "family"]
+__all__ = ["Potential", "duality_defect", "family", "without_companion"]
 
 Array = NDArray[np.float64]
 
@@ -28,6 +39,9 @@ _MOST_TERMS = 64
 
 #: What a potential is made of; the companion belongs to the polynomial.
 _PARTS = ("clebsch", "family", "polynomial", "companion")
+
+#: The fields of a term.
+_TERM = ("coefficient", "powers")
 
 #: Points of the sphere, away from the planes γ_i = 0, at which identities between polynomials are
 #: looked at.
@@ -66,32 +80,25 @@ class Potential:
             raise InvalidInput(
                 ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
             )
-        for name in given:
-            if name not in _PARTS:
-                raise InvalidInput(("potential",), f"no fields but {', '.join(_PARTS)}", show(name))
+        faults = Faults()
+        faults.found += unknown_fields(("potential",), given, _PARTS)
+        alpha = faults.attempt(exact_number, given.get("clebsch", 0), ("potential", "clebsch"))
+        alphas = faults.attempt(_alphas, given.get("family", (0,) * 5), inertia)
+        polynomial = faults.attempt(_polynomial, given, "polynomial")
+        known = faults.attempt(_polynomial, given, "companion")
+        faults.require_none()
         pairs = []
-        if "clebsch" in given:
-            alpha = float(exact_number(given["clebsch"], ("potential", "clebsch")))
-            pairs.append(family((0.0, alpha, 0.0, 0.0, 0.0), inertia, inverse))
-        if "family" in given:
-            alphas = _alphas(given["family"], inertia)
+        if alpha and "clebsch" in given:
+            pairs.append(family((0.0, float(alpha), 0.0, 0.0, 0.0), inertia, inverse))
+        if alphas and "family" in given:
             pairs.append(
                 family(alphas, inverse, inertia)[::-1] if dual else family(alphas, inertia, inverse)
             )
         terms = sum((pair[0] for pair in pairs), none)
         companion: LaurentPolynomial | None = sum((pair[1] for pair in pairs), none)
-        if "polynomial" in given:
-            terms = terms + _polynomial(given["polynomial"], "polynomial")
-            known = given.get("companion")
-            companion = (
-                None
-                if known is None or companion is None
-                else companion + _polynomial(known, "companion")
-            )
-        elif "companion" in given:
-            raise InvalidInput(
-                ("potential", "companion"), "a polynomial that it belongs to", "none"
-            )
+        if polynomial is not None:
+            terms = terms + polynomial
+            companion = None if known is None or companion is None else companion + known
         unconditional = False
         if companion is not None:
             unconditional = _check_pair(
@@ -147,6 +154,13 @@ def family(
     return V, F
 
 
+def without_companion(given: Any) -> Any:
+    """Return the data of a potential without its companion."""
+    if not isinstance(given, Mapping) or "companion" not in given or "polynomial" not in given:
+        return given
+    return {name: value for name, value in given.items() if name != "companion"}
+
+
 def duality_defect(
     V: LaurentPolynomial, F: LaurentPolynomial, inertia: Array, gamma: Array
 ) -> Array:
@@ -193,33 +207,47 @@ def _alphas(given: Any, inertia: Array) -> tuple[float, ...]:
     return alphas
 
 
-def _polynomial(given: Any, name: str) -> LaurentPolynomial:
+def _polynomial(potential: Mapping[str, Any], name: str) -> LaurentPolynomial | None:
+    """Return the polynomial, or the companion that belongs to one; None where it is left out."""
     path = ("potential", name)
+    if name not in potential:
+        return None
+    given = potential[name]
+    if "polynomial" not in potential:
+        raise InvalidInput(path, "a polynomial that it belongs to", "none")
+    if given is None and name == "companion":
+        return None
     form = 'a list of terms {"coefficient": c, "powers": [a, b, c]}'
     if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
         raise InvalidInput(path, form, show(given))
     if not 0 < len(given) <= _MOST_TERMS:
         raise InvalidInput(path, f"1 to {_MOST_TERMS} terms", f"{len(given)}")
-    return LaurentPolynomial.of(_term(item, (*path, i)) for i, item in enumerate(given))
+    return LaurentPolynomial.of(require_each(_term, given, path))
 
 
 def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int, int]]:
-    if not isinstance(item, Mapping) or set(item) != {"coefficient", "powers"}:
+    if not isinstance(item, Mapping):
         raise InvalidInput(path, 'a term {"coefficient": c, "powers": [a, b, c]}', show(item))
-    coefficient = float(exact_number(item["coefficient"], (*path, "coefficient")))
-    powers = item["powers"].tolist() if isinstance(item["powers"], np.ndarray) else item["powers"]
+    faults = Faults()
+    faults.found += unknown_fields(path, item, _TERM) + missing_fields(path, item, _TERM)
+    coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
+    powers = faults.attempt(_powers, item.get("powers", (0, 0, 0)), (*path, "powers"))
+    faults.require_none()
+    assert coefficient is not None
+    assert powers is not None
+    return float(coefficient), powers
+
+
+def _powers(given: Any, path: tuple[str | int, ...]) -> tuple[int, int, int]:
+    powers = given.tolist() if isinstance(given, np.ndarray) else given
     if isinstance(powers, (str, bytes)) or not isinstance(powers, Sequence) or len(powers) != 3:
-        raise InvalidInput((*path, "powers"), "a list of 3 whole numbers", show(powers))
-    for j, power in enumerate(powers):
-        if (
-            isinstance(power, bool)
-            or not isinstance(power, Integral)
-            or abs(int(power)) > _LARGEST_POWER
-        ):
-            required = f"a whole number from -{_LARGEST_POWER} to {_LARGEST_POWER}"
-            raise InvalidInput((*path, "powers", j), required, show(power))
-    a, b, c = (int(power) for power in powers)
-    return coefficient, (a, b, c)
+        raise InvalidInput(path, "a list of 3 whole numbers", show(powers))
+    a, b, c = require_each(_power, powers, path)
+    return a, b, c
+
+
+def _power(given: Any, path: tuple[str | int, ...]) -> int:
+    return whole_number(given, path, -_LARGEST_POWER, _LARGEST_POWER)
 
 
 def _exponents(powers: Mapping[int, int]) -> tuple[int, int, int]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_vector,
     given_arguments,
     read_only,
@@ -74,15 +76,17 @@ class EllipsoidGeodesic(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
     def __init__(self, A: Any, X: Any, X_dot: Any, *, normalize: bool = False) -> None:
-        require_truth_value(normalize, "normalize")
-        diagonal = positive_numbers(A)
-        require_moderate(diagonal, "A")
-        n = len(diagonal)
-        exact_X = exact_vector(X, ("X",), n)
-        exact_V = exact_vector(X_dot, ("X_dot",), n)
-        for name, vector in (("X", exact_X), ("X_dot", exact_V)):
-            if not any(vector):
-                raise InvalidInput((name,), "a vector other than zero", "the zero vector")
+        faults = Faults()
+        faults.attempt(require_truth_value, normalize, "normalize")
+        numbers = faults.attempt(_moderate_numbers, A)
+        n = entry_count(A, X)
+        exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
+        exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
+        faults.require_none()
+        assert numbers is not None
+        assert exact_X is not None
+        assert exact_V is not None
+        diagonal = numbers
         if not normalize:
             _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(to_float(diagonal)))
         # q ∝ A⁻¹X, and dq ∝ A⁻¹V up to a multiple of q, for V tangent to the ellipsoid.
@@ -253,6 +257,23 @@ def _joachimsthal(A: Array, q: Array, V: Array) -> Array:
     return np.asarray(np.sum(V * V / A, axis=-1) / np.sum(A * q * q, axis=-1), dtype=np.float64)
 
 
+def _moderate_numbers(A: Any) -> tuple[Fraction, ...]:
+    """Return the entries of A exactly; raises InvalidInput unless they are positive and
+    moderate.
+    """
+    diagonal = positive_numbers(A)
+    require_moderate(diagonal, "A")
+    return diagonal
+
+
+def _vector_other_than_zero(values: Any, name: str, n: int) -> tuple[Fraction, ...]:
+    """Return a vector of n numbers exactly; raises InvalidInput for zero."""
+    vector = exact_vector(values, (name,), n)
+    if not any(vector):
+        raise InvalidInput((name,), "a vector other than zero", "the zero vector")
+    return vector
+
+
 def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:
     """Raise InvalidInput unless X lies on the ellipsoid and V is a unit tangent, each to the
     tolerance.
@@ -261,14 +282,14 @@ def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:
         scaled = X / semiaxes
         value = float(scaled @ scaled)
         length = float(np.linalg.norm(V))
+    faults = Faults()
     if not abs(value - 1) <= 2 * INPUT_TOLERANCE:
-        raise InvalidInput(
-            ("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}"
-        )
+        faults.add(("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}")
     if not abs(length - 1) <= INPUT_TOLERANCE:
-        raise InvalidInput(
+        faults.add(
             ("X_dot",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
         )
+    faults.require_none()
     normal = scaled / semiaxes
     slope = float(normal @ V) / float(np.linalg.norm(normal))
     if not abs(slope) <= INPUT_TOLERANCE:

@@ -13,8 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
-from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import plain, require_truth_value, whole_number
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import (
+    entry_count,
+    plain,
+    require_truth_value,
+    whole_number,
+)
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.lr_flow import (
     LRFlow,
@@ -95,14 +100,20 @@ class LRSystem(Problem):
         *,
         homogeneous: bool = False,
     ) -> None:
-        size = whole_number(n, ("n",), 2, LARGEST)
-        r = whole_number(rank, ("rank",), 1, size - 1)
-        if omega is None or not hasattr(omega, "__len__") or len(omega) != size:
-            raise InvalidInput(
-                ("omega",), f"a skew-symmetric matrix, {size} rows of {size} numbers", show(omega)
-            )
-        operator = Inertia.of(inertia, size)
-        self._become(Distribution.of_rank(size, r), operator, g, omega, potential, homogeneous)
+        faults = Faults()
+        known = faults.attempt(whole_number, n, ("n",), 2, LARGEST)
+        size = known or min(max(entry_count(omega), 2), LARGEST)
+        r = faults.attempt(whole_number, rank, ("rank",), 1, size - 1)
+        operator = state = None
+        if known is not None:
+            operator = faults.attempt(Inertia.of, inertia, size)
+            group = Distribution.of_rank(size, r or 1).group
+            state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
+        faults.require_none()
+        assert r is not None
+        assert operator is not None
+        assert state is not None
+        self._become(Distribution.of_rank(size, r), operator, *state, homogeneous)
         given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
         given |= {
             "potential": self.potential.given if self.potential else None,
@@ -133,18 +144,16 @@ class LRSystem(Problem):
             raise InvalidInput(
                 ("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", show(group)
             )
-        if omega is None:
-            raise InvalidInput(("omega",), "a matrix of the Lie algebra", "nothing")
         system = cls.__new__(cls)
-        distribution = Distribution.orthogonal_to(group, h)
-        system._become(
-            distribution,
-            Inertia.of_matrix(inertia, group.dimension),
-            g,
-            omega,
-            potential,
-            homogeneous,
-        )
+        faults = Faults()
+        distribution = faults.attempt(Distribution.orthogonal_to, group, h)
+        operator = faults.attempt(Inertia.of_matrix, inertia, group.dimension)
+        state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
+        faults.require_none()
+        assert distribution is not None
+        assert operator is not None
+        assert state is not None
+        system._become(distribution, operator, *state, homogeneous)
         arrays = {
             "basis": group.basis,
             "inertia": system.inertia.matrix,
@@ -173,15 +182,11 @@ class LRSystem(Problem):
         self,
         distribution: Distribution,
         inertia: Inertia,
-        g: Any,
-        omega: Any,
-        potential: Any,
-        homogeneous: Any,
+        start: Array,
+        velocity: Array,
+        potential: GroupPotential | None,
+        homogeneous: bool,
     ) -> None:
-        require_truth_value(homogeneous, "homogeneous")
-        group = distribution.group
-        start = np.eye(group.size) if g is None else group.validate(g)
-        velocity = group.algebra_element(omega, ("omega",))
         along, across = distribution.components(start, velocity)
         size = float(np.max(np.abs(velocity)))
         off = float(np.max(np.abs(across), initial=0.0))
@@ -195,14 +200,13 @@ class LRSystem(Problem):
         if homogeneous or off <= _ROUNDINGS * np.finfo(float).eps * size:
             across = np.zeros_like(across)
             velocity = distribution.body(start, along, across)
-        v = None if potential is None else GroupPotential.of(potential, group.size)
         self._set(
             g=start,
             omega=velocity,
             constraint=across,
             distribution=distribution,
             inertia=inertia,
-            potential=v,
+            potential=potential,
         )
         self._require_finite()
 
@@ -379,3 +383,22 @@ class LRSystem(Problem):
             self.distribution.momentum(self.inertia, g, omega) / size
         )
         return trace_integrals(np.swapaxes(g[..., : self.rank, :], -1, -2), M)
+
+
+def _read_state(
+    group: MatrixGroup, g: Any, omega: Any, potential: Any, homogeneous: Any
+) -> tuple[Array, Array, GroupPotential | None]:
+    """Return g, the coordinates of ω and the potential; raises InvalidRequest for faults of
+    all.
+    """
+    faults = Faults()
+    faults.attempt(require_truth_value, homogeneous, "homogeneous")
+    start = np.eye(group.size) if g is None else faults.attempt(group.validate, g)
+    if omega is None:
+        faults.add(("omega",), "a matrix of the Lie algebra (of so(n): skew)", "nothing")
+    velocity = None if omega is None else faults.attempt(group.algebra_element, omega, ("omega",))
+    v = None if potential is None else faults.attempt(GroupPotential.of, potential, group.size)
+    faults.require_none()
+    assert start is not None
+    assert velocity is not None
+    return start, velocity, v

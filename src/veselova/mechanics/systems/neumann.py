@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     given_arguments,
     read_only,
     require_truth_value,
@@ -75,9 +76,13 @@ class NeumannSystem(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
     def __init__(self, A: Any, q: Any, q_prime: Any, *, normalize: bool = False) -> None:
-        require_truth_value(normalize, "normalize")
-        diagonal = positive_numbers(A)
-        exact, position = point_on_sphere(diagonal, q, q_prime, normalize, "q_prime")
+        faults = Faults()
+        faults.attempt(require_truth_value, normalize, "normalize")
+        diagonal = faults.attempt(positive_numbers, A) or (Fraction(1),) * entry_count(A, q)
+        point = faults.attempt(point_on_sphere, diagonal, q, q_prime, bool(normalize), "q_prime")
+        faults.require_none()
+        assert point is not None
+        exact, position = point
         self._set(
             A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact
         )

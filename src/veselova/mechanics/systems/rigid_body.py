@@ -19,8 +19,9 @@ from veselova.mechanics.bodies.principal_inertia import (
     symmetric_matrix,
 )
 from veselova.mechanics.bodies.wide_axes import WideAxes
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    exact_matrix,
     exact_vector,
     given_arguments,
     is_matrix,
@@ -29,11 +30,11 @@ from veselova.mechanics.core.exact_input import (
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
-from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, over_largest, unit
-from veselova.mechanics.potentials.polynomial import Potential
+from veselova.mechanics.potentials.polynomial import Potential, without_companion
 
 __all__ = ["RigidBody", "exact_inverse"]
 
@@ -86,15 +87,13 @@ class RigidBody(Problem):
         *,
         normalize: bool = False,
     ) -> None:
-        require_truth_value(normalize, "normalize")
-        moments, axes, tensor, inverse = _inertia(inertia)
-        exact_gamma = exact_vector(gamma, ("gamma",), 3)
-        exact_Omega = exact_vector(Omega, ("Omega",), 3)
-        direction = _direction(exact_gamma, normalize)
+        dual = not self.constrained
+        body, point, exact_Omega, V, exact_frame = _read_fields(
+            inertia, gamma, Omega, potential, frame, normalize, dual
+        )
+        moments, axes, tensor, inverse = body
+        exact_gamma, direction = point
         velocity = to_float(exact_Omega)
-        exact_frame = None if frame is None else given_frame(frame, exact_gamma, normalize, "gamma")
-        V = Potential.of(potential, tensor, inverse, dual=not self.constrained)
-        V.require_finite(direction)
         across = direction if self.constrained else tensor @ direction
         with np.errstate(over="ignore", invalid="ignore"):  # refused below
             linear = float(velocity @ across)
@@ -208,7 +207,44 @@ class RigidBody(Problem):
         return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
 
 
-def _inertia(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]:
+_Body = tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]
+
+
+def _read_fields(
+    inertia: Any, gamma: Any, Omega: Any, potential: Any, frame: Any, normalize: Any, dual: bool
+) -> tuple[
+    _Body,
+    tuple[tuple[Fraction, ...], Array],
+    tuple[Fraction, ...],
+    Potential,
+    ExactFrame | None,
+]:
+    """Return body, direction, Ω, potential and frame; raises InvalidRequest for faults of all."""
+    faults = Faults()
+    faults.attempt(require_truth_value, normalize, "normalize")
+    body = faults.attempt(_inertia, inertia)
+    point = faults.attempt(_direction, gamma, bool(normalize))
+    exact_Omega = faults.attempt(exact_vector, Omega, ("Omega",), 3)
+    exact_frame = None
+    if frame is not None and point is not None:
+        exact_frame = faults.attempt(given_frame, frame, point[0], bool(normalize), "gamma")
+    elif frame is not None:
+        faults.attempt(exact_matrix, frame, ("frame",), 3)
+    if body is None:  # a companion belongs to one inertia
+        V = faults.attempt(Potential.of, without_companion(potential), np.eye(3), np.eye(3))
+    else:
+        V = faults.attempt(Potential.of, potential, *body[2:], dual=dual)
+    if V is not None and point is not None:
+        faults.attempt(V.require_finite, point[1])
+    faults.require_none()
+    assert body is not None
+    assert point is not None
+    assert exact_Omega is not None
+    assert V is not None
+    return body, point, exact_Omega, V, exact_frame
+
+
+def _inertia(given: Any) -> _Body:
     """Return the principal moments, the principal axes where a matrix is given, the tensor and its
     inverse.
     """
@@ -235,8 +271,9 @@ def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fract
     return tuple(tuple(x / determinant for x in row) for row in cofactors)
 
 
-def _direction(exact: tuple[Fraction, ...], normalize: bool) -> Array:
-    """Return the unit vector γ."""
+def _direction(given: Any, normalize: bool) -> tuple[tuple[Fraction, ...], Array]:
+    """Return γ as given, exactly, and the unit vector."""
+    exact = exact_vector(given, ("gamma",), 3)
     if not any(exact):
         raise InvalidInput(("gamma",), "a vector of unit length", "the zero vector")
     gamma = to_float(over_largest(exact) if normalize else exact)
@@ -245,7 +282,7 @@ def _direction(exact: tuple[Fraction, ...], normalize: bool) -> Array:
         raise InvalidInput(
             ("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
         )
-    return unit(gamma)
+    return exact, unit(gamma)
 
 
 def _require_finite_squares(velocity: Array, tensor: Array) -> None:

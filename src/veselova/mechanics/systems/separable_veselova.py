@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_number,
     exact_vector,
     given_arguments,
@@ -88,15 +89,16 @@ class SeparableVeselova(Problem):
     def __init__(
         self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False
     ) -> None:
-        require_truth_value(normalize, "normalize")
-        diagonal = positive_numbers(A)
-        require_moderate(diagonal, "A", _WIDEST)
+        faults = Faults()
+        faults.attempt(require_truth_value, normalize, "normalize")
+        diagonal = faults.attempt(_different_numbers, A) or (Fraction(1),) * entry_count(A, q)
         n = len(diagonal)
-        for i, value in enumerate(diagonal):
-            if value in diagonal[:i]:
-                raise InvalidInput(("A", i), "a number different from the others", show(A[i]))
-        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
-        parts = _potential(potential, n)
+        point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
+        parts = faults.attempt(_potential, potential, n)
+        faults.require_none()
+        assert point is not None
+        assert parts is not None
+        exact, position = point
         for i, beta in enumerate(parts[2]):
             if beta and not exact.q[i]:
                 raise InvalidInput(
@@ -216,20 +218,37 @@ class SeparableVeselova(Problem):
         }
 
 
+def _different_numbers(A: Any) -> tuple[Fraction, ...]:
+    """Return the entries of A exactly; raises InvalidInput unless they are positive, moderate and
+    different.
+    """
+    diagonal = positive_numbers(A)
+    faults = Faults()
+    faults.attempt(require_moderate, diagonal, "A", _WIDEST)
+    for i, value in enumerate(diagonal):
+        if value in diagonal[:i]:
+            faults.add(("A", i), "a number different from the others", show(A[i]))
+    faults.require_none()
+    return diagonal
+
+
 def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, ...]]:
     """Return (α₁, α₂, β); raises InvalidInput, located below ``potential``."""
     if given is None:
         return Fraction(0), Fraction(0), (Fraction(0),) * n
-    if not isinstance(given, Mapping) or not given or set(given) - set(_PARTS):
+    if not isinstance(given, Mapping) or not given:
         raise InvalidInput(
             ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
         )
+    faults = Faults()
+    faults.found += unknown_fields(("potential",), given, _PARTS)
     quartic, quadratic = (
-        exact_number(given.get(name, 0), ("potential", name)) for name in _PARTS[:2]
+        faults.attempt(exact_number, given.get(name, 0), ("potential", name)) for name in _PARTS[:2]
     )
-    betas = (
-        exact_vector(given["centrifugal"], ("potential", "centrifugal"), n)
-        if "centrifugal" in given
-        else (Fraction(0),) * n
-    )
+    walls = given.get("centrifugal", (0,) * n)
+    betas = faults.attempt(exact_vector, walls, ("potential", "centrifugal"), n)
+    faults.require_none()
+    assert quartic is not None
+    assert quadratic is not None
+    assert betas is not None
     return quartic, quadratic, betas

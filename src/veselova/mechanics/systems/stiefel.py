@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_matrix,
     given_arguments,
     is_matrix,
@@ -79,19 +80,26 @@ class StiefelFlow(Problem):
     def __init__(
         self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False
     ) -> None:
-        require_truth_value(normalize, "normalize")
+        faults = Faults()
+        faults.attempt(require_truth_value, normalize, "normalize")
         if (P is None) == (X_dot is None):
-            raise InvalidInput(("P",), "either P or X_dot", "neither" if P is None else "both")
-        if not is_matrix(X) or len(X) < 2:
-            raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", show(X))
-        n = len(X)
-        r = len(X[0])
-        if not 1 <= r <= n:
-            raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
-        operator = body_inertia(inertia, n)
-        columns = _orthonormal(to_float(exact_matrix(X, ("X",), n, r)), normalize)
+            faults.add(("P",), "either P or X_dot", "neither" if P is None else "both")
         name, values = ("P", P) if X_dot is None else ("X_dot", X_dot)
-        tangent = _tangent(columns, to_float(exact_matrix(values, (name,), n, r)), name, normalize)
+        shape = faults.attempt(_shape, X)
+        n = shape[0] if shape is not None else entry_count(values)
+        operator = faults.attempt(body_inertia, inertia, n) if n >= 2 else None
+        columns = tangent = None
+        if shape is not None:
+            columns = faults.attempt(_columns, X, shape, bool(normalize))
+            given = None
+            if values is not None:
+                given = faults.attempt(exact_matrix, values, (name,), *shape)
+            if columns is not None and given is not None:
+                tangent = faults.attempt(_tangent, columns, to_float(given), name, bool(normalize))
+        faults.require_none()
+        assert operator is not None
+        assert columns is not None
+        assert tangent is not None
         momentum = tangent if X_dot is None else _momentum(operator, columns, tangent)
         self._set(inertia=operator, X=columns, P=momentum)
         if not (
@@ -251,3 +259,19 @@ def _momentum(inertia: BodyInertia, X: Array, X_dot: Array) -> Array:
     P = cotangent(X, inertia.apply(angular_velocity(X, X_dot / largest)))
     with np.errstate(over="ignore"):  # refused by the constructor
         return np.asarray(np.ldexp(P * largest, inertia.exponent), dtype=np.float64)
+
+
+def _shape(X: Any) -> tuple[int, int]:
+    """Return n and r of the rows of X; raises InvalidInput unless 1 ≤ r ≤ n, n ≥ 2."""
+    if not is_matrix(X) or len(X) < 2:
+        raise InvalidInput(("X",), "a list of n ≥ 2 rows of r numbers", show(X))
+    n = len(X)
+    r = len(X[0])
+    if not 1 <= r <= n:
+        raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
+    return n, r
+
+
+def _columns(X: Any, shape: tuple[int, int], normalize: bool) -> Array:
+    """Return the orthonormal columns of X."""
+    return _orthonormal(to_float(exact_matrix(X, ("X",), *shape)), normalize)

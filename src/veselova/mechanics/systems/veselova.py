@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
+    entry_count,
+    exact_matrix,
     exact_number,
     given_arguments,
     read_only,
@@ -88,10 +90,21 @@ class Veselova(TorusProblem):
     def __init__(
         self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False
     ) -> None:
-        require_truth_value(normalize, "normalize")
-        diagonal, axes = principal_inertia(A)
-        exact, position = point_on_sphere(diagonal, q, q_dot, normalize)
-        exact_frame = None if frame is None else given_frame(frame, exact.q, normalize)
+        faults = Faults()
+        faults.attempt(require_truth_value, normalize, "normalize")
+        inertia = faults.attempt(principal_inertia, A)
+        size = entry_count(A, q)
+        ones = (Fraction(1),) * size
+        diagonal, axes = inertia or (ones, None)
+        point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
+        exact_frame = None
+        if frame is not None and point is not None:
+            exact_frame = faults.attempt(given_frame, frame, point[0].q, bool(normalize))
+        elif frame is not None:
+            faults.attempt(exact_matrix, frame, ("frame",), size)
+        faults.require_none()
+        assert point is not None
+        exact, position = point
         if axes is not None:
             # The tangential part, so that a body at rest stays so.
             exact = replace(exact, q=axes.to_axes(exact.q), q_dot=axes.to_axes(exact.tangent))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import (
@@ -40,53 +40,47 @@ def require_modest(document: Any, settings: Settings) -> None:
 
 def admit(request: BudgetedRequest, settings: Settings) -> None:
     """Raise InvalidInput where a request is beyond the limits of this server, before its numbers
-    are looked at.
+    are looked at; beside limits its numbers are looked at too, unless they are many.
     """
+    faults = Faults()
     if request.budget_s > settings.max_budget_s:
-        raise InvalidInput(
-            ("budget_s",),
-            f"at most {settings.max_budget_s:g} on this server",
-            f"{request.budget_s:g}",
-        )
+        required = f"at most {settings.max_budget_s:g} on this server"
+        faults.add(("budget_s",), required, f"{request.budget_s:g}")
     if isinstance(request, TorusRequest):
-        _admit_motion(request, settings)
+        _admit_motion(request, settings, faults)
     elif isinstance(request, ToolkitRequest):
-        _admit_points(request, settings)
+        _admit_points(request, settings, faults)
+    if faults.found:
+        faults.found += request.data_faults()
+    faults.require_none()
 
 
-def _admit_motion(request: TorusRequest, settings: Settings) -> None:
+def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> None:
     n = request.problem.dimension
-    if n > settings.max_dimension:
-        raise InvalidInput(
-            ("problem", request.problem.measured),
-            f"at most {settings.max_dimension} entries on this server",
-            str(n),
-        )
     count = request.time_count()
+    if n > settings.max_dimension:
+        place = ("problem", request.problem.measured)
+        faults.add(place, f"at most {settings.max_dimension} entries on this server", str(n))
     if count > settings.max_times:
-        raise InvalidInput(
-            ("times",), f"at most {settings.max_times} times on this server", str(count)[:30]
-        )
-    if count * n * n > settings.max_values:
-        raise InvalidInput(
-            ("times",),
-            f"at most {settings.max_values} frame entries (times × n²) on this server",
-            str(count * n * n),
-        )
+        required = f"at most {settings.max_times} times on this server"
+        faults.add(("times",), required, str(count)[:30])
+    elif count * n * n > settings.max_values:
+        required = f"at most {settings.max_values} frame entries (times × n²) on this server"
+        faults.add(("times",), required, str(count * n * n))
     if isinstance(request, ComparisonRequest):
         if request.digits > settings.max_digits:
-            raise InvalidInput(
-                ("digits",), f"at most {settings.max_digits} on this server", str(request.digits)
-            )
-        require_hope(request, settings)
+            required = f"at most {settings.max_digits} on this server"
+            faults.add(("digits",), required, str(request.digits))
+        if not faults.found:
+            faults.attempt(require_hope, request, settings)
 
 
-def _admit_points(request: ToolkitRequest, settings: Settings) -> None:
+def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
     path = (request.points_field,)
     count = request.point_count()
-    if count > settings.max_times:
-        raise InvalidInput(path, f"at most {settings.max_times} points on this server", str(count))
     values = request.value_count()
-    if values > settings.max_values:
+    if count > settings.max_times:
+        faults.add(path, f"at most {settings.max_times} points on this server", str(count))
+    elif values > settings.max_values:
         required = f"at most {settings.max_values} numbers in one answer on this server"
-        raise InvalidInput(path, required, str(values))
+        faults.add(path, required, str(values))

@@ -8,6 +8,7 @@ input with the same sentence.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import islice
@@ -26,8 +27,8 @@ from veselova.mechanics.core.errors import (
     show,
     unknown_name,
 )
-from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.times import MOST_TIMES, TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.json_text import layers
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
@@ -73,8 +74,12 @@ class BudgetedRequest(Request):
         """Return what the request is about, in a word."""
         raise NotImplementedError
 
-    def faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request beyond its fields."""
+    def option_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the request beyond its fields and numbers."""
+        return []
+
+    def data_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with its numbers."""
         return []
 
 
@@ -89,6 +94,15 @@ class TorusRequest(BudgetedRequest):
     def subject(self) -> str:
         """Return the name of the system."""
         return self.problem.system
+
+    def data_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the numbers of the request; those of large problems, which take
+        long, are left aside.
+        """
+        faults = Faults()
+        if self.problem.dimension <= _SMALL_DIMENSION:
+            faults.attempt(self.problem.problem)
+        return faults.found
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them."""
@@ -116,7 +130,8 @@ class ComparisonRequest(TorusRequest):
         Field(
             min_length=1,
             max_length=MOST_OUTPUTS,
-            description="series of the system (GET /v1/systems); all when left out",
+            description="series of the system (GET /v1/systems), and conditioning: how far one "
+            "rounding of the data moves the state; all series when left out",
         ),
     ] = None
     digits: Annotated[
@@ -141,20 +156,27 @@ class ComparisonRequest(TorusRequest):
         """Return whether times are needed to more digits than a double has."""
         return False
 
-    def faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request for the system that it asks of."""
-        kind = SYSTEMS[self.problem.system].problem_class
+    def option_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the options for the system that they are asked of."""
         faults = Faults()
         self._try_options(faults)
-        for i, name in enumerate(self.outputs or ()):
-            if name not in kind.outputs:
-                faults.found.append(unknown_name(("outputs", i), name, list(kind.outputs)))
-        if (
-            faults.found
-            and self.problem.dimension <= _SMALL_DIMENSION
-            and self.time_count() <= _FEW_TIMES
-        ):
-            faults.attempt(self.problem.problem)
+        names = SYSTEMS[self.problem.system].problem_class.output_names()
+        faults.found += [
+            unknown_name(("outputs", i), name, names)
+            for i, name in enumerate(self.outputs or ())
+            if name not in names
+        ]
+        return faults.found
+
+    def data_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the problem and the times; the numbers of large problems and
+        the points of long grids, which take long, are left aside.
+        """
+        faults = Faults()
+        faults.found += super().data_faults()
+        if isinstance(self.times, dict) and _FEW_TIMES < self.time_count() <= MOST_TIMES:
+            faults.attempt(TimeGrid.of, {**self.times, "count": 2})
+        else:
             faults.attempt(self.time_grid)
         return faults.found
 
@@ -210,7 +232,7 @@ class TrajectoryRequest(ComparisonRequest):
 
     def _try_options(self, faults: Faults) -> None:
         kind = SYSTEMS[self.problem.system].problem_class
-        if self.engine is None and (self.method, self.formulation) == (None, None):
+        if (self.engine, self.method, self.formulation, self._exact) == (None, None, None, False):
             return
         engine = self.engine or (
             "analytic" if self._exact and "analytic" in kind.engines else self.chosen_engine
@@ -250,13 +272,75 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     try:
         request = model.model_validate(document)
     except ValidationError as error:
-        found = error.errors(include_url=False, include_context=True)
-        raise InvalidRequest(
-            [_fault(item, _fields(model, document, item["loc"])) for item in found]
-        ) from None
-    if faults := request.faults():
-        raise InvalidRequest(faults)
+        items = error.errors(include_url=False, include_context=True)
+        faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
+        raise InvalidRequest([*faults, *_other_faults(model, document, items, faults)]) from None
+    if faults := request.option_faults():
+        raise InvalidRequest(_once([*faults, *request.data_faults()]))
     return request
+
+
+def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
+    """Return faults, each once."""
+    return list({str(single): single for fault in faults for single in fault.faults}.values())
+
+
+def _other_faults(
+    model: type[BudgetedRequest],
+    document: Any,
+    items: Sequence[Any],
+    faults: Sequence[InvalidInput],
+) -> list[InvalidInput]:
+    """Return what else is wrong with a document than those of its fields at which pydantic found
+    faults.
+    """
+    if not isinstance(document, dict):
+        return []
+    if "problem" not in model.model_fields:
+        stand_in: dict[str, Any] = {}
+        known = True
+    else:
+        problem = document.get("problem")
+        known = isinstance(problem, dict) and problem.get("system") in SYSTEMS
+        stand_in = {"problem": problem if known else BODY4_PROBLEM}
+    try:
+        request = model.model_validate(_without_faults({**document, **stand_in}, items))
+    except ValidationError:
+        return []
+    reported = [fault.path for fault in faults]
+    others = InvalidRequest([*faults, *request.option_faults(), *request.data_faults()]).faults
+    return [
+        fault
+        for fault in others
+        if not any(fault.path[: len(path)] == path for path in reported)
+        and (known or fault.path[0] == "times")
+    ]
+
+
+def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str, Any]:
+    """Return a document whose fields at fault have a value in their place that pydantic takes, or
+    are left out.
+    """
+    left = dict(document)
+    if "problem" in left:
+        left["problem"] = dict(left["problem"])
+    for item in items:
+        first, *rest = item["loc"]
+        if first == "problem":
+            place, values = rest[1:], left.get("problem", {})
+        else:
+            place, values = [first, *rest], left
+        if not place:
+            continue
+        if item["type"] == "missing":
+            values[place[0]] = [0.0] if place[0] == "times" else None
+        elif len(place) > 1 and isinstance(values.get(place[0]), list):
+            values[place[0]] = [
+                CONDITIONING if i == place[1] else value for i, value in enumerate(values[place[0]])
+            ]
+        else:
+            values.pop(place[0], None)
+    return left
 
 
 def _is_deeper(document: Any, levels: int) -> bool:
@@ -302,10 +386,11 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
             "no field of this name",
             f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}",
         )
+    if kind == "literal_error":
+        return unknown_name(path, item["input"], re.findall("'([^']*)'", item["ctx"]["expected"]))
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return InvalidInput(path, "a JSON object", given)
     required: str = {
-        "literal_error": str(item.get("ctx", {}).get("expected", "")),
         "bool_type": "true or false",
         "too_short": "at least one entry",
         "too_long": f"at most {MOST_OUTPUTS} entries",

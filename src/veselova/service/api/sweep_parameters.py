@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
-from veselova.mechanics.core.exact_input import exact_number
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
+from veselova.mechanics.core.exact_input import exact_number, require_each, whole_number
 
 __all__ = [
     "Axis",
@@ -90,25 +90,38 @@ def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[
             f"an object of 1 to {_MOST_PARAMETERS} JSON pointers into the problem",
             show(vary),
         )
+    faults = Faults()
     found: list[Parameter] = []
     for pointer, stated in vary.items():
-        where = ("vary", str(pointer)[:100].encode("utf-8", "backslashreplace").decode("utf-8"))
-        path = _path(pointer, problem, where)
+        parameter = faults.attempt(_parameter_at, str(pointer), stated, problem, most_values)
+        if parameter is None:
+            continue
+        path = parameter.path
         if other := next(
             (p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None
         ):
-            raise InvalidInput(
-                where, "a place of its own", f"a place that overlaps with {other.name}"
-            )
-        found.append(_parameter(path, stated, _value_at(problem, path), where, most_values))
-        count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
-        if count > most_values:
-            raise InvalidInput(
-                ("vary",),
-                f"lists and grids of at most {most_values} values, all together",
-                str(count),
-            )
+            given = f"a place that overlaps with {other.name}"
+            faults.add(("vary", _writable_name(pointer)), "a place of its own", given)
+        found.append(parameter)
+    count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
+    if count > most_values:
+        required = f"lists and grids of at most {most_values} values, all together"
+        faults.add(("vary",), required, str(count))
+    faults.require_none()
     return found
+
+
+def _parameter_at(
+    pointer: str, stated: Any, problem: Mapping[str, Any], most_values: int
+) -> Parameter:
+    where = ("vary", _writable_name(pointer))
+    path = _path(pointer, problem, where)
+    return _parameter(path, stated, _value_at(problem, path), where, most_values)
+
+
+def _writable_name(pointer: str) -> str:
+    """Return the beginning of a pointer, as a text that UTF-8 can hold."""
+    return pointer[:100].encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _value_at(document: Any, path: Path) -> Any:
@@ -230,13 +243,15 @@ def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
 
 
 def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
-    count = stated["count"]
+    faults = Faults()
     spacing = stated.get("spacing", "linear")
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= most:
-        raise InvalidInput((*where, "count"), f"a whole number from 1 to {most}", show(count))
+    number = faults.attempt(whole_number, stated["count"], (*where, "count"), 1, most)
     if spacing not in _SPACINGS:
-        raise unknown_name((*where, "spacing"), spacing, _SPACINGS)
-    start, stop = (float(exact_number(stated[key], (*where, key))) for key in ("start", "stop"))
+        faults.found.append(unknown_name((*where, "spacing"), spacing, _SPACINGS))
+    ends = [faults.attempt(exact_number, stated[key], (*where, key)) for key in ("start", "stop")]
+    faults.require_none()
+    start, stop = (float(end) for end in ends if end is not None)
+    count = number or 1
     if not math.isfinite(stop - start):
         raise InvalidInput(
             where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}"
@@ -253,7 +268,7 @@ def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
 def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
     if not isinstance(stated, list) or len(stated) != 2:
         raise InvalidInput(where, "two numbers", show(stated))
-    first, second = (float(exact_number(value, (*where, i))) for i, value in enumerate(stated))
+    first, second = map(float, require_each(exact_number, stated, where))
     if distribution == "normal":
         if second < 0:
             raise InvalidInput((*where, 1), "a standard deviation of at least 0", f"{second:g}")

@@ -13,7 +13,7 @@ import numpy as np
 import orjson
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.mechanics.core.errors import InvalidInput, VeselovaError, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, VeselovaError, show
 from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
@@ -159,48 +159,53 @@ class SweepRequest(TorusRequest):
         Field(gt=0, allow_inf_nan=False, description="seconds after which one problem is given up"),
     ] = 10.0
 
-    def faults(self) -> list[InvalidInput]:
+    def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields; one problem of those looked at
         must be valid.
         """
-        try:
-            if not isinstance(self.samples, int) or (self.samples > 1 and not self.draws):
-                raise InvalidInput(
-                    ("samples",), "1 where nothing is drawn at random", str(self.samples)
-                )
+        kind = SYSTEMS[self.problem.system].problem_class
+        faults = Faults()
+        if self.times is None and not kind.has_tori:
+            required = f"this field, for system {kind.system} has no torus to summarise"
+            faults.add(("times",), required, "nothing")
+        for name in ("engine", "method", "formulation", "outputs", "trajectories"):
+            if self.times is None and getattr(self, name):
+                required = "times as well (without them no motion is computed)"
+                faults.add((name,), required, "no times")
+        if faults.attempt(lambda: self.varied) is not None:
+            if self.samples > 1 and not self.draws:
+                faults.add(("samples",), "1 where nothing is drawn at random", str(self.samples))
             if self.total > _MOST_PROBLEMS:
-                raise InvalidInput(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
-            kind = SYSTEMS[self.problem.system].problem_class
-            if self.times is None and not kind.has_tori:
-                raise InvalidInput(
-                    ("times",),
-                    f"this field, for system {kind.system} has no torus to summarise",
-                    "nothing",
-                )
-            if self.times is None:
-                for name in ("engine", "method", "formulation", "outputs", "trajectories"):
-                    if getattr(self, name):
-                        raise InvalidInput(
-                            (name,),
-                            "times as well (without them no motion is computed)",
-                            "no times",
-                        )
-            looked_at = np.unique(
-                np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)
-            ).tolist()
-            self._require_one_valid(looked_at)
+                faults.add(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
+        if not faults.found:
+            faults.attempt(self._require_one_valid)
+        try:
             _ = self.canonical
-        except InvalidInput as fault:
-            return [fault]
         except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
-            return [InvalidInput((), "texts of whole characters", "half of a surrogate pair")]
-        except VeselovaError as error:
-            return list(getattr(error, "faults", ()))
-        return []
+            faults.add((), "texts of whole characters", "half of a surrogate pair")
+        return faults.found
 
-    def _require_one_valid(self, rows: list[int]) -> None:
+    def data_faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the base problem and the motion asked of it, places that vary
+        set aside.
+        """
+        faults = Faults()
+        request = faults.attempt(self.request_of, {})
+        faults.found += [] if request is None else request.data_faults()
+        pointers = self.vary if isinstance(self.vary, dict) else ()
+        varied = [("problem", *pointer.split("/")[1:]) for pointer in pointers]
+        return [
+            fault
+            for error in faults.found
+            for fault in error.faults
+            if not any(tuple(map(str, fault.path[: len(place)])) == place for place in varied)
+        ]
+
+    def _require_one_valid(self) -> None:
+        """Raise InvalidInput unless one of some problems, evenly spread, is valid."""
         first: VeselovaError | None = None
-        for row in rows:
+        rows = np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)
+        for row in np.unique(rows).tolist():
             try:
                 request = self.request_of(self.values(row))
                 request.problem.problem()
@@ -210,7 +215,7 @@ class SweepRequest(TorusRequest):
                 first = first or error
             else:
                 return
-        if first is not None:
+        if isinstance(first, InvalidInput):
             raise first
 
     @cached_property

@@ -46,12 +46,10 @@ class ClosedFormRequest(TorusRequest):
         Field(description="error that modes left out of the time map may make"),
     ] = 1e-12
 
-    def faults(self) -> list[InvalidInput]:
+    def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         faults.attempt(require_accuracy, self.accuracy)
-        if faults.found:
-            faults.attempt(self.problem.problem)
         return faults.found
 
 
@@ -106,7 +104,7 @@ class CurveRequest(ToolkitRequest):
         known = self.branch_points if isinstance(self.branch_points, list) else ()
         return self.point_count() * ((len(known) - 1) // 2)
 
-    def faults(self) -> list[InvalidInput]:
+    def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         faults.attempt(curve_arguments, self.branch_points, self.sign)
@@ -171,7 +169,7 @@ class ThetaRequest(ToolkitRequest):
         count = len(given) if several else 1
         return math.prod((self.point_count(), count, orders.get(order, 1)))
 
-    def faults(self) -> list[InvalidInput]:
+    def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         if (self.tau is None) == (self.T is None):

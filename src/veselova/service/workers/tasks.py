@@ -9,6 +9,8 @@ from typing import Any
 
 from veselova.engines import Prepared, closed_form, compare, torus
 from veselova.mechanics.core.errors import Faults
+from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.torus import Torus
@@ -37,20 +39,35 @@ def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) 
     """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that
     is made already.
     """
-    faults = Faults()
-    prepared = prepared or faults.attempt(lambda: Prepared(request.problem.problem()))
-    grid = faults.attempt(request.time_grid)
-    faults.require_none()
-    assert prepared is not None
+    if prepared is None:
+        problem, grid = _problem_and_times(request)
+        prepared = Prepared(problem)
+    else:
+        grid = request.time_grid()
     options: dict[str, Any] = {
         name: getattr(request, name) for name in ("digits", "certified", "formulation")
     }
-    return prepared.solve(grid, request.engine, request.method, **options)
+    trajectory = prepared.solve(grid, request.engine, request.method, **options)
+    if CONDITIONING in (request.outputs or ()):
+        trajectory.series(CONDITIONING)  # within the budget, and before the trajectory is kept
+    return trajectory
+
+
+def _problem_and_times(request: ComparisonRequest) -> tuple[Problem, TimeGrid]:
+    """Return the problem and the times of a request; raises InvalidRequest for faults of both."""
+    faults = Faults()
+    problem = faults.attempt(request.problem.problem)
+    grid = faults.attempt(request.time_grid)
+    faults.require_none()
+    assert problem is not None
+    assert grid is not None
+    return problem, grid
 
 
 def compare_request(request: ComparisonRequest) -> Comparison:
     """Return the comparison that a request asks for."""
-    return compare(request.problem.problem(), request.time_grid(), request.method)
+    problem, grid = _problem_and_times(request)
+    return compare(problem, grid, request.method)
 
 
 def torus_request(request: TorusRequest) -> Torus:

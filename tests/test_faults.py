@@ -1,0 +1,308 @@
+"""All faults of an input come back together, each at its place, at every door."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+import veselova as vs
+from conftest import Server
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.api.problem_details import problem_document
+from veselova.service.api.request_models import (
+    ComparisonRequest,
+    TorusRequest,
+    TrajectoryRequest,
+    read_request,
+)
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli.main import main
+from veselova.service.workers.tasks import compare_request, solve_request, torus_request
+
+#: Constructor, arguments, the places of all their faults, and words that the message has.
+PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
+    "veselova": (
+        vs.Veselova,
+        {"A": [-1, 0, "x"], "q": [1, 2], "q_dot": [0, "y", 0], "frame": [[1], 2, "z"]},
+        {"/A/0", "/A/1", "/A/2", "/q", "/q_dot/1", "/frame/0", "/frame/1", "/frame/2"},
+        [],
+    ),
+    "veselova-off": (
+        vs.Veselova,
+        {"A": [3, 2], "q": [1, 1], "q_dot": [1, 0], "normalize": False},
+        {"/q", "/q_dot"},
+        ["length", "cosine"],
+    ),
+    "neumann": (
+        vs.NeumannSystem,
+        {"A": [1, -2], "q": ["a", 0], "q_prime": [0, True]},
+        {"/A/1", "/q/0", "/q_prime/1"},
+        [],
+    ),
+    "ellipsoid": (
+        vs.EllipsoidGeodesic,
+        {"A": [1, "x", 3], "X": [0, 0, 0], "X_dot": [1, 0], "normalize": "yes"},
+        {"/A/1", "/X", "/X_dot", "/normalize"},
+        [],
+    ),
+    "separable": (
+        vs.SeparableVeselova,
+        {
+            "A": [1, 2, 2],
+            "q": [1, 0, 0],
+            "q_dot": [0, 1],
+            "potential": {"quartc": 1, "quadratic": "x"},
+        },
+        {"/A/2", "/q_dot", "/potential/quartc", "/potential/quadratic"},
+        ["did you mean quartic?"],
+    ),
+    "so3": (
+        vs.VeselovaSO3,
+        {
+            "inertia": [1, 2, -3],
+            "gamma": [1, 1, 0],
+            "Omega": [0, 0, "w"],
+            "potential": {
+                "clebch": 1,
+                "polynomial": [
+                    {"coefficient": "c", "power": [1, 0, 0]},
+                    {"coefficient": 1, "powers": [0, 0.5, 99]},
+                ],
+            },
+        },
+        {
+            "/inertia/2",
+            "/gamma",
+            "/Omega/2",
+            "/potential/clebch",
+            "/potential/polynomial/0/power",
+            "/potential/polynomial/0/powers",
+            "/potential/polynomial/0/coefficient",
+            "/potential/polynomial/1/powers/1",
+            "/potential/polynomial/1/powers/2",
+        },
+        ["did you mean clebsch?", "did you mean powers?"],
+    ),
+    "lr": (
+        vs.LRSystem,
+        {
+            "n": 3,
+            "rank": 7,
+            "inertia": {"specal": [1, 2, 3]},
+            "omega": [[0, 1, 0], [1, 0, 0], [0, 0, 0]],
+            "potential": [
+                {"coefficient": 1, "powers": [[0, 1, 1]]},
+                {"coeficient": 1, "powers": []},
+            ],
+        },
+        {
+            "/rank",
+            "/inertia/specal",
+            "/omega",
+            "/potential/0/powers/0",
+            "/potential/1/coeficient",
+            "/potential/1/coefficient",
+        },
+        ["did you mean special?", "did you mean coefficient?"],
+    ),
+    "stiefel": (
+        vs.StiefelFlow,
+        {"inertia": {"special": [1, -2, 3]}, "X": [[1], [1], [0]], "P": [[0], ["p"], [0]]},
+        {"/inertia/special/1", "/X", "/P/1/0"},
+        [],
+    ),
+}
+
+
+def faults_of(call: Any, *arguments: Any, **options: Any) -> tuple[set[str], str]:
+    """Return the places of all faults of a call, and all of their sentences."""
+    with pytest.raises(InvalidInput) as raised:
+        call(*arguments, **options)
+    found = problem_document(raised.value)["errors"]
+    places = [fault["pointer"] for fault in found]
+    assert len(places) == len(set(places)), places
+    return set(places), " ".join(fault["detail"] for fault in found)
+
+
+@pytest.mark.parametrize("case", PROBLEMS)
+def test_a_problem_reports_all_faults_of_its_fields(case: str) -> None:
+    kind, arguments, places, words = PROBLEMS[case]
+    found, text = faults_of(kind, **arguments)
+    assert found == places
+    for word in words:
+        assert word in text
+
+
+def test_solve_reports_options_and_times_together() -> None:
+    body = vs.Veselova([2, 1], [1, 0], [0, 1])
+    found, text = faults_of(
+        vs.solve, body, {"strat": 0, "stop": "x", "count": 0}, "analytc", digits=3
+    )
+    assert found == {
+        "/engine",
+        "/digits",
+        "/times/strat",
+        "/times/start",
+        "/times/stop",
+        "/times/count",
+    }
+    assert "did you mean start?" in text
+    assert faults_of(vs.compare, body, [0, "x", "y"], "dop")[0] == {
+        "/times/1",
+        "/times/2",
+        "/method",
+    }
+
+
+BAD_PROBLEM = {"system": "veselova", "A": [-1, 2, "x"], "q": [1, 0], "q_dot": [0, 1, 0]}
+OF_PROBLEM = {"/problem/A/0", "/problem/A/2", "/problem/q"}
+
+#: Kind of request, its body, and the places of its faults.
+BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
+    "trajectory": (
+        TrajectoryRequest,
+        solve_request,
+        {
+            "problem": {**BAD_PROBLEM, "normalise": True},
+            "times": [0, "x"],
+            "engine": "analytc",
+            "methd": "theta",
+            "budget_s": -1,
+            "outputs": ["qq", 7],
+        },
+        OF_PROBLEM
+        | {"/problem/normalise", "/times/1", "/engine", "/methd", "/budget_s"}
+        | {"/outputs/0", "/outputs/1"},
+    ),
+    "trajectory-missing": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": {"system": "veselova", "q": [1, 0], "q_dot": [0, "v"]}, "digits": 5},
+        {"/problem/A", "/problem/q_dot/1", "/times", "/digits"},
+    ),
+    "trajectory-system": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": {"system": "veslova"}, "times": ["x"], "certified": 1},
+        {"/problem/system", "/times/0", "/certified"},
+    ),
+    "trajectory-plain": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": BAD_PROBLEM, "times": [0, "x"]},
+        OF_PROBLEM | {"/times/1"},
+    ),
+    "trajectory-many-times": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": BAD_PROBLEM, "times": [*range(3000), "x"], "method": "dop853"},
+        OF_PROBLEM | {"/times/3000", "/method"},
+    ),
+    "trajectory-digits": (
+        TrajectoryRequest,
+        solve_request,
+        {
+            "problem": {
+                "system": "euler-poisson",
+                "inertia": [1, 2, 0],
+                "gamma": [1, 0, 0],
+                "Omega": 3,
+            },
+            "times": [0],
+            "digits": 30,
+        },
+        {"/digits", "/problem/inertia/2", "/problem/Omega"},
+    ),
+    "comparison": (
+        ComparisonRequest,
+        compare_request,
+        {"problem": BAD_PROBLEM, "times": [0, "x"]},
+        OF_PROBLEM | {"/times/1"},
+    ),
+    "comparison-options": (
+        ComparisonRequest,
+        compare_request,
+        {
+            "problem": BAD_PROBLEM,
+            "times": {"start": 0, "stop": "x", "count": 5000},
+            "method": "dop",
+            "digits": 20,
+        },
+        OF_PROBLEM | {"/times/stop", "/method", "/digits"},
+    ),
+    "torus": (TorusRequest, torus_request, {"problem": BAD_PROBLEM}, OF_PROBLEM),
+    "torus-fields": (
+        TorusRequest,
+        torus_request,
+        {"problem": {**BAD_PROBLEM, "fram": None}, "budget_s": "x", "times": [0]},
+        OF_PROBLEM | {"/problem/fram", "/budget_s", "/times"},
+    ),
+    "sweep": (
+        SweepRequest,
+        None,
+        {
+            "problem": BAD_PROBLEM,
+            "vary": {"/A/9": [1], "/q_dot/0": {"start": "z", "stop": 1, "count": 0}},
+            "times": [0, "x"],
+            "method": "dop",
+            "samples": 0,
+        },
+        OF_PROBLEM
+        | {"/vary/~1A~19", "/vary/~1q_dot~10/start", "/vary/~1q_dot~10/count"}
+        | {"/times/1", "/method", "/samples"},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BODIES)
+def test_a_request_reports_all_faults_of_its_body(case: str) -> None:
+    model, compute, body, places = BODIES[case]
+
+    def door() -> None:
+        request = read_request(model, body)
+        assert compute is not None
+        compute(request)
+
+    found, _ = faults_of(door)
+    assert found == places
+
+
+@pytest.mark.parametrize("case", ["trajectory", "trajectory-plain", "comparison", "torus", "sweep"])
+def test_the_service_reports_them_all(server: Server, case: str) -> None:
+    path = {"trajectory": "trajectories", "comparison": "comparisons", "torus": "tori"}.get(
+        case.partition("-")[0], "sweeps"
+    )
+    response = server.ask("POST", f"/v1/{path}", json=BODIES[case][2])
+    assert response.status_code == 422
+    assert {fault["pointer"] for fault in response.json()["errors"]} == BODIES[case][3]
+
+
+def test_limits_of_the_server_come_with_the_other_faults(server: Server) -> None:
+    body = {**BODIES["trajectory-plain"][2], "budget_s": 1e9}
+    response = server.ask("POST", "/v1/trajectories", json=body)
+    found = {fault["pointer"] for fault in response.json()["errors"]}
+    assert found == OF_PROBLEM | {"/times/1", "/budget_s"}
+
+
+def test_the_command_line_reports_them_all(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    path = tmp_path / "request.json"
+    path.write_text(json.dumps(BODIES["trajectory"][2]))
+    monkeypatch.setattr("sys.argv", ["veselova", "solve", str(path)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    text = capsys.readouterr().err
+    for place in ("problem.A[0]", "problem.A[2]", "problem.q:", "times[1]", "engine", "budget_s"):
+        assert place in text
+
+
+def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
+    with pytest.raises(InvalidInput) as raised:
+        vs.solve(vs.Veselova([2, 1], [1, 0], [0, 1]), ["x"] * 250)
+    document = problem_document(raised.value)
+    assert len(document["errors"]) == 100
+    assert document["further_errors"] == 150
