@@ -112,7 +112,7 @@ CHAPTERS = {
         "curve": {"arithmetic", "numerics", "spectrum"},
         "attitude": {"arithmetic", "curve", "spectrum"},
         "theta": {"arithmetic", "attitude", "curve"},
-        "time_map": {"arithmetic", "curve", "numerics", "spectrum"},
+        "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
         "dense_output": {"arithmetic", "numerics", "time_map"},
         "motion": {
             "arithmetic",

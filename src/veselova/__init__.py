@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
     from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
+    from veselova.mechanics.systems.rubber_ball import RubberBall as RubberBall
     from veselova.mechanics.systems.separable_veselova import SeparableVeselova as SeparableVeselova
     from veselova.mechanics.systems.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.systems.veselova import Veselova as Veselova
@@ -66,6 +67,7 @@ _HOMES = {
     "NeumannSystem": "veselova.mechanics.systems.neumann",
     "ProblemResponse": "veselova.mechanics.core.errors",
     "Provenance": "veselova.mechanics.results.provenance",
+    "RubberBall": "veselova.mechanics.systems.rubber_ball",
     "SeparableVeselova": "veselova.mechanics.systems.separable_veselova",
     "ServiceError": "veselova.mechanics.core.errors",
     "ServiceUnreachable": "veselova.mechanics.core.errors",

@@ -21,10 +21,12 @@ from veselova.mechanics.systems.torus_problem import on_torus
 if TYPE_CHECKING:
     from veselova.analytic.motion.torus_solution import Solution
     from veselova.mechanics.results.closed_form import ClosedForm
+    from veselova.mechanics.results.drift import Drift
     from veselova.mechanics.results.torus import Torus
+    from veselova.mechanics.systems.rubber_ball import RubberBall
     from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["ENGINES", "Prepared", "closed_form", "compare", "from_torus", "solve", "torus"]
+__all__ = ["ENGINES", "Prepared", "closed_form", "compare", "drift", "from_torus", "solve", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {
@@ -239,6 +241,13 @@ def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     return closed_form_of(problem, accuracy)
+
+
+def drift(problem: RubberBall) -> Drift:
+    """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
+    from veselova.analytic.motion.mean_drift import drift as drift_of
+
+    return drift_of(problem)
 
 
 def torus(problem: Problem) -> Torus:

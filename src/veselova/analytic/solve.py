@@ -23,6 +23,7 @@ from veselova.mechanics.core.errors import InvalidInput, Unsolved, show, unknown
 from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
@@ -35,7 +36,8 @@ Array = NDArray[np.float64]
 #: roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
 
-#: The series that states are, along the principal axes; the last may be left to the problem.
+#: The series that states are, along the principal axes; the last may be left to the problem. A
+#: displacement follows them.
 _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 
 
@@ -108,8 +110,13 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
     """Raise InvalidInput where more than doubles are asked for along axes that are known in double
     precision.
     """
+    field = "digits" if digits > FEWEST_DIGITS else "certified"
+    if isinstance(problem, RubberBall) and beyond_double(digits, certified):
+        given = str(digits) if field == "digits" else "true"
+        required = f"{FEWEST_DIGITS}, not certified, for the contact point (the attitude alone has "
+        required += "more: system veselova-so3 with inertia I + ma²)"
+        raise InvalidInput((field,), required, given)
     if problem.axes is not None and beyond_double(digits, certified):
-        field = "digits" if digits > FEWEST_DIGITS else "certified"
         required = "inertia as 3 principal moments (those of a matrix are no exact numbers)"
         raise InvalidInput((field,), required, "inertia as a matrix")
 
@@ -207,7 +214,8 @@ class _TorusMotion(Motion[TorusProblem]):
             apart, on_the_way = self._departure.at(grid.doubles)
             apart = self.problem.bound({"frame": along.series[1]}, apart)
             error = np.maximum(error, on_the_way) + apart
-        self.problem.require_digit(grid.doubles, error, self._cause)
+        sizes = _lengths(along.series[-1]) if evaluator.rolls else 1.0
+        self.problem.require_digit(grid.doubles, error / sizes, self._cause)
         solution = evaluator.solution
         details = {
             "regime": solution.regime,
@@ -220,8 +228,10 @@ class _TorusMotion(Motion[TorusProblem]):
             "theta_terms": evaluator.terms,
         }
         states = (np.multiply(along.tau1, solution.tau1_unit, out=along.tau1), *along.series)
+        last = ("displacement",) if evaluator.rolls else ()
+        names = (*_SERIES[: len(states) - len(last)], *last)
         return (
-            self.problem.complete(dict(zip(_SERIES, states, strict=False))),
+            self.problem.complete(dict(zip(names, states, strict=True))),
             error,
             evaluator.method,
             details,
@@ -231,8 +241,8 @@ class _TorusMotion(Motion[TorusProblem]):
 def _with_neighbours(
     evaluators: Sequence[Evaluator], time_map: str | None, instants: Array
 ) -> tuple[list[Array], Array]:
-    """Return the frames of a motion and its neighbours at increasing times, and the error of the
-    first, by its sensitivities at these times.
+    """Return the frames of a motion and its neighbours at increasing times, below them the
+    displacements of a ball, and the error of the first, by its sensitivities at these times.
     """
     grid = TimeGrid.of(instants)
     local = [instants.size, *(0 for _ in evaluators[1:])]
@@ -241,4 +251,15 @@ def _with_neighbours(
         plan = evaluator.plan(grid, time_map)
         made = plan.make_time_map(evaluator.solution)
         found.append(evaluator.evaluate(plan, made, most_local))
-    return [samples.series[1] for samples, _ in found], found[0][1]
+    frames = [samples.series[1] for samples, _ in found]
+    if evaluators[0].rolls:
+        for k, (samples, _) in enumerate(found):
+            row = np.zeros((instants.size, 1, frames[k].shape[2]))
+            row[:, 0, 1:] = samples.series[-1]
+            frames[k] = np.concatenate([frames[k], row], axis=1)
+    return frames, found[0][1]
+
+
+def _lengths(displacement: Array) -> Array:
+    """Return the largest component at each time, at least one."""
+    return np.asarray(np.maximum(1.0, np.max(np.abs(displacement), axis=1)))

@@ -98,6 +98,13 @@ class Frame:
             first += len(psi)
         return parts
 
+    def roots(self, psi: Values) -> tuple[Values, Values]:
+        """Return √|λ_s−b_i| at angles (N, g), shape (g, 2g+1, N), one where b_i ends cut s, and
+        there the signed roots, (2g+1, N).
+        """
+        point = _Point(self, psi)
+        return point.roots, point.own_roots
+
     @cached_property
     def half_periods(self) -> Values:
         """Return ν ∈ {0, 1}^g, (2^g, g): at the angles πν, the half periods z = ½ν, every λ_s is a

@@ -15,10 +15,13 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
+from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
 from veselova.version import __version__
 
@@ -66,6 +69,9 @@ def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
         **_time_map(solution, accuracy),
         "error": _error(solution, accuracy),
     }
+    if isinstance(given, RubberBall):
+        parts |= {"path": _path(solution, given, accuracy)}
+        parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
     return ClosedForm({**head, **parts, "problem": given.as_dict()})
 
 
@@ -165,6 +171,35 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     return modes[selected], [
         round(float(value), place) for value, place in zip(values, places, strict=True)
     ]
+
+
+def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, Any]:
+    """Return the contact point: the speed along the momentum, and the modes across it that the
+    accuracy asks for, largest first.
+    """
+    assert isinstance(solution.problem, RollingVeselova)
+    transverse = []
+    for k in range(1, solution.curve.genus):
+        component = NormalComponent.of(solution.frame, solution.inversion, k)
+        series = find_series(component)
+        pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
+        effects = 2 * np.abs(series.coefficients) / (np.pi * np.maximum(pace, 1e-300))
+        order = np.argsort(-effects)
+        left_out = np.cumsum(effects[order][::-1])[::-1]
+        selected = order[left_out > accuracy / 4]
+        transverse.append(
+            {
+                "modes": series.orders[selected].tolist(),
+                "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),
+                "turn": -0.25 if component.is_odd else 0,
+            }
+        )
+    return {
+        "radius": float(ball.ball.radius),
+        "position": [float(x) for x in ball.ball.contact],
+        "speed": solution.problem.speed,
+        "transverse": transverse,
+    }
 
 
 def _reduction(solution: Solution) -> dict[str, Any] | None:

@@ -14,6 +14,7 @@ from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, comb
 from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.transverse_path import TransversePath
 
 __all__ = ["ErrorBound"]
 
@@ -93,6 +94,12 @@ class ErrorBound:
             result = combine_bounds(result, local)
         return self._to_axes(result)
 
+    def of_path(self, plan: EvaluationPlan, samples: Samples, path: TransversePath) -> Array:
+        """Return the bound of y_2 … y_{n−1} at each time, (N,): |q'| ≤ 1 in these units."""
+        rounding = _rate_rounding(plan)
+        of_phases = path.error(samples.tau1, self._of_start, rounding * self._frequencies)
+        return self._moved(plan, samples).along_flow + of_phases + _EPSILON
+
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.
 
@@ -101,7 +108,7 @@ class ErrorBound:
         """
         tau1 = samples.tau1
         solution = self.solution
-        rounding = _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
+        rounding = _rate_rounding(plan)
         of_map, drift = samples.time_map.error(tau1, self._of_start, rounding * self._frequencies)
         lag = np.abs(plan.times / solution.mean_rate)
         lag *= rounding + drift
@@ -184,6 +191,10 @@ class _Moved:
     lag: Array
     along_flow: Array
     frequencies: Array
+
+
+def _rate_rounding(plan: EvaluationPlan) -> float:
+    return _GUARDED_RATE if plan.is_guarded else _RATE * _EPSILON
 
 
 def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:

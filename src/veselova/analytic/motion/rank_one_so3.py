@@ -13,6 +13,7 @@ import numpy as np
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Decimals, Later, Pair
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["motion_of_body"]
@@ -24,12 +25,18 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
     """
     frame = point.series("frame")
     series = {"Omega": np.cross(point.series("q_dot"), frame[:, :, 0]), "frame": frame}
+    error = point.error
+    if isinstance(problem, RubberBall):
+        rolled = float(problem.ball.radius) * point.series("displacement")
+        series["position"] = problem.start["position"] - rolled
+        lost = np.finfo(float).eps * np.max(np.abs(series["position"]), axis=1)
+        error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     decimals = None if point.decimals is None else _decimals(problem, point.decimals)
     return Trajectory(
         problem,
         point.times,
-        point.error,
+        error,
         series,
         point.provenance,
         dense,

@@ -28,7 +28,13 @@ from veselova.analytic.time_map.fourier_modes import Integers, find_significant_
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TimeMap, TorusRate
 
-__all__ = ["ColumnsForModes", "FourierTimeMap", "find_modes"]
+__all__ = [
+    "COLUMN_ROUNDING",
+    "ColumnsForModes",
+    "FourierTimeMap",
+    "find_modes",
+    "with_slow_phases",
+]
 
 Array = NDArray[np.float64]
 
@@ -39,7 +45,7 @@ _SMALLEST_MODE = 4e-16
 
 #: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is
 #: hardly ever exceeded.
-_COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
+COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 
 #: Radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
 _SPARE_PACE = 16
@@ -86,7 +92,7 @@ class FourierTimeMap(TimeMap):
         #: How far modes move τ₁ with each phase at the start, in a unit of time.
         self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
         at_edge = in_tau1.rates_of(edge)
-        self._modes, slow = _with_slow_phases(
+        self._modes, slow = with_slow_phases(
             modes, self._pull.max(axis=1, initial=0.0), in_tau1.rates
         )
         if len(slow):
@@ -271,7 +277,7 @@ class _Sum:
         return result.T
 
 
-def _with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
+def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
     """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
 
     ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
@@ -302,7 +308,7 @@ def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
         return (
             weights.T,
             angles,
-            _COLUMN_ROUNDING * float(np.linalg.norm(weights)),
+            COLUMN_ROUNDING * float(np.linalg.norm(weights)),
             np.abs(angles).max(axis=1),
         )
 

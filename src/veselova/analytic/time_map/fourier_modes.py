@@ -24,6 +24,9 @@ def find_significant_modes(
     genus: int,
     coefficients: Callable[[Integers], tuple[Any, NDArray[np.bool_]]],
     most: int = _MOST_MODES,
+    *,
+    origin: Integers | None = None,
+    stride: int = 1,
 ) -> tuple[Integers, NDArray[Any], Integers]:
     """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, these, and
     the modes next to them.
@@ -33,13 +36,15 @@ def find_significant_modes(
     convex body, so the set is convex up to its edge: it is grown from zero through neighbours, in
     whichever directions it reaches far. Where A's nearly coincide so do rates of phases, and modes
     e_s − e_{s+1} are slow. Averages over fast phases are constant to first order, so sets Σm = 0
-    and 2 may be empty where Σm = 1 reaches far: such differences lead to neighbours too. Raises
-    Unsolved where more than ``most`` have been looked at.
+    and 2 may be empty where Σm = 1 reaches far: such differences lead to neighbours too. Modes are
+    ``origin``, zero where none is given, plus multiples of ``stride``: half-integers doubled, say.
+    Raises Unsolved where more than ``most`` have been looked at.
     """
     units = np.eye(genus, dtype=np.int64)
     steps = np.concatenate([units, -units, np.diff(units, axis=0), -np.diff(units, axis=0)])
+    steps *= stride
     none = np.empty((0, genus), dtype=np.int64)
-    layer = np.zeros((1, genus), dtype=np.int64)
+    layer = np.zeros((1, genus), dtype=np.int64) if origin is None else origin[None, :]
     looked_at = 1
     before = none
     refused = none

@@ -17,7 +17,7 @@ from veselova.mechanics.flows.collision import SingularFlow
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
 
-__all__ = ["RigidBodyFlow", "angular_velocity", "momentum"]
+__all__ = ["RigidBodyFlow", "angular_velocity", "cross", "momentum"]
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class RigidBodyFlow(SingularFlow):
             )
         else:
             Omega = state[:3]
-            torque = _cross(ops.dot(inertia, Omega), Omega)
+            torque = cross(ops.dot(inertia, Omega), Omega)
             torque = torque + self._torque(gamma, parameters, ops) if self.potential else torque
             if self.constrained:
                 torque = torque - (ops.dot(torque, across) / ops.dot(gamma, across)) * gamma
@@ -105,7 +105,7 @@ class RigidBodyFlow(SingularFlow):
         """Return γ×∂V/∂γ."""
         exponents, _, components = self.potential.slopes
         terms = parameters[18:] * monomials(exponents, gamma)
-        return _cross(gamma, ops.dot(components, terms))
+        return cross(gamma, ops.dot(components, terms))
 
     def project(self, state: Array) -> Array:
         """Return states (..., 12) with orthonormal frames; where they hold Ω, also with the
@@ -247,7 +247,8 @@ def _frames(states: Array) -> Array:
     return states[..., 3:].reshape(*states.shape[:-1], 3, 3)
 
 
-def _cross(a: Any, b: Any) -> Any:
+def cross(a: Any, b: Any) -> Any:
+    """Return a×b of floats or symbols."""
     a1, a2, a3 = a
     b1, b2, b3 = b
     return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1], dtype=a.dtype)

@@ -56,7 +56,40 @@ def evaluate(
     rate = document["rate"]
     place = int(rate["characteristic"])
     slope = float(rate["constant"]) * np.abs(quotients[:, place]) ** int(rate["power"])
-    return _series(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
+    series = _series(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
+    if "path" not in document:
+        return series
+    elapsed = times if remainders is None else times + remainders
+    return {**series, "position": _contact_point(document["path"], arrays, tau1, z, elapsed)}
+
+
+def _contact_point(
+    path: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array, times: Array
+) -> Array:
+    """Return x(0) − a ℜᵀ(y_2, …, y_g, y_γ), y_k the integral of (q',n_k) over τ₁, y_γ = speed·t.
+
+    A mode of y_k is c/(π m·f) [sin 2π(m·z + turn) − sin 2π(m·z⁰ + turn)], m = M/2. It is made as a
+    product, so that nothing cancels where m·f is small.
+    """
+    start = arrays["phases"]
+    columns = []
+    for series in path["transverse"]:
+        modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
+        pace = np.pi * (modes @ arrays["frequencies"])
+        weights = 2 * np.array(series["coefficients"], dtype=np.float64) / pace
+        offset = 2 * np.pi * (modes @ start + float(series["turn"]))
+        column = np.empty(len(z))
+        for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
+            h = np.pi * ((z[rows] - start) @ modes.T)
+            near = np.abs(tau1[rows, None] * pace) < 1
+            h = np.where(near, tau1[rows, None] * pace, h)
+            column[rows] = (np.cos(offset + h) * np.sin(h)) @ weights
+        columns.append(column)
+    y = np.stack([*columns, float(path["speed"]) * times], axis=1)
+    return np.asarray(
+        np.array(path["position"], dtype=np.float64)
+        - float(path["radius"]) * (y @ arrays["rotation"])
+    )
 
 
 def _series(
@@ -77,7 +110,7 @@ def _series(
         q = frame[:, :, 0]
     if document["problem"]["system"] == "neumann":
         return {"q": q, "q_prime": velocity, "frame": frame}
-    if document["problem"]["system"] == "veselova-so3":
+    if document["problem"]["system"] in ("veselova-so3", "rubber-ball"):
         return {"gamma": q, "Omega": np.cross(velocity, q), "frame": frame}
     return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
 

@@ -108,13 +108,43 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     ),
 }
 
+#: Fields of some documents only.
+_FURTHER: dict[str, tuple[dict[str, Any], str]] = {
+    "path": (
+        {
+            "type": "object",
+            "required": ["radius", "position", "speed", "transverse"],
+            "properties": {
+                "radius": _NUMBER,
+                "position": _VECTOR,
+                "speed": _NUMBER,
+                "transverse": {
+                    "type": "array",
+                    "items": {
+                        "type": "object",
+                        "required": ["modes", "coefficients", "turn"],
+                        "properties": {
+                            "modes": {"type": "array", "items": _INTEGERS},
+                            "coefficients": _VECTOR,
+                            "turn": {"enum": [0, -0.25]},
+                        },
+                    },
+                },
+            },
+        },
+        "the contact point of a rolling ball: radius, start, speed along the momentum, and for k = "
+        "2 … g the doubled modes M and coefficients of (q', n_k) = Σ 2c cos 2π(M·z/2 + turn)",
+    ),
+}
+
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "title": "A motion in closed form",
     "type": "object",
     "required": list(_FIELDS),
     "properties": {
-        name: {**schema, "description": text} for name, (schema, text) in _FIELDS.items()
+        name: {**schema, "description": text}
+        for name, (schema, text) in {**_FIELDS, **_FURTHER}.items()
     },
 }
 
@@ -175,6 +205,8 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     _require_numbers(("mean_rate",), document["mean_rate"], ())
     if document["axes"] is not None:
         _require_numbers(("axes",), document["axes"], (n, n))
+    if "path" in document:
+        _require_path(document["path"], g, n)
     least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
     if not least > 0:
         raise InvalidInput(
@@ -203,6 +235,26 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         raise InvalidInput(
             ("document", "rate", "characteristic"), f"an index below {functions}", show(place)
         )
+
+
+def _require_path(path: Any, g: int, n: int) -> None:
+    """Raise InvalidInput unless the path has numbers and g − 1 series."""
+    if not isinstance(path, Mapping) or not isinstance(path.get("transverse"), list):
+        raise InvalidInput(("document", "path"), "an object with a list of series", show(path))
+    for name in ("radius", "speed"):
+        _require_numbers(("path", name), path.get(name), ())
+    _require_numbers(("path", "position"), path.get("position"), (n - 1,))
+    if len(path["transverse"]) != g - 1:
+        required = f"a list of {g - 1} series"
+        raise InvalidInput(("document", "path", "transverse"), required, show(path["transverse"]))
+    for k, series in enumerate(path["transverse"]):
+        where = ("path", "transverse", k)
+        if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
+            raise InvalidInput(("document", *where), "an object with modes", show(series))
+        count = len(series["modes"])
+        _require_numbers((*where, "modes"), series["modes"], (count, g))
+        _require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
+        _require_numbers((*where, "turn"), series.get("turn"), ())
 
 
 def _require_reduction(reduction: Any, g: int) -> None:

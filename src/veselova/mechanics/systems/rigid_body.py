@@ -55,7 +55,7 @@ class RigidBody(Problem):
         · potential  V(γ)
     linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
     exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the
-        frame None for the natural one
+        frame None for the natural one · exact_inertia  moments or matrix, as given
     """
 
     moments: tuple[Fraction, ...]
@@ -70,6 +70,7 @@ class RigidBody(Problem):
     exact_gamma: tuple[Fraction, ...]
     exact_Omega: tuple[Fraction, ...]
     exact_frame: tuple[tuple[Fraction, ...], ...] | None
+    exact_inertia: Any
     given: Mapping[str, Any]
 
     #: Whether a multiplier keeps (Ω,γ) constant.
@@ -119,6 +120,7 @@ class RigidBody(Problem):
         )
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
+        self._set(exact_inertia=inertia)
         given = given_arguments(
             inertia=inertia,
             gamma=gamma,

@@ -79,6 +79,8 @@ class VeselovaSO3(RigidBody):
     has_tori: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
     constrained: ClassVar[bool] = True
+    #: What ``rank_one`` makes.
+    rank_one_class: ClassVar[type[Veselova]] = Veselova
 
     def __init__(
         self,
@@ -212,12 +214,12 @@ class VeselovaSO3(RigidBody):
         A: Any = (
             [1 / moment for moment in self.moments]
             if exact
-            else exact_inverse(symmetric_matrix(self.given["inertia"]))
+            else exact_inverse(symmetric_matrix(self.exact_inertia))
         )
         gamma = self.exact_gamma
         length = inverse_length(self.exact_gamma, bits)
         velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
-        return Veselova(A, gamma, velocity, self.exact_frame, normalize=True)
+        return self.rank_one_class(A, gamma, velocity, self.exact_frame, normalize=True)
 
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that γ is in time τ₁, dτ₁ = √(2h det𝓘⁻¹/(𝓘⁻¹γ,γ)) dt (Theorem

@@ -8,173 +8,44 @@ input with the same sentence.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import Field
 
-from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson
 from veselova.mechanics.systems.lr_system import LRSystem
 from veselova.mechanics.systems.neumann import NeumannSystem
+from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.stiefel import StiefelFlow
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
+from veselova.service.api.problem_fields import (
+    NUMBER,
+    Attitude,
+    BodyInertia,
+    Columns,
+    Frame,
+    Inertia,
+    InertiaOperator,
+    Matrix,
+    Number,
+    Pair,
+    Potential,
+    PotentialData,
+    Request,
+    SeparableData,
+    SystemModel,
+    Tensor,
+    Times,
+    Triple,
+    Vector,
+    Whole,
+)
 
 __all__ = ["NUMBER", "SYSTEMS", "ProblemModel", "Request", "Times"]
-
-NUMBER = {
-    "anyOf": [
-        {"type": "number"},
-        {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)[\d./eE+ -]*$", "maxLength": 2100},
-    ],
-    "description": 'A finite number; as a string ("0.7", "7/10") it is taken exactly.',
-}
-_VECTOR = {"type": "array", "items": NUMBER, "minItems": 2}
-_MATRIX = {"type": "array", "items": _VECTOR, "minItems": 2}
-_UNIFORM = {
-    "type": "object",
-    "properties": {"start": NUMBER, "stop": NUMBER, "count": {"type": "integer", "minimum": 1}},
-    "required": ["start", "stop", "count"],
-    "additionalProperties": False,
-}
-_WHOLE = {"type": "integer", "minimum": 1}
-_INERTIA_OPERATOR = {
-    "anyOf": [
-        {
-            "type": "object",
-            "properties": {name: schema},
-            "required": [name],
-            "additionalProperties": False,
-        }
-        for name, schema in (
-            (
-                "special",
-                {
-                    **_VECTOR,
-                    "description": "A_1 … A_n > 0 of (4.5): 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j",
-                },
-            ),
-            (
-                "matrix",
-                {"type": "array", "items": {"type": "array", "items": NUMBER}, "minItems": 1},
-            ),
-        )
-    ],
-}
-_MONOMIAL = {
-    "type": "object",
-    "properties": {
-        "coefficient": NUMBER,
-        "powers": {
-            "type": "array",
-            "items": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
-        },
-    },
-    "required": ["coefficient", "powers"],
-    "additionalProperties": False,
-    "description": "c Π g_ij^p for powers [[i, j, p], …], i and j from 1",
-}
-_TIMES = {"anyOf": [{"type": "array", "items": NUMBER, "minItems": 1}, _UNIFORM]}
-
-_TRIPLE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-_SQUARE = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
-_TERM = {
-    "type": "object",
-    "properties": {
-        "coefficient": NUMBER,
-        "powers": {"type": "array", "items": {"type": "integer"}, "minItems": 3, "maxItems": 3},
-    },
-    "required": ["coefficient", "powers"],
-    "additionalProperties": False,
-}
-_POTENTIAL = {
-    "type": "object",
-    "properties": {
-        "clebsch": NUMBER,
-        "family": {"type": "array", "items": NUMBER, "minItems": 5, "maxItems": 5},
-        "polynomial": {"type": "array", "items": _TERM, "minItems": 1},
-        "companion": {"type": "array", "items": _TERM, "minItems": 1},
-    },
-    "minProperties": 1,
-    "additionalProperties": False,
-}
-_SEPARABLE = {
-    "type": "object",
-    "properties": {"quartic": NUMBER, "quadratic": NUMBER, "centrifugal": _VECTOR},
-    "minProperties": 1,
-    "additionalProperties": False,
-}
-_COLUMNS = {
-    "type": "array",
-    "items": {"type": "array", "items": NUMBER, "minItems": 1},
-    "minItems": 2,
-}
-_BODY_INERTIA = {
-    "anyOf": [
-        {
-            "type": "object",
-            "properties": {name: form},
-            "required": [name],
-            "additionalProperties": False,
-        }
-        for name, form in (("special", _VECTOR), ("matrix", _COLUMNS))
-    ]
-}
-
-Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
-Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
-Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
-Triple = Annotated[Any, WithJsonSchema(_TRIPLE)]
-Tensor = Annotated[Any, WithJsonSchema({"anyOf": [_TRIPLE, _SQUARE]})]
-Attitude = Annotated[Any, WithJsonSchema({"anyOf": [_SQUARE, {"type": "null"}]})]
-PotentialData = Annotated[Any, WithJsonSchema({"anyOf": [_POTENTIAL, {"type": "null"}]})]
-Columns = Annotated[Any, WithJsonSchema(_COLUMNS)]
-BodyInertia = Annotated[Any, WithJsonSchema(_BODY_INERTIA)]
-Whole = Annotated[Any, WithJsonSchema(_WHOLE)]
-InertiaOperator = Annotated[Any, WithJsonSchema(_INERTIA_OPERATOR)]
-Matrix = Annotated[Any, WithJsonSchema(_MATRIX)]
-Potential = Annotated[
-    Any,
-    WithJsonSchema(
-        {"anyOf": [{"type": "array", "items": _MONOMIAL, "minItems": 1}, {"type": "null"}]}
-    ),
-]
-SeparableData = Annotated[Any, WithJsonSchema({"anyOf": [_SEPARABLE, {"type": "null"}]})]
-Times = Annotated[Any, WithJsonSchema(_TIMES)]
-
-
-class Request(BaseModel):
-    """What every part of a request is: no field but those stated, no value converted."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class SystemModel(Request):
-    """A problem of one system."""
-
-    #: What the model becomes, and the field that shows its size: a number, or a list with as many
-    #: entries.
-    problem_class: ClassVar[type[Problem]]
-    measured: ClassVar[str]
-
-    system: str
-
-    @property
-    def dimension(self) -> int:
-        """Return how many components a vector of the problem has, before anything is validated."""
-        value = getattr(self, self.measured)
-        return value if isinstance(value, int) else len(value) if isinstance(value, list) else 0
-
-    def problem(self) -> Problem:
-        """Return the problem; raises InvalidInput located below ``problem``."""
-        fields = {name: getattr(self, name) for name in type(self).model_fields if name != "system"}
-        try:
-            return self.problem_class(**fields)
-        except InvalidInput as error:
-            raise error.below("problem") from None
 
 
 class VeselovaModel(SystemModel):
@@ -283,6 +154,45 @@ class EulerPoissonModel(RigidBodyModel):
     system: Literal["euler-poisson"]
 
 
+class BallModel(SystemModel):
+    """A ball on a horizontal plane and its state at t = 0."""
+
+    measured: ClassVar[str] = "inertia"
+
+    inertia: Annotated[
+        Tensor,
+        Field(
+            description="inertia about the centre: 3 positive principal moments, or a symmetric "
+            "positive definite 3 × 3 matrix"
+        ),
+    ]
+    mass: Annotated[Number, Field(description="mass, greater than 0")]
+    radius: Annotated[Number, Field(description="radius, greater than 0")]
+    gamma: Annotated[
+        Triple, Field(description="unit normal e_1 = γ of the plane, upwards, seen from the body")
+    ]
+    Omega: Annotated[Triple, Field(description="angular velocity in the body")]
+    frame: Annotated[
+        Attitude,
+        Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out"),
+    ] = None
+    position: Annotated[
+        Pair, Field(description="contact point at t = 0, along e_2 and e_3; zero when left out")
+    ] = (0, 0)
+    strict: Annotated[
+        bool, Field(description="refuse moments that violate the triangle inequalities")
+    ] = True
+    normalize: Annotated[bool, Field(description="scale gamma to unit length first")] = False
+
+
+class RubberBallModel(BallModel):
+    """A ball that rolls on a plane without slipping, (Ω,γ) = const, zero for no twist."""
+
+    problem_class: ClassVar[type[Problem]] = RubberBall
+
+    system: Literal["rubber-ball"]
+
+
 class StiefelModel(SystemModel):
     """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the
     constraints of rank r.
@@ -381,6 +291,7 @@ SYSTEMS: Mapping[str, type[SystemModel]] = {
     "neumann": NeumannModel,
     "ellipsoid-geodesic": EllipsoidGeodesicModel,
     "veselova-so3": VeselovaSO3Model,
+    "rubber-ball": RubberBallModel,
     "stiefel": StiefelModel,
     "euler-poisson": EulerPoissonModel,
     "lr": LRModel,
@@ -392,6 +303,7 @@ ProblemModel = Annotated[
     | NeumannModel
     | EllipsoidGeodesicModel
     | VeselovaSO3Model
+    | RubberBallModel
     | StiefelModel
     | EulerPoissonModel
     | LRModel

@@ -1,0 +1,109 @@
+"""The path of a rolling ball across its momentum, y_k = ∫(q',n_k)dτ₁, by Fourier series or on
+panels, as its time map is.
+
+Along γ of the natural frame the motion is uniform. ``RollingVeselova`` says how both make the path.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.time_map.chebyshev_panels import Panels
+from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
+from veselova.analytic.time_map.torus_series import NormalComponent, SeriesIntegral, find_series
+
+__all__ = ["FourierPath", "PanelPath", "TransversePath"]
+
+Array = NDArray[np.float64]
+
+#: By how much farther panels go than they are asked for.
+_FARTHER = 1.25
+
+
+class TransversePath(Protocol):
+    """y_2 … y_{n−1} along one orbit."""
+
+    def at(self, tau1: Array, z: Array) -> Array:
+        """Return y at Neumann times (N,) with their phases (N, g), shape (N, g−1)."""
+
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+        """Return a bound on what the path adds to the error of the Neumann times, (N,)."""
+
+
+class FourierPath:
+    """The path by the Fourier series of (q',n_k), at a cost that does not grow with time."""
+
+    def __init__(self, solution: Solution) -> None:
+        self._integrals = [
+            SeriesIntegral(
+                find_series(NormalComponent.of(solution.frame, solution.inversion, k)),
+                solution.in_tau1,
+            )
+            for k in range(1, solution.curve.genus)
+        ]
+
+    def at(self, tau1: Array, z: Array) -> Array:
+        """Return y at Neumann times with their phases."""
+        result = np.empty((tau1.size, len(self._integrals)))
+        for k, integral in enumerate(self._integrals):
+            result[:, k] = integral.at(tau1, z)
+        return result
+
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+        """Return the largest error of the series."""
+        result = np.zeros(tau1.size)
+        for integral in self._integrals:
+            np.maximum(result, integral.error(tau1, of_start, of_rates), out=result)
+        return result
+
+
+class PanelPath:
+    """The path by Chebyshev panels along the orbit; they are extended when times ask for it."""
+
+    def __init__(self, solution: Solution, method: str) -> None:
+        self._solution = solution
+        self._method = method
+        self._known: list[Panels] = []
+
+    def _panels(self, tau1: Array) -> list[Panels]:
+        low = min(0.0, float(np.min(tau1, initial=0.0)))
+        high = max(0.0, float(np.max(tau1, initial=0.0)))
+        if self._known:
+            borders = self._known[0].borders
+            if borders[0] <= low and high <= borders[-1]:
+                return self._known
+            low, high = min(low, float(borders[0])), max(high, float(borders[-1]))
+        self._known = [
+            integrate_on_panels(
+                lambda z, k=k: self._solution.attitude(z, self._method).components[:, k],  # type: ignore[misc]
+                self._solution.in_tau1,
+                _FARTHER * low,
+                _FARTHER * high,
+                1.0,
+            )
+            for k in range(self._solution.curve.genus - 1)
+        ]
+        return self._known
+
+    def at(self, tau1: Array, z: Array) -> Array:
+        """Return y at Neumann times."""
+        result = np.empty((tau1.size, self._solution.curve.genus - 1))
+        for k, panels in enumerate(self._panels(tau1)):
+            result[:, k] = panels.at(tau1)
+        return result
+
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
+        """Return the tails of the panels, and what errors of the phases make over the time
+        elapsed.
+        """
+        slopes = self._solution.sensitivity.by_phase
+        elapsed = np.abs(tau1)
+        phases = float(of_start @ slopes) + float(of_rates @ slopes) * elapsed
+        result = np.zeros(tau1.size)
+        for panels in self._panels(tau1):
+            np.maximum(result, panels.error(tau1), out=result)
+        return np.asarray(result + phases * elapsed)

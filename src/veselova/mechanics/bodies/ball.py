@@ -1,0 +1,127 @@
+"""A ball on a plane: mass, radius, inertia about its centre, and what they make of inertia about
+the contact point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.principal_inertia import principal_inertia, symmetric_matrix
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    exact_vector,
+    is_matrix,
+    require_truth_value,
+    to_float,
+)
+
+__all__ = ["Ball"]
+
+Array = NDArray[np.float64]
+
+#: By what part of the largest moment the triangle inequalities may fail: the rounding of moments
+#: that are given in doubles.
+_ROUNDING = Fraction(1, 10**12)
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball, and where it touches the plane at t = 0, exactly as given.
+
+    inertia   principal moments (3,) about the centre, or the symmetric matrix, (3, 3)
+    mass, radius  positive · contact (2,) the contact point in the plane, along e_2 and e_3
+    """
+
+    inertia: tuple[Any, ...]
+    mass: Fraction
+    radius: Fraction
+    contact: tuple[Fraction, ...]
+
+    @classmethod
+    def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: Any) -> Ball:
+        """Return the ball that is given. Raises InvalidInput, with all faults.
+
+        ``strict``: whether the moments must satisfy the triangle inequalities I_i ≤ I_j + I_k.
+        """
+        faults = Faults()
+        faults.attempt(require_truth_value, strict, "strict")
+        tensor = faults.attempt(_inertia, inertia, strict is not False)
+        exact_mass = faults.attempt(_positive, mass, "mass")
+        exact_radius = faults.attempt(_positive, radius, "radius")
+        contact = faults.attempt(exact_vector, position, ("position",), 2)
+        faults.require_none()
+        assert tensor is not None
+        assert exact_mass is not None
+        assert exact_radius is not None
+        assert contact is not None
+        return cls(tensor, exact_mass, exact_radius, contact)
+
+    @property
+    def added(self) -> Fraction:
+        """Return ma², the moment of the mass at the centre about the contact point."""
+        return self.mass * self.radius**2
+
+    @cached_property
+    def effective(self) -> tuple[Any, ...]:
+        """Return I + ma², as moments or as a matrix."""
+        if not isinstance(self.inertia[0], tuple):
+            return tuple(moment + self.added for moment in self.inertia)
+        return tuple(
+            tuple(x + self.added * (i == j) for j, x in enumerate(row))
+            for i, row in enumerate(self.inertia)
+        )
+
+    @cached_property
+    def tensor(self) -> Array:
+        """Return the inertia about the centre, (3, 3)."""
+        values = to_float(self.inertia)
+        return np.diag(values) if values.ndim == 1 else np.array(values)
+
+    @property
+    def size(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return max(1.0, float(self.radius))
+
+    def velocity(self, Omega: Array, frame: Array) -> Array:
+        """Return the velocity of the contact point and of the centre, a(Ω×γ, e_k), (..., 2)."""
+        across = np.cross(Omega, frame[..., 0]) * float(self.radius)
+        return np.asarray(np.einsum("...i,...ik->...k", across, frame[..., 1:]))
+
+    def force(self, Omega_dot: Array, frame: Array) -> Array:
+        """Return the horizontal force of the plane, ma(Ω̇×γ, e_k): mass times the acceleration of
+        the centre, (..., 2).
+        """
+        return float(self.mass) * self.velocity(Omega_dot, frame)
+
+
+def _positive(value: Any, name: str) -> Fraction:
+    number = exact_number(value, (name,))
+    if number <= 0:
+        raise InvalidInput((name,), "a finite number greater than 0", show(value))
+    return number
+
+
+def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
+    """Return moments or the matrix, exactly; raises InvalidInput unless a body has them."""
+    moments, _ = principal_inertia(given, "inertia")
+    if len(moments) != 3:
+        raise InvalidInput(
+            ("inertia",),
+            "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix",
+            f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}",
+        )
+    first, second, largest = sorted(moments)
+    if strict and largest - first - second > _ROUNDING * largest:
+        raise InvalidInput(
+            ("inertia",),
+            "moments of a body, none larger than the sum of the others (or strict=False)",
+            f"{float(largest):.6g} > {float(first):.6g} + {float(second):.6g}",
+        )
+    return symmetric_matrix(given, "inertia") if is_matrix(given) else moments

@@ -1,0 +1,34 @@
+"""How a rolling ball moves on in the mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Drift"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """The mean velocity of a contact point over all times, along e_2 and e_3.
+
+    velocity (2,) · resonance: the whole numbers M with Σ_s M_s f_s = 0 by which the ball also
+    drifts across the direction of its generic motions; None where there are none
+    """
+
+    velocity: Array
+    resonance: tuple[int, ...] | None = None
+
+    @property
+    def speed(self) -> float:
+        """Return |velocity|."""
+        return float(np.linalg.norm(self.velocity))
+
+    @property
+    def direction(self) -> Array:
+        """Return the unit vector along the velocity, (2,); zero for a ball at rest."""
+        return self.velocity / self.speed if self.speed else np.zeros(2)

@@ -1,0 +1,66 @@
+"""The rank-one problem together with the path of a ball of radius one that rolls by it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+from operator import mul
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.systems.veselova import Veselova
+
+__all__ = ["RollingVeselova"]
+
+Array = NDArray[np.float64]
+
+
+class RollingVeselova(Veselova):
+    """A ``Veselova`` problem whose motions have one series more, the displacement ∫(e_k, q̇) dt for
+    k = 2 … n, (N, n−1).
+
+    A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
+    at x(0) − a times the displacement.
+    """
+
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **Veselova.outputs,
+        "displacement": ("horizontal",),
+    }
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
+
+    @cached_property
+    def exact_square_of_speed(self) -> Fraction:
+        """Return (2h/|p|)², the square of the speed (q̇,γ) along the momentum, exactly.
+
+        2h/|p| = [(Av,v)(AQ,Q) − (AQ,v)²]/|(Q,AQ)Av − (v,AQ)AQ| for a vector Q along q, of any
+        length, and v = q̇.
+        """
+        A, Q, v = self.exact.A, self.exact.q, self.exact.tangent
+        AQ = tuple(map(mul, A, Q))
+        Av = tuple(map(mul, A, v))
+        QAQ = sum(map(mul, AQ, Q))
+        vAQ = sum(map(mul, AQ, v))
+        twice_energy = sum(map(mul, Av, v)) * QAQ - vAQ**2
+        momentum = [QAQ * x - vAQ * y for x, y in zip(Av, AQ, strict=True)]
+        return Fraction(twice_energy**2, sum(x * x for x in momentum))
+
+    @cached_property
+    def speed(self) -> float:
+        """Return 2h/|p|, with which the displacement along γ of the natural frame grows."""
+        return _root(self.exact_square_of_speed) if self.moves else 0.0
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {**super().start, "displacement": np.zeros((1, self.n - 1))}
+
+
+def _root(square: Fraction) -> float:
+    """Return the square root of a positive rational, whose float may be out of range."""
+    shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
+    return float(np.ldexp(np.sqrt(float(square / Fraction(4) ** shift)), shift))

@@ -1,0 +1,172 @@
+"""A ball that rolls on a plane without slipping and without twisting: Veselova's system."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.ball import Ball
+from veselova.mechanics.core.exact_input import given_arguments
+from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.flows.ball_flow import ContactForceFlow, RollingFlow
+from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
+from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.veselova import Veselova
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3, multiplier
+
+if TYPE_CHECKING:
+    from veselova.mechanics.results.drift import Drift
+
+__all__ = ["RubberBall"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class RubberBall(VeselovaSO3):
+    """A ball of mass m and radius a that rolls on a plane without slipping, with constant spin
+    (Ω,γ) about the vertical γ, zero for no twist: ``VeselovaSO3`` with inertia J = I + ma².
+
+    inertia    3 principal moments I about the centre, or a symmetric positive definite 3 × 3 matrix
+    mass, radius  positive numbers
+    gamma      the unit normal e_1 of the plane, from the contact point to the centre, seen from the
+        body, (3,)
+    Omega      the angular velocity in the body, (3,)
+    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ, e_2 and e_3 in the plane; None
+        for the natural frame
+    position   the contact point at t = 0, along e_2 and e_3, (2,)
+    strict     whether moments that no body has, larger than the sum of the others, are refused
+
+    The centre is at distance a above the contact point, and has no offset from the middle of the
+    ball. Outputs: those of ``VeselovaSO3`` for J, and the contact point ``position`` (N, 2), its
+    ``velocity`` a(Ω×γ, e_k), which is that of the centre, and the horizontal ``force`` of the plane
+    on the ball, m times the acceleration of the centre. The vertical force is the weight. The
+    ``multiplier`` λ is the torque λγ that keeps the ball from twisting. ``inertia`` as an attribute
+    is J; ``ball`` has what was given.
+
+    Formulations: those of ``VeselovaSO3`` with the quadrature of the contact point, and
+    ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises InvalidInput, which
+    names the field.
+    """
+
+    ball: Ball
+
+    system: ClassVar[str] = "rubber-ball"
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "Omega": ("axis",),
+        "gamma": ("axis",),
+        "frame": ("axis", "vector"),
+        "position": ("horizontal",),
+        "velocity": ("horizontal",),
+        "force": ("horizontal",),
+        "momentum": ("axis",),
+        "multiplier": (),
+    }
+    derived: ClassVar[tuple[str, ...]] = (
+        "gamma",
+        "velocity",
+        "force",
+        "momentum",
+        "multiplier",
+    )
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
+    rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
+
+    def __init__(
+        self,
+        inertia: Any,
+        mass: Any,
+        radius: Any,
+        gamma: Any,
+        Omega: Any,
+        frame: Any = None,
+        position: Any = (0, 0),
+        *,
+        strict: bool = True,
+        normalize: bool = False,
+    ) -> None:
+        ball = Ball.of(inertia, mass, radius, position, strict)
+        self._set(ball=ball)
+        super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
+        given = given_arguments(
+            inertia=inertia,
+            mass=mass,
+            radius=radius,
+            gamma=gamma,
+            Omega=Omega,
+            frame=frame,
+            position=position,
+            strict=strict,
+            normalize=normalize,
+        )
+        self._set(given=given)
+
+    def __repr__(self) -> str:
+        parts = [
+            f"{name}={np.array2string(np.asarray(value), precision=6)}"
+            for name, value in (
+                ("inertia", self.ball.tensor),
+                ("mass", float(self.ball.mass)),
+                ("radius", float(self.ball.radius)),
+                ("gamma", self.gamma),
+                ("Omega", self.Omega),
+            )
+        ]
+        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        contact = np.array([[float(x) for x in self.ball.contact]])
+        return {**super().start, "position": contact}
+
+    @cached_property
+    def drift(self) -> Drift:
+        """Return the mean velocity of the contact point, its direction, and the resonance if there
+        is one. Raises Unsolved on a separatrix, and where the motion has no closed form.
+        """
+        # By name, as engines are: what solves stands above systems.
+        found: Drift = import_module("veselova.engines").drift(self)
+        return found
+
+    def flow(self, formulation: str = "multiplier") -> Flow:  # type: ignore[override]
+        """Return the field in units of this problem."""
+        contact = self.start["position"][0]
+        radius = float(self.ball.radius)
+        if formulation != "contact-forces":
+            inner: RigidBodyFlow = super().flow(formulation)
+            return RollingFlow(inner, radius, contact, self.ball.size)
+        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+        return ContactForceFlow(
+            inertia=np.ldexp(self.ball.tensor, -power),
+            added=float(np.ldexp(float(self.ball.added), -power)),
+            Omega=self.Omega / self.turning,
+            frame=self.frame,
+            radius=radius,
+            contact=contact,
+            time_unit=1 / self.turning,
+            size=self.ball.size,
+            twists=False,
+        )
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return gamma, velocity, force, momentum or multiplier."""
+        if name not in ("velocity", "force"):
+            return super().derive(name, series)
+        Omega = series["Omega"]
+        frame = series["frame"]
+        if name == "velocity":
+            return self.ball.velocity(Omega, frame)
+        gamma = frame[..., 0]
+        torque = np.cross(Omega @ self.inertia, Omega)
+        torque = torque + multiplier(self, Omega, gamma)[..., None] * gamma
+        return self.ball.force(torque @ self.inverse, frame)

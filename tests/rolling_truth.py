@@ -1,0 +1,69 @@
+"""The ball itself, integrated in space with its contact forces: nothing of it is in the package."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+__all__ = ["RolledBall", "roll"]
+
+#: The vertical.
+_UP = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class RolledBall:
+    """frame (N, 3, 3) columns e_i in the body · position, velocity, force (N, 2)."""
+
+    frame: Any
+    position: Any
+    velocity: Any
+    force: Any
+
+
+def roll(ball: Any, times: Sequence[float], twists: bool = False) -> RolledBall:
+    """Return the motion of a ball from its start, by Newton's and Euler's equations in space.
+
+    Unknowns of each instant: angular and linear acceleration, the force at the contact point, and
+    the torque about the vertical that keeps the ball from twisting, zero where it ``twists``.
+    """
+    inertia = ball.ball.tensor
+    m, a = float(ball.ball.mass), float(ball.ball.radius)
+    attitude = ball.frame.T
+    spin = attitude @ ball.Omega
+    contact = [float(x) for x in ball.ball.contact]
+
+    def accelerations(y: Any) -> Any:
+        R, w = y[:9].reshape(3, 3), y[9:12]
+        tensor = R @ inertia @ R.T
+        M, b = np.zeros((10, 10)), np.zeros(10)
+        M[:3, :3], M[:3, 6:9], M[:3, 9] = tensor, _cross_matrix(a * _UP), -_UP
+        b[:3] = -np.cross(w, tensor @ w)
+        M[3:6, 3:6], M[3:6, 6:9] = m * np.eye(3), -np.eye(3)
+        M[6:9, 3:6], M[6:9, :3] = np.eye(3), a * _cross_matrix(_UP)
+        if twists:
+            M[9, 9] = 1
+        else:
+            M[9, :3] = _UP
+        return np.linalg.solve(M, b)
+
+    def field(_: float, y: Any) -> Any:
+        found = accelerations(y)
+        turned = _cross_matrix(y[9:12]) @ y[:9].reshape(3, 3)
+        return np.concatenate([turned.ravel(), found[:6], y[13:15]])
+
+    start = np.concatenate([attitude.ravel(), spin, a * np.cross(spin, _UP), contact])
+    found = solve_ivp(
+        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
+    ).y.T
+    force = np.array([accelerations(y)[6:9] for y in found])
+    frames = np.swapaxes(found[:, :9].reshape(-1, 3, 3), 1, 2)
+    return RolledBall(frames, found[:, 15:17], found[:, 13:15], force[:, 1:])
+
+
+def _cross_matrix(u: Any) -> Any:
+    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])

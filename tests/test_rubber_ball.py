@@ -1,0 +1,275 @@
+"""The ball that neither slips nor twists: against its own equations, far out, in resonance, at
+every door.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import veselova as vs
+from conftest import Server
+from rolling_truth import roll
+from veselova import InvalidInput, RubberBall, Unsolved
+from veselova.analytic.solve import METHODS, solve
+
+TIMES = np.linspace(0, 20, 9)
+DATA: dict[str, Any] = {
+    "inertia": [1, 1.5, 2],
+    "mass": 0.7,
+    "radius": 0.6,
+    "gamma": [0.6, 0, 0.8],
+    "Omega": [0.8, 1, -0.6],
+}
+
+
+def ball(rng: np.random.Generator, **changes: Any) -> RubberBall:
+    """Return a random ball that does not twist."""
+    gamma, velocity = rng.normal(size=(2, 3))
+    data = {
+        "inertia": rng.uniform(1, 2, size=3).tolist(),
+        "mass": rng.uniform(0.2, 2),
+        "radius": rng.uniform(0.2, 2),
+        "gamma": gamma,
+        "Omega": np.cross(gamma, velocity),
+        "position": rng.normal(size=2).tolist(),
+        "normalize": True,
+    }
+    return RubberBall(**{**data, **changes})
+
+
+def tensor(rng: np.random.Generator) -> Any:
+    """Return an inertia tensor along turned axes."""
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    values = turn @ np.diag([1.0, 1.5, 2.2]) @ turn.T
+    return ((values + values.T) / 2).tolist()
+
+
+def largest(values: Any) -> float:
+    return float(np.max(np.abs(values)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("inertia", [None, [1, 1, 1.5], [1, 1.5, 1.5], [1, 1, 1], "tensor"])
+def test_all_ways_roll_as_the_ball_itself_does(seed: int, inertia: Any) -> None:
+    rng = np.random.default_rng(seed)
+    changes = (
+        {} if inertia is None else {"inertia": tensor(rng) if inertia == "tensor" else inertia}
+    )
+    problem = ball(rng, **changes)
+    true = roll(problem, TIMES)
+    ways = [("analytic", None), *(("numeric", f) for f in RubberBall.formulations)]
+    for engine, formulation in ways:
+        found = vs.solve(problem, TIMES, engine, formulation=formulation)
+        for name, least in (("frame", 1e-11), ("position", 1e-11), ("velocity", 5e-11)):
+            assert largest(getattr(found, name) - getattr(true, name)) < least, (name, formulation)
+        assert largest(found.force - true.force) < 1e-10
+        assert np.all(found.error < 1e-8)
+
+
+@pytest.mark.parametrize("time_map", ["fourier", "panels"])
+@pytest.mark.parametrize("method", METHODS)
+def test_every_route_to_the_path_agrees(time_map: str, method: str) -> None:
+    problem = RubberBall(**DATA, position=(3, -1))
+    times = np.concatenate([[-7.0, 0.0], np.linspace(1, 60, 700)])
+    some, other = (
+        solve(problem, times, time_map=time_map, method=method),
+        vs.solve(problem, times),
+    )
+    assert np.all(
+        np.max(np.abs(some.position - other.position), axis=1) <= some.error + other.error
+    )
+    assert np.array_equal(some.position[1], [3, -1])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_errors_are_honest_and_the_closed_form_document_holds_the_path(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = ball(rng)
+    times = np.sort(rng.uniform(-60, 60, size=5))
+    found, other = vs.solve(problem, times), vs.solve(problem, times, "numeric")
+    written = vs.ClosedForm.from_json(vs.closed_form(problem).to_json()).at(times)
+    for name in problem.bounded:
+        for one in (other, written):
+            off = np.abs(getattr(one, name) - found.series(name)).reshape(5, -1)
+            assert np.all(np.max(off, axis=1) <= found.error + one.error), name
+
+
+def test_on_a_separatrix_the_path_is_known_as_far_as_the_attitude() -> None:
+    problem = RubberBall(
+        ["1/2", "19/2", "51/2"],
+        "1/2",
+        1,
+        ["3/5", 0, "4/5"],
+        ["4/5", -1, "-3/5"],
+        strict=False,
+    )
+    times = np.linspace(0, 6, 7)
+    found, true = vs.solve(problem, times), roll(problem, times)
+    assert found.provenance.details["regime"] == "separatrix"
+    off = np.max(np.abs(found.position - true.position), axis=1)
+    assert np.all(off <= found.error + 1e-12)
+    with pytest.raises(Unsolved, match="separatrix"):
+        _ = problem.drift
+
+
+def test_along_the_momentum_the_ball_moves_uniformly_and_across_it_hardly() -> None:
+    problem = RubberBall(**DATA)
+    times = np.linspace(0, 4000, 1500)
+    found = vs.solve(problem, times)
+    momentum = found.integrals["space_momentum"][0]
+    along = np.cross(momentum, [1, 0, 0])[1:] / np.linalg.norm(momentum[1:])
+    energy = found.integrals["energy"][0]
+    speed = 0.6 * 2 * energy / np.linalg.norm(momentum[1:])
+    assert largest(found.position @ along - speed * times) < 1e-13 * 4000 * speed
+    across = found.position @ [-along[1], along[0]]
+    assert largest(across) < 0.6
+    assert np.allclose(problem.drift.velocity, speed * along, rtol=1e-14, atol=1e-15)
+    assert problem.drift.resonance is None
+
+
+def test_far_times_cost_no_more_digits_than_the_time_itself() -> None:
+    problem = RubberBall(**{**DATA, "Omega": ["0.8", "1", "-0.6"], "gamma": ["0.6", "0", "0.8"]})
+    found = vs.solve(problem, [1e9])
+    # the path across the momentum is bounded, and where it is follows from the phases alone
+    before = vs.solve(problem, [1e9 - 20, 1e9])
+    assert found.error[0] < 100 * np.finfo(float).eps * 1e9 * problem.drift.speed
+    moved = before.position[1] - before.position[0]
+    start = RubberBall(
+        **{
+            **DATA,
+            "gamma": before.gamma[0],
+            "Omega": before.Omega[0],
+            "frame": before.frame[0],
+            "normalize": True,
+        }
+    )
+    rolled = roll(start, [0.0, 20.0]).position[1]
+    # the roundings of both positions, which are of the size of the distance rolled
+    assert largest(moved - rolled) < 4 * np.spacing(1e9)
+
+
+def resonant(seed: int, ratio: float, low: float) -> RubberBall:
+    """Return the ball with f_1/f_2 of this ratio among the starts of a seed, of which one has an
+    angle a little above ``low``.
+    """
+    rng = np.random.default_rng(seed)
+    gamma = rng.normal(size=3)
+    gamma /= np.linalg.norm(gamma)
+    first, second = np.linalg.qr(np.column_stack([gamma, rng.normal(size=(3, 2))]))[0][:, 1:].T
+
+    def at(angle: float) -> RubberBall:
+        Omega = math.cos(angle) * first + math.sin(angle) * second
+        return RubberBall([0.8, 1.2, 2.1], 0.3, 0.5, gamma, Omega, strict=False, normalize=True)
+
+    def excess(angle: float) -> float:
+        f = vs.torus(at(angle)).frequencies_tau1
+        return float(f[0] / f[1]) - ratio
+
+    return at(float(brentq(excess, low, low + 0.1358, xtol=1e-16, rtol=1e-15)))
+
+
+def period(problem: RubberBall, turns: int) -> float:
+    """Return the time that the slower phase of a resonant torus takes for so many turns."""
+    torus = vs.torus(problem)
+    tau1 = turns / torus.frequencies_tau1[1]
+    point = problem.rank_one()
+    time = tau1 * torus.mean_rate
+    for _ in range(4):
+        late, later = vs.solve(point, [time, time * (1 + 1e-6)]).tau1
+        time += (tau1 - late) * time * 1e-6 / (later - late)
+    return float(time)
+
+
+#: p, q, whether c_2 lies on cut 2, the seed and the angle of a torus with f_1/f_2 = p/q.
+TORI = [
+    *((3, 4, True, *at) for at in ((1, 1.0958), (1, 2.5887), (2, 1.2315))),
+    *((5, 6, True, *at) for at in ((1, 0.8243), (2, 2.5887), (3, 2.9959))),
+    *((7, 8, True, *at) for at in ((0, 0.1457), (0, 2.8601), (6, 0.5529))),
+    (9, 10, True, 4, 1.5029),
+    *((4, 5, False, *at) for at in ((0, 0.96), (0, 2.0458), (1, 0.01))),
+    *((6, 7, False, *at) for at in ((0, 0.5529), (0, 2.453), (2, 0.5529))),
+    *((8, 9, False, *at) for at in ((0, 0.4172), (2, 0.5529), (4, 0.96))),
+    *((4, 5, True, 1, 0.8243), (6, 7, True, 3, 2.9959)),
+    *((5, 6, False, 0, 0.6886), (7, 8, False, 0, 0.4172)),
+]
+
+
+@pytest.mark.parametrize(("p", "q", "upper", "seed", "low"), TORI)
+def test_in_resonance_the_ball_drifts_across_as_predicted(
+    p: int, q: int, upper: bool, seed: int, low: float
+) -> None:
+    """On a resonant torus the motion is periodic up to the drift, which one period measures: across
+    for even q where c_2 lies on cut 2, for even p where it lies on cut 1.
+    """
+    problem = resonant(seed, p / q, low)
+    assert (vs.torus(problem).origins.index("c2") > 2) == upper
+    time = period(problem, 2 * q)
+    motion = vs.solve(problem, [0.0, time])
+    assert largest(motion.frame[1] - motion.frame[0]) < 1e-9
+    measured = (motion.position[1] - motion.position[0]) / time
+    assert largest(measured - problem.drift.velocity) < 1e-9
+    assert (problem.drift.resonance is not None) == ((q if upper else p) % 2 == 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"inertia": [1, 1, 3]}, r"inertia: required moments of a body.*strict=False.*3 > 1 \+ 1"),
+        ({"inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}, "inertia: required moments of a body"),
+        ({"inertia": [1, 2]}, "inertia: required 3 positive principal moments.*2 numbers"),
+        ({"inertia": [1, 1.5, -2]}, r"inertia\[2\]|inertia.2"),
+        ({"mass": 0}, "mass: required a finite number greater than 0; given 0"),
+        ({"radius": "-1/2"}, "radius: required a finite number greater than 0"),
+        ({"mass": "x", "radius": None, "position": [1]}, "mass: .*radius: .*position: "),
+        ({"position": [1, 2, 3]}, "position: required a list of 2 numbers; given 3 entries"),
+        ({"strict": "yes"}, "strict: required true or false"),
+        ({"gamma": [1, 2, 3]}, "gamma: required a vector of unit length"),
+    ],
+)
+def test_bad_input_is_refused_with_its_name(
+    server: Server, changes: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        RubberBall(**{**DATA, **changes})
+    document = {"system": "rubber-ball", **DATA, **changes}
+    answer = server.ask("POST", "/v1/trajectories", json={"problem": document, "times": [1.0]})
+    assert answer.status_code == 422
+    assert next(iter(changes)) in answer.text
+
+
+def test_moments_of_no_body_are_taken_where_they_are_meant() -> None:
+    assert RubberBall(**{**DATA, "inertia": [1, 1, 3]}, strict=False).moves
+
+
+def test_the_service_answers_for_a_ball(server: Server) -> None:
+    document = {"system": "rubber-ball", **DATA, "position": ["1/2", 2]}
+    ask = {"problem": document, "times": [0.0, 1.0]}
+    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
+    assert answer["engine"] == "analytic"
+    assert answer["series"]["position"][0] == [0.5, 2.0]
+    expected = vs.solve(RubberBall(**DATA, position=("1/2", 2)), [0.0, 1.0])
+    assert np.allclose(answer["series"]["position"], expected.position, atol=1e-13)
+    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
+    assert server.ask("POST", "/v1/tori", json={"problem": document}).status_code == 200
+    digits = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30})
+    assert (digits.status_code, "contact point" in digits.text) == (422, True)
+
+
+def test_a_ball_that_twists_is_integrated_by_all_formulations() -> None:
+    problem = RubberBall(**{**DATA, "Omega": [0.8, 1, -0.5]})
+    true = roll(problem, TIMES)
+    for formulation in RubberBall.formulations:
+        found = vs.solve(problem, TIMES, "numeric", formulation=formulation)
+        assert largest(found.position - true.position) < 1e-11
+
+
+def test_a_ball_at_rest_stays() -> None:
+    problem = RubberBall(**{**DATA, "Omega": [0, 0, 0]}, position=(1, 2))
+    found = vs.solve(problem, [5.0])
+    assert np.array_equal(found.position, [[1, 2]])
+    assert problem.drift.speed == 0
