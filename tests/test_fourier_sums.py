@@ -93,14 +93,14 @@ def test_sums_over_modes_hold_those_in_balls(
             monkeypatch.setattr(enclosed_waves, "_PLACES", places)
             modes, coefficients, points = drawn(genus, size, xp, rng)
             with xp.at(digits + 30) as finer:
-                waves = finer.waves(modes, finer.turns(points))
+                waves = finer.exponentials(modes, finer.turns(points))
                 exact = [
                     finer.product(wave.T, xp.midpoints(coefficients)[:, None])[:, 0]
                     for wave in waves
                 ]
             for kind, expected in zip(KINDS, exact, strict=True):
                 with monkeypatch.context() as without:
-                    without.setattr(Balls, "waves", None)  # nothing is left to balls
+                    without.setattr(Balls, "exponentials", None)  # nothing is left to balls
                     found = sums_over_modes(kind, modes, coefficients, xp.turns(points), xp)
                 assert all(a.contains(b) for a, b in zip(found, expected, strict=True))
                 assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
@@ -123,7 +123,7 @@ def test_sums_over_points_hold_those_in_balls(
         assert sums._in_fixed_point is not None
         with xp.at(digits + 30) as finer:
             expected = finer.product(
-                finer.waves(modes, finer.turns(points))[0], xp.midpoints(weights).T
+                finer.exponentials(modes, finer.turns(points))[0], xp.midpoints(weights).T
             )
         # rows of modes are kept from the first to the second
         for rows in (slice(0, 1), slice(None)):
@@ -151,12 +151,12 @@ def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Gener
             weights = coefficients[None, :4]
             points = SumsOverPoints(turns, weights, 9, xp)
             assert points._in_fixed_point is None
-            of_points = xp.product(xp.waves(modes, turns)[0], weights.T)
+            of_points = xp.product(xp.exponentials(modes, turns)[0], weights.T)
             assert all(
                 (a - b).contains(0)
                 for a, b in zip(points.cosines(modes)[:, 0], of_points[:, 0], strict=True)
             )
-            for kind, waves in zip(KINDS, xp.waves(modes, turns), strict=True):
+            for kind, waves in zip(KINDS, xp.exponentials(modes, turns), strict=True):
                 expected = xp.product(waves.T, coefficients[:, None])[:, 0]
                 for a, b in zip(
                     sums_over_modes(kind, modes, coefficients, turns, xp), expected, strict=True

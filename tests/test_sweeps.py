@@ -880,7 +880,7 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
     def failing(*_: Any) -> Any:
         raise failure
 
-    monkeypatch.setattr("veselova.service.sweeps.chunk_dispatch.computed_chunk", failing)
+    monkeypatch.setattr("veselova.service.sweeps.chunk_dispatch.compute_chunk", failing)
     # so that the sweep goes to a worker
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
     monkeypatch.setattr("veselova.service.sweeps.in_process_cluster.seconds_of", lambda *_: 1e9)
