@@ -114,7 +114,7 @@ ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
     [
         ({"Omega": [0.3, 0.1, 0.2]}, "not-separable"),
         ({"potential": {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0]}]}}, "not-separable"),
-        ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),
+        ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),  # before t = 20
         (
             {"gamma": [0.6, 1e-30, 0.8], "Omega": [0, 0.7, 0], "potential": {"clebsch": 0.5}},
             "separatrix",

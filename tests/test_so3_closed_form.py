@@ -4,6 +4,7 @@ many digits, tori, every door.
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from typing import Any
 
@@ -57,9 +58,20 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
 def test_before_a_collision_the_default_answers() -> None:
     attracting = {"family": [0, 0.1, -1, 0, 0]}
     problem = VeselovaSO3([1, 1.7, 2.6], [0.6, 0.48, 0.64], [0.3, -0.7, 0.24375], attracting)
-    assert vs.solve(problem, [-0.2, 0.7]).provenance.engine == problem.default_engine == "numeric"
-    with pytest.raises(Unsolved, match=r"collision: .* integrate numerically"):
-        vs.solve(problem, [0.5], "analytic")
+    closed = vs.solve(problem, [-0.2, 0.7])
+    assert closed.provenance.engine == problem.default_engine == "analytic"
+    found = vs.solve(problem, [-0.2, 0.7], "numeric")
+    difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
+    assert np.all(difference <= closed.error + found.error)
+    with pytest.raises(Unsolved, match=r"collision: .* gamma\[0\] = 0 at t = ") as caught:
+        vs.solve(problem, [0.5, 9.0])
+    with pytest.raises(Unsolved, match="collision: ") as theirs:
+        vs.solve(problem, [0.5, 9.0], "numeric")
+    ours, integrated = (
+        float(re.search(r"t = ([-\d.e]+)", str(x.value))[1])  # type: ignore[index]
+        for x in (caught, theirs)
+    )
+    assert abs(ours - integrated) < 1e-6 * abs(integrated)
 
 
 def test_the_rank_one_problem_of_texts_is_exact() -> None:

@@ -19,7 +19,9 @@ from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
+from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
+from veselova.analytic.separable.orbit_section import OrbitSections
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -48,8 +50,8 @@ class BodyMotion(Motion[VeselovaSO3]):
         return np.array(sorted(range(3), key=lambda i: self.problem.moments[i]))
 
     @cached_property
-    def _orbit(self) -> SeparableOrbit:
-        """Return the orbit of the exact start along these axes."""
+    def _motion(self) -> SeparableMotion:
+        """Return the motion of the exact start along these axes."""
         problem = self.problem
         order = self._order
         if problem.without_closed_form:
@@ -67,9 +69,20 @@ class BodyMotion(Motion[VeselovaSO3]):
         x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
         v = family_polynomial(moments, *alphas[:2])
         walls = tuple(alphas[2 + i] for i in order)
-        return SeparableOrbit(SeparableStart(tuple(moments), x, w, v, walls))
+        return SeparableMotion(SeparableStart(tuple(moments), x, w, v, walls))
+
+    @cached_property
+    def _orbit(self) -> SeparableOrbit:
+        return SeparableOrbit(self._motion)
+
+    @cached_property
+    def _sections(self) -> OrbitSections:
+        return OrbitSections(self._motion)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        motion = self._motion
+        if motion.collides:
+            return self._evaluate_between_collisions(grid)
         orbit = self._orbit
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         time_map = orbit.time_map(grid.doubles)
@@ -81,8 +94,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
         panels = integrate_on_panels(self._turning_at, orbit.in_tau, low, high, largest, noise)
         at, velocity, rate = orbit.states(z)
-        gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
-        frame = self._frame(gamma, lines, -panels.at(tau))
+        series = self._series(at, velocity, panels.at(tau))
         lag = orbit.lag(grid.doubles, tau, rate, time_map)
         error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _frames))
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
@@ -91,8 +103,29 @@ class BodyMotion(Motion[VeselovaSO3]):
         along = orbit.slopes_along(self._turning_at, panels, tau)
         error = error + orbit.integral_error(tau, slopes, along)
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
-        series = {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
         return series, error, "angles", orbit.details(time_map)
+
+    def _evaluate_between_collisions(
+        self, grid: TimeGrid
+    ) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        section = self._sections.of_times(grid.doubles)
+        passage = section.passage(
+            grid.doubles,
+            grid.remainders,
+            lambda axis: f"the singular plane gamma[{self._order[axis]}]",
+        )
+        at, velocity, phi = section.states(passage)
+        panels = section.turning
+        series = self._series(at, velocity, panels.at(passage.u))
+        error = section.error(passage, phi, True)
+        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
+        return series, error, "angles", section.details()
+
+    def _series(self, at: Attitude, velocity: Array, rotated: Array) -> Series:
+        """Return Ω and the frame where the coordinate lines have turned by ``rotated``."""
+        gamma, gamma_dot, lines = (self._to_body(values) for values in (at.q, velocity, at.normals))
+        frame = self._frame(gamma, lines, -rotated)
+        return {"Omega": np.cross(gamma_dot, gamma), "frame": frame}
 
     def _to_body(self, values: Array) -> Array:
         """Return vectors (N, 3), or columns (N, 3, k), along sorted axes in those of the body."""
@@ -103,9 +136,7 @@ class BodyMotion(Motion[VeselovaSO3]):
 
     def _frame(self, gamma: Array, lines: Array, rotated: Array) -> Array:
         """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
-        start = self._to_body(
-            self._orbit.motion.attitude(self._orbit.motion.angles[None, :]).normals
-        )[0]
+        start = self._to_body(self._motion.attitude(self._motion.angles[None, :]).normals)[0]
         cosine = np.cos(rotated)
         sine = np.sin(rotated)
         turn = np.stack(

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +34,11 @@ from veselova.analytic.numerics.real_roots import (
     trim,
     value,
 )
+from veselova.analytic.separable.open_interval import OpenInterval
 from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
+__all__ = ["AnyCut", "SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
 
 Array = NDArray[np.float64]
 
@@ -217,6 +219,14 @@ class SeparatedCut:
         below, above = self.points.roots(psi)
         return below * below, above * above
 
+    def roots(self, psi: Array) -> tuple[Array, Array]:
+        """Return √(λ−a) and √(b−λ), with the signs of sin ψ/2 and cos ψ/2."""
+        return self.points.roots(psi)
+
+    def start_angle(self, increasing: bool) -> float:
+        """Return ψ in (−π, π] at the start, negative where λ_s decreases."""
+        return float(self.points.angle(self.below, self.above, increasing))
+
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
         """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
         many may be no float.
@@ -234,9 +244,21 @@ class SeparatedCut:
         near, far = self._roots_of_factors(psi)
         return np.asarray(near * far)
 
+    def moving_root(self, psi: Array) -> Array:
+        """Return √R with the sign of λ_s', over the roots of the ends that are I's, at angles ψ."""
+        result = self.outer_root(psi)
+        for root, axis in zip(self.roots(psi), self.axes, strict=True):
+            if axis is None:
+                result = result * root
+        return result
+
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
         return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
+
+
+#: Between turning points, or up to a plane in which V is −∞.
+AnyCut: TypeAlias = SeparatedCut | OpenInterval
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -258,12 +280,11 @@ class _Resting(Exception):
         self.axis = axis
 
 
-def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
+def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[AnyCut], list[int]]:
     """Return the start among the axes along which it moves, its cuts, and the numbers of these
     axes.
 
-    Raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``, ``at-rest``,
-    ``beyond-floats``).
+    Raises Unsolved (``separatrix``, ``clustered-roots``, ``at-rest``, ``beyond-floats``).
     """
     axes = list(range(len(start.q)))
     still = [i for i, x in enumerate(start.q) if x == start.q_dot[i] == 0]
@@ -279,7 +300,7 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
             still = [resting.axis]
 
 
-def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
+def find_cuts(start: SeparableStart) -> list[AnyCut]:
     """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as
     ``moving_axes`` has it.
     """
@@ -306,14 +327,13 @@ def _cut(
     real: list[Fraction],
     pairs: list[tuple[Fraction, Fraction]],
     R: Polynomial,
-) -> SeparatedCut:
+) -> AnyCut:
     low = start.inverse[s]
     high = start.inverse[s + 1]
     marks = [x for x in real if low <= x <= high]
-    # without marks it runs into a plane either way
-    at = min(marks, key=lambda x: abs(x - point), default=point)
+    at = min(marks, key=lambda x: abs(x - point), default=None)
     names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
-    if abs(at - point) > NEAR * (high - low):
+    if at is None or abs(at - point) > NEAR * (high - low):
         lower = max((x for x in marks if x < point), default=None)
         upper = min((x for x in marks if x > point), default=None)
     else:
@@ -325,22 +345,25 @@ def _cut(
             reason = "R has a double root: a coordinate rests there; integrate numerically"
             raise Unsolved("clustered-roots", reason)
         lower, upper = ends
-    if lower is None or upper is None:
-        wall = float(low if lower is None else high)
-        raise Unsolved(
-            "collision",
-            f"the motion runs into the plane q_i = 0 of I_i = {wall:.6g}, where V is −∞; "
-            "integrate numerically",
-        )
+    planes = (lower is None, upper is None)  # V is −∞ in the plane of I_s, or I_{s+1}
+    lower = low if lower is None else lower
+    upper = high if upper is None else upper
     width = upper - lower
+    turns = [end for end, plane in zip((lower, upper), planes, strict=True) if not plane]
     others = list(real)
-    others.remove(lower)
-    others.remove(upper)
-    if min(abs(x - end) for x in others for end in (lower, upper)) <= Fraction(_SEPARATRIX) * width:
+    for end in turns:
+        others.remove(end)
+    gap = min((abs(x - end) for x in others for end in turns), default=width)
+    if gap <= Fraction(_SEPARATRIX) * width:
         raise Unsolved(
             "separatrix",
             "a turning point is nearly a double root: the motion is asymptotic, or within "
             "1e-12 of one",
+        )
+    axes = (names.get(lower), names.get(upper))
+    if any(planes):
+        return OpenInterval.of(
+            (lower, upper), planes, point, sorted(real), pairs, abs(float(R[-1])), axes
         )
     return SeparatedCut(
         ends=(lower, upper),
@@ -352,7 +375,7 @@ def _cut(
         leading=abs(float(R[-1])),
         below=float(point - lower),
         above=float(upper - point),
-        axes=(names.get(lower), names.get(upper)),
+        axes=axes,
     )
 
 

@@ -7,17 +7,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
+from veselova.analytic.separable.curve import AnyCut, SeparableStart, moving_axes
+from veselova.analytic.separable.open_interval import OpenInterval
 from veselova.analytic.separable.periods import SeparatedPeriods
+from veselova.analytic.separable.reflection import ReflectedAbelJacobi, ReflectedPeriods
 from veselova.analytic.time_map.rate import TorusRate
 
-__all__ = ["SeparableMotion", "SeparatedRate"]
+__all__ = ["SeparableMotion", "SeparatedRate", "Slopes"]
 
 Array = NDArray[np.float64]
 
@@ -33,10 +36,16 @@ class SeparableMotion:
 
     def __init__(self, start: SeparableStart) -> None:
         self._dimension = len(start.q)
-        self.start, self.cuts, self._axes = moving_axes(start)
+        self.start, self.cuts, self.axes = moving_axes(start)
         start = self.start
-        self.periods = SeparatedPeriods(self.cuts)
-        self.inversion = AbelJacobi(self.periods)
+        self.periods: SeparatedPeriods
+        self.inversion: AbelJacobi[Any]
+        if self.collides:
+            self.periods = ReflectedPeriods(self.cuts)
+            self.inversion = ReflectedAbelJacobi(self.periods)
+        else:
+            self.periods = SeparatedPeriods(self.cuts)
+            self.inversion = AbelJacobi(self.periods)
         self._inverse = np.array([float(x) for x in start.inverse])
         self._distances = [[float(abs(x - y)) for y in start.inverse] for x in start.inverse]
         self.angles = np.array([_angle(cut, start, s) for s, cut in enumerate(self.cuts)])
@@ -48,6 +57,11 @@ class SeparableMotion:
         self._signs = [
             self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))
         ]
+
+    @property
+    def collides(self) -> bool:
+        """Return whether a coordinate runs into a plane in which V is −∞."""
+        return any(isinstance(cut, OpenInterval) for cut in self.cuts)
 
     def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
         """Return the constant sign of q_i against its root, which passes zero upwards at a lower
@@ -128,7 +142,7 @@ class SeparableMotion:
         )
         own = np.ones_like(offsets)
         for i, (s, lower) in self._own.items():
-            own[:, s, i] = self.cuts[s].points.roots(phi[:, s])[0 if lower else 1]
+            own[:, s, i] = self.cuts[s].roots(phi[:, s])[0 if lower else 1]
         far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
         return (
             offsets,
@@ -142,11 +156,11 @@ class SeparableMotion:
         n = self._dimension
         g = len(self.cuts)
         count = q.shape[0]
-        still = [i for i in range(n) if i not in self._axes]
+        still = [i for i in range(n) if i not in self.axes]
         position = np.zeros((count, n))
         normals = np.zeros((count, n, n - 1))
         along = np.zeros((count, n - 1))
-        position[:, self._axes], normals[:, self._axes, :g], along[:, :g] = q, lines, components
+        position[:, self.axes], normals[:, self.axes, :g], along[:, :g] = q, lines, components
         normals[:, still, range(g, n - 1)] = 1.0
         return Attitude(position, normals, along, points)
 
@@ -157,40 +171,67 @@ class SeparableMotion:
         result = np.empty_like(phi)
         products = np.prod(self.differences(phi), axis=2)
         for s, cut in enumerate(self.cuts):
-            lower, upper = cut.points.roots(phi[:, s])
-            ends = (1.0 if cut.axes[0] is not None else lower) * (
-                1.0 if cut.axes[1] is not None else upper
-            )
-            result[:, s] = ends * cut.outer_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
+            result[:, s] = cut.moving_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
         return result
 
     def turning(self, phi: Array) -> Array:
-        """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
+        """Return (dm_1/dτ, m_2) for n = 3, shape (N,)."""
+        _, _, own, _, y_rest = self._roots(phi)
+        return self._turning(phi, y_rest * np.prod(own, axis=2), self._components(phi, y_rest))
+
+    def _turning(self, phi: Array, y: Array, along: Array) -> Array:
+        """Return how m_1 turns towards m_2 where q moves by ``along`` (N, g), or (N, g, K), on the
+        coordinate lines.
 
         From A⁻¹m_s = λ_sm_s + σ_sq it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); σ_s = Σ
         I_iq_i²y_s/(λ_s−I_i) = −y_s, a product: the sum has no digit left where I's are nearly
         equal. It is zero where m_2 is an axis.
         """
         if len(self.cuts) == 1:
-            return np.zeros(phi.shape[0])
+            return np.zeros_like(along[:, 0])
+        crossed = np.einsum("ns,ns...->n...", y, along[:, ::-1]).T
+        return np.asarray(-(crossed / self.differences(phi)[:, 0, 1]).T)
+
+    def slopes(self, phi: Array) -> Slopes:
+        """Return how the motion changes with its phases, at angles (N, g)."""
+        by_phase = np.linalg.inv(self.inversion.jacobian(phi))
+        speeds = self.speeds(phi)
         _, _, own, _, y_rest = self._roots(phi)
         y = y_rest * np.prod(own, axis=2)
-        along = self._components(phi, y_rest)
-        return np.asarray(-np.sum(y * along[:, ::-1], axis=1) / self.differences(phi)[:, 0, 1])
+        components = self._components(phi, y_rest)
+        along = (components / speeds)[:, :, None] * by_phase
+        turning = self._turning(phi, y, along) if self._dimension <= 3 else np.zeros(phi.shape)
+        # λ_s' = 2y_s(q',m_s), and the rate is √(λ_1…λ_g)
+        relative = (y * components / self.periods.points(phi) / speeds)[:, :, None] * by_phase
+        rate = np.sqrt(np.prod(self.periods.points(phi), axis=1))
+        return Slopes(by_phase, along, turning, np.sum(relative, axis=1) * rate[:, None])
 
 
-def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives in the phases z_k, at N points: of the angles, angles (N, g, g), s before k; of q
+    along the coordinate lines, along (N, g, g); turning (N, g) of m_1 towards m_2, for n ≤ 3; rate
+    (N, g) of dt/dτ.
+    """
+
+    angles: Array
+    along: Array
+    turning: Array
+    rate: Array
+
+
+def _angle(cut: AnyCut, start: SeparableStart, s: int) -> float:
     """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ
     q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)².
     """
     if cut.below == 0 or cut.above == 0:  # from an end there is one way, and λ_s may be I_i
-        return float(cut.points.angle(cut.below, cut.above, True))
+        return cut.start_angle(True)
     point = start.spheroconic[s]
     slope = sum(
         (x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)),
         Fraction(),
     )
-    return float(cut.points.angle(cut.below, cut.above, slope >= 0))
+    return cut.start_angle(slope >= 0)
 
 
 @dataclass(frozen=True)

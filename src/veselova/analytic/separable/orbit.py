@@ -15,7 +15,6 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, combine_bounds
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
-from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.fourier import FourierTimeMap
@@ -54,10 +53,10 @@ _STEP = 1e-6
 
 
 class SeparableOrbit:
-    """The orbit of a start. Raises Unsolved as SeparableMotion does."""
+    """The orbit of a motion without a collision."""
 
-    def __init__(self, start: SeparableStart) -> None:
-        self.motion = SeparableMotion(start)
+    def __init__(self, motion: SeparableMotion) -> None:
+        self.motion = motion
         self._degree = self.motion.start.degree
         self.rate = SeparatedRate(self.motion.inversion)
         self.inversion = self.motion.inversion

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Double
 from veselova.analytic.curve.angle_series import AngleSeries
-from veselova.analytic.separable.curve import SeparatedCut
+from veselova.analytic.separable.curve import AnyCut
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparatedPeriods"]
@@ -35,7 +35,7 @@ _RESOLVED = 1e-15
 class SeparatedPeriods(AngleSeries):
     """The period data of the cuts of a separable motion, in double precision."""
 
-    cuts: Sequence[SeparatedCut]
+    cuts: Sequence[AnyCut]
 
     @property
     def arithmetic(self) -> Double:

@@ -13,7 +13,9 @@ from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
+from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
+from veselova.analytic.separable.orbit_section import OrbitSections
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -32,7 +34,7 @@ class PointMotion(Motion[SeparableVeselova]):
         return np.array(sorted(range(self.problem.n), key=lambda i: -self.problem.exact.A[i]))
 
     @cached_property
-    def _orbit(self) -> SeparableOrbit:
+    def _motion(self) -> SeparableMotion:
         exact = self.problem.exact
         betas = self.problem.potential[2]
         inverse, q, v, walls = (
@@ -41,27 +43,54 @@ class PointMotion(Motion[SeparableVeselova]):
         )
         size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableOrbit(
+        return SeparableMotion(
             SeparableStart(separate(inverse), q, v, self.problem.polynomial, walls, size)
         )
+
+    @cached_property
+    def _orbit(self) -> SeparableOrbit:
+        return SeparableOrbit(self._motion)
+
+    @cached_property
+    def _sections(self) -> OrbitSections:
+        return OrbitSections(self._motion)
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
         return self._orbit.sensitivity(_positions)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        if self._motion.collides:
+            return self._evaluate_between_collisions(grid)
         orbit = self._orbit
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
         at, velocity, rate = orbit.states(z)
-        series = {
-            name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))
-        }
-        series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
+        series = self._series(at, velocity)
         lag = orbit.lag(grid.doubles, tau, rate, time_map)
         error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _positions))
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
+
+    def _evaluate_between_collisions(
+        self, grid: TimeGrid
+    ) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        section = self._sections.of_times(grid.doubles)
+        passage = section.passage(
+            grid.doubles, grid.remainders, lambda axis: f"the plane q[{self._order[axis]}]"
+        )
+        at, velocity, phi = section.states(passage)
+        error = section.error(passage, phi, False)
+        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
+        return self._series(at, velocity), error, "angles", section.details()
+
+    def _series(self, at: Attitude, velocity: Array) -> Series:
+        """Return q and q_dot along the axes of the problem."""
+        series = {
+            name: np.empty_like(values) for name, values in (("q", at.q), ("q_dot", velocity))
+        }
+        series["q"][:, self._order], series["q_dot"][:, self._order] = at.q, velocity
+        return series
 
 
 def _positions(at: Attitude) -> Array:

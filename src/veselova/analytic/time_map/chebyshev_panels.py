@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.numerics.monotone_root import Rows, increasing_root
+
 __all__ = ["TAIL", "Panels", "are_settled"]
 
 Array = NDArray[np.float64]
@@ -18,6 +20,9 @@ TAIL = 4e-15
 #: Last coefficients that have not fallen to this part of what they were on a longer panel are
 #: rounding, if they are small.
 _STALLED = 0.25
+
+#: A Newton step of this size, in half panels, leaves an error of its square.
+_CONVERGED = 1e-9
 
 
 def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np.bool_]:
@@ -118,6 +123,25 @@ class Panels:
         return np.clip(
             np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1
         )
+
+    def find_arguments(
+        self, values: Array, remainders: Array | None = None
+    ) -> tuple[NDArray[np.intp], Array]:
+        """Return where an increasing integral has values (N,), doubles and their remainders: the
+        panels, and the distances from their left borders. By Newton's method on the polynomials.
+        """
+        panel = self.panel_of(self.values, values)
+        target = values - self.values[panel]
+        if remainders is not None:
+            target += remainders
+        x = 2 * target / (self.values[panel + 1] - self.values[panel]) - 1
+
+        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
+            value, slope = self.within(panel[rows], x)
+            return value - target[rows], slope
+
+        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
+        return panel, (x + 1) * (self.lengths[panel] / 2)
 
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
         """Return the integral from the panel's left border to x, and its derivative in x."""

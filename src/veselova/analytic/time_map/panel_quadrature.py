@@ -15,7 +15,7 @@ from veselova.analytic.time_map.chebyshev_panels import TAIL, Panels, are_settle
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["integrate_on_panels"]
+__all__ = ["integrate_between", "integrate_on_panels"]
 
 Array = NDArray[np.float64]
 
@@ -73,17 +73,59 @@ def integrate_on_panels(
     if (high - low) / panels.length >= _MANY_PANELS:
         panels = panels.longer(low, high)
     lefts = panels.lefts(low, high)
-    length = panels.length
+    lengths = np.full(lefts.size, panels.length)
+    return _refine(
+        panels.series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL * floor * panels.length
+    )
+
+
+def integrate_between(
+    integrand: Callable[[Array], Array], borders: Array, noise: float = 0.0
+) -> Panels:
+    """Return x ↦ ∫_0^x f over the stretch of increasing ``borders``, zero among them, panels of
+    which are halved.
+
+    ``integrand`` gives f at points (N,). Panels are resolved to rounding of their means, or of the
+    integral of |f| over all of them. Otherwise as ``integrate_on_panels``.
+    """
+    points, to_coefficients = _chebyshev(_FEW_NODES)
+
+    def values(lefts: Array, lengths: Array) -> Array:
+        nodes = (lefts[:, None] + points * lengths[:, None]).ravel()
+        blocks = range(0, nodes.size, _BLOCK)
+        found = [integrand(nodes[first : first + _BLOCK]) for first in blocks]
+        return np.concatenate(found).reshape(lefts.size, -1)
+
+    def series(lefts: Array, lengths: Array) -> tuple[Array, Array, Array]:
+        coefficients = values(lefts, lengths) @ to_coefficients
+        sizes = np.maximum(np.max(np.abs(coefficients), axis=1), np.finfo(float).tiny)
+        return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+
+    lefts = borders[:-1]
+    lengths = np.diff(borders)
+    whole = float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths)
+    return _refine(series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL / lefts.size * whole)
+
+
+def _refine(
+    series: Callable[[Array, Array], tuple[Array, Array, Array]],
+    lefts: Array,
+    lengths: Array,
+    noise: float,
+    negligible: float,
+) -> Panels:
+    """Return the panels of which those that are not resolved are halved, each for itself.
+
+    ``series`` gives coefficients, sizes and tails of panels; an integral of tails that is
+    ``negligible`` is resolved.
+    """
     before = np.full(lefts.size, np.inf)
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
-        coefficients, sizes, tails = panels.series(lefts, length)
+        coefficients, sizes, tails = series(lefts, lengths)
         # A spike may be shorter than its phases are exact, and its series never end; a short one
         # needs no more than a long panel.
-        converged = are_settled(tails, before, max(_NOISE_TAIL, noise)) | (
-            tails * sizes * length <= TAIL * floor * panels.length
-        )
-        lengths = np.full(lefts.size, length)
+        converged = are_settled(tails, before, noise) | (tails * sizes * lengths <= negligible)
         done.append(
             (
                 lefts[converged],
@@ -95,8 +137,9 @@ def integrate_on_panels(
         )
         if np.all(converged):
             return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
-        length /= 2
-        lefts = (lefts[~converged][:, None] + np.array([0.0, length])).ravel()
+        halves = lengths[~converged] / 2
+        lefts = (lefts[~converged][:, None] + halves[:, None] * np.array([0.0, 1.0])).ravel()
+        lengths = np.repeat(halves, 2)
         before = np.repeat(tails[~converged], 2)
     raise Unsolved(
         "narrow-gap",
@@ -125,13 +168,14 @@ class _Panels:
         last = max(after + _MARGIN * (after > _NEAR), first == 0)
         return np.arange(-first, last, dtype=float) * self.length
 
-    def series(self, lefts: Array, length: float) -> tuple[Array, Array, Array]:
+    def series(self, lefts: Array, lengths: Array) -> tuple[Array, Array, Array]:
         """Return the Chebyshev coefficients (P, nodes), their sizes and relative tails, (P,).
 
         Phases of nodes are those of the border plus a short way.
         """
         points, to_coefficients = _chebyshev(self.nodes)
-        z = self.in_tau1.phases(lefts)[:, None, :] + (points * length)[:, None] * self.in_tau1.rates
+        offsets = (points * lengths[:, None])[:, :, None]
+        z = self.in_tau1.phases(lefts)[:, None, :] + offsets * self.in_tau1.rates
         z = z.reshape(-1, z.shape[2])
         values = [
             self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)
@@ -149,7 +193,8 @@ class _Panels:
             panels = replace(self, nodes=_NODES, length=factor * self.length)
             lefts = panels.lefts(low, high)
             probed = lefts[np.linspace(0, lefts.size - 1, _PROBED).astype(int)]
-            if np.all(are_settled(panels.series(probed, panels.length)[2], np.inf, _NOISE_TAIL)):
+            lengths = np.full(probed.size, panels.length)
+            if np.all(are_settled(panels.series(probed, lengths)[2], np.inf, _NOISE_TAIL)):
                 return panels
         return self
 

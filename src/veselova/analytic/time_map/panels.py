@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.numerics.monotone_root import Rows, increasing_root
 from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
@@ -31,9 +30,6 @@ _TURN = 3 * np.pi
 #: for.
 _AVERAGED = 16.0
 _HIGHEST = 8
-
-#: A Newton step of this size, in half panels, leaves an error of its square.
-_CONVERGED = 1e-9
 
 
 class ChebyshevTimeMap(TimeMap):
@@ -154,17 +150,6 @@ class ChebyshevTimeMap(TimeMap):
         polynomial.
         """
         panels = self.panels
-        panel = panels.panel_of(panels.values, times)
-        target = times - panels.values[panel]
-        if remainders is not None:
-            target += remainders
-        x = 2 * target / (panels.values[panel + 1] - panels.values[panel]) - 1
-
-        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
-            value, slope = panels.within(panel[rows], x)
-            return value - target[rows], slope
-
-        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
-        offset = (x + 1) * (panels.lengths[panel] / 2)
+        panel, offset = panels.find_arguments(times, remainders)
         z = self.in_tau1.phases(panels.borders[panel]) + offset[:, None] * self.in_tau1.rates
         return panels.borders[panel] + offset, z

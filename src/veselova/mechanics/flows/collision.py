@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.flow import Flow
 
-__all__ = ["SingularFlow"]
+__all__ = ["SingularFlow", "collision"]
 
 Array = NDArray[np.float64]
 
@@ -70,15 +70,27 @@ class SingularFlow(Flow):
         x, speed = self._coordinates(state)
         nearest = min(self._singular, key=lambda i: x[i] * self._sides[i])
         arrival = (time - x[nearest] / speed[nearest]) * self.time_unit
-        place = (
-            f"{self._plane(nearest)} = 0 at about t = {arrival:.7g}, where the potential is "
-            "infinite"
-        )
+        plane = self._plane(nearest)
         # beyond a plane odd powers have changed sign: look at it from the side of the start
         for i in self._singular:
             x[i] = abs(x[i]) * self._sides[i]
         if self._singular[nearest](x) < 0:
-            return Unsolved("collision", f"the motion runs into {place}; ask for earlier times")
+            return collision(plane, f"about t = {arrival:.7g}")
         return Unsolved(
-            "thin-barrier", f"the motion turns back nearer than the integration resolves to {place}"
+            "thin-barrier",
+            "the motion turns back nearer than the integration resolves to "
+            f"{_place(plane, f'about t = {arrival:.7g}')}",
         )
+
+
+def collision(plane: str, time: str) -> Unsolved:
+    """Return the outcome of a motion that is asked for times beyond a collision, at a time in
+    words.
+    """
+    return Unsolved(
+        "collision", f"the motion runs into {_place(plane, time)}; ask for earlier times"
+    )
+
+
+def _place(plane: str, time: str) -> str:
+    return f"{plane} = 0 at {time}, where the potential is infinite"

@@ -14,7 +14,7 @@ from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.exact_input import exact_vector, to_float
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import momentum
 from veselova.mechanics.geometry.sphere import (
@@ -111,15 +111,8 @@ class VeselovaSO3(RigidBody):
 
     @property
     def default_engine(self) -> str:
-        """Return ``analytic`` where the motion has a closed form, else ``numeric``.
-
-        ``numeric`` too where V is −∞ in a plane: before a collision times are answered by
-        integration alone.
-        """
-        family = exact_vector(
-            (self.potential.given or {}).get("family", [0] * 5), ("potential", "family"), 5
-        )
-        return "numeric" if self.without_closed_form or min(family[2:]) < 0 else "analytic"
+        """Return ``analytic`` where the motion has a closed form, else ``numeric``."""
+        return "numeric" if self.without_closed_form else "analytic"
 
     @property
     def has_torus(self) -> bool:
