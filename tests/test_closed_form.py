@@ -213,3 +213,73 @@ def test_what_has_no_closed_form_is_refused_by_name() -> None:
         vs.closed_form(vs.EulerPoisson([1, 2, 3], [0, 0, 1], [1, 0, 0]))
     with pytest.raises(vs.InvalidInput, match="accuracy"):
         vs.closed_form(BODY3, accuracy=1)
+
+
+#: The reduced bodies, a direction that rests, equal A's, and a start beside a separatrix.
+PRECISE = [
+    BODY3,
+    vs.NeumannSystem(["3", "2", "1"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225"]),
+    vs.EllipsoidGeodesic([3, 2, 1], [1, 1, 1], [1, -1, 0.2], normalize=True),
+    vs.Veselova([3, 2, 1, "1.5"], ["0.6", 0, "0.8", 0], ["0.3", 1, "-0.225", 0]),
+    vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.3", 1, "-0.225"]),
+    vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
+]
+
+
+@pytest.mark.parametrize("problem", PRECISE)
+def test_a_document_of_thirty_digits_has_them_a_million_away(problem: Any) -> None:
+    document = vs.closed_form(problem, digits=30)
+    jsonschema_rs.validator_for(SCHEMA).validate(json.loads(document.to_json()))
+    states = vs.ClosedForm.from_json(document.to_json()).at([10**6, "1000.1", -3])
+    wanted = vs.solve(problem, [10**6, "1000.1", -3], digits=33).decimals
+    assert wanted is not None
+    assert states.decimals is not None
+    first = next(iter(problem.outputs))
+    for name in ("frame", first):
+        for i in range(3):
+            off = np.abs(states.decimals[name][i] - wanted.midpoints[name][i])
+            assert float(max(np.ravel(off))) <= min(1e-25, states.error[i])
+    assert states.error.max() <= 1e-25
+    assert np.array_equal(states.frame, states.decimals["frame"].astype(float))
+
+
+def test_a_document_of_thirty_digits_lasts_to_ten_to_the_twelve() -> None:
+    states = vs.closed_form(BODY3, digits=30).at([10**12])
+    wanted = vs.solve(BODY3, [10**12], digits=30).decimals
+    assert wanted is not None
+    assert states.decimals is not None
+    off = np.abs(states.decimals["frame"] - wanted.midpoints["frame"])
+    assert float(max(np.ravel(off))) <= states.error[0] <= 1e-25
+
+
+def test_a_coarse_document_of_many_digits_says_how_far_it_is_off() -> None:
+    document = vs.closed_form(BODY3, accuracy=1e-18, digits=25)
+    wanted = vs.solve(BODY3, [12345], digits=25).decimals
+    states = document.at([12345])
+    assert states.decimals is not None
+    assert wanted is not None
+    off = float(max(np.ravel(np.abs(states.decimals["frame"] - wanted.midpoints["frame"]))))
+    assert 1e-24 < off <= states.error[0] <= 2e-18
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"digits": 14}, "digits"),
+        ({"digits": 201}, "digits"),
+        ({"digits": 30.0}, "digits"),
+        ({"digits": True}, "digits"),
+        ({"digits": 30, "accuracy": 1e-40}, "accuracy"),
+        ({"accuracy": 1e-20}, "accuracy"),
+    ],
+)
+def test_digits_and_accuracies_out_of_range_are_named(arguments: Any, field: str) -> None:
+    with pytest.raises(vs.InvalidInput) as caught:
+        vs.closed_form(BODY3, **arguments)
+    assert caught.value.field == field
+
+
+def test_more_digits_ask_for_a_as_numbers() -> None:
+    body = vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6])
+    with pytest.raises(vs.InvalidInput, match="A as n numbers"):
+        vs.closed_form(body, digits=20)

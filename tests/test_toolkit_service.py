@@ -41,6 +41,18 @@ def test_a_document_over_http_is_the_one_of_the_library(server: Server) -> None:
     assert coarse == json.loads(vs.closed_form(BODY3, 1e-5).to_json())
 
 
+def test_a_document_of_many_digits_comes_through_every_door(server: Server) -> None:
+    expected = json.loads(vs.closed_form(BODY3, digits=20).to_json())
+    body = {"problem": BODY3_PROBLEM, "digits": 20}
+    assert post(server, "/v1/closed-forms", {**body, "budget_s": BUDGET_S}).json() == expected
+    with vs.Client(server.url) as client:
+        assert client.closed_form(BODY3, digits=20, budget_s=BUDGET_S).document == expected
+    printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(body))
+    assert json.loads(printed.stdout) == expected
+    refused = post(server, "/v1/closed-forms", {**body, "digits": 14})
+    assert is_problem(refused, 422, "invalid-input")["errors"][0]["pointer"] == "/digits"
+
+
 def test_the_schema_of_documents_is_published_under_its_file_name(server: Server) -> None:
     answer = server.get("/v1/schemas/closed-form.json")
     assert answer.headers["content-type"] == "application/schema+json"

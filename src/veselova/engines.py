@@ -226,11 +226,15 @@ def from_torus(
     return Veselova(A, q, q_dot, frame, normalize=True)
 
 
-def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
+def closed_form(
+    problem: Problem, accuracy: float | None = None, digits: int = FEWEST_DIGITS
+) -> ClosedForm:
     """Return the motion of a problem as data: a document of a few kilobytes that any language can
     evaluate at any time.
 
-    ``accuracy``: the error that modes left out of the time map may make. Raises InvalidInput for a
+    ``accuracy``: the error that modes left out of the time map may make; 10^(3−digits), which is
+    1e-12, when left out. ``digits`` (15 … 200): beyond 15 all numbers are decimal strings, with 15
+    digits more, for times up to 10¹²; data are taken at their word. Raises InvalidInput for a
     system without a torus and for bad arguments, Unsolved where theta functions do not serve (rest,
     a separatrix, too many modes).
     """
@@ -240,7 +244,7 @@ def closed_form(problem: Problem, accuracy: float = 1e-12) -> ClosedForm:
         )
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
-    return closed_form_of(problem, accuracy)
+    return closed_form_of(problem, accuracy, digits)
 
 
 def drift(problem: RubberBall) -> Drift:

@@ -56,10 +56,19 @@ class BodyFrame:
         n = self.moving.n
         result = np.empty((len(attitude.q), n, n), dtype=object)
         result[:, :, 0] = self.to_axes(attitude.q)
-        result[:, :, 1:] = self.to_axes(attitude.normals @ self._rotation)
+        result[:, :, 1:] = self.to_axes(attitude.normals @ self.rotation)
         if self.moving.frozen:
-            result[:, :, 1:] += self.start - self.directions @ (self.directions.T @ self.start)
+            result[:, :, 1:] += self.frozen_part
         return result
+
+    @cached_property
+    def frozen_part(self) -> Values:
+        """Return what stays of e_2 … e_n, (n, n−1): their components along the directions that do
+        not move.
+        """
+        if not self.moving.frozen:
+            return np.asarray(self.arithmetic.array(np.zeros((self.moving.n, self.moving.n - 1))))
+        return np.asarray(self.start - self.directions @ (self.directions.T @ self.start))
 
     @cached_property
     def start(self) -> Values:
@@ -141,7 +150,7 @@ class BodyFrame:
         ]
 
     @cached_property
-    def _rotation(self) -> Values:
+    def rotation(self) -> Values:
         """Return the constant ℜ of (orth), (g, n−1)."""
         xp = self.arithmetic
         result = xp.array(np.zeros((self.normals.shape[1], self.moving.n - 1)))

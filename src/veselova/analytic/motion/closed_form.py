@@ -10,16 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
 from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
-from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
+from veselova.mechanics.results.closed_form import (
+    MOST_CLOSED_FORM_DIGITS,
+    ClosedForm,
+    require_accuracy,
+)
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
@@ -45,14 +52,20 @@ _CYCLES = 100.0
 _OWN_ROUNDING = 2.0
 
 
-def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
-    """Return the motion of a problem as a document in double precision.
+def closed_form(
+    given: Problem, accuracy: float | None = None, digits: int = FEWEST_DIGITS
+) -> ClosedForm:
+    """Return the motion of a problem as a document.
 
-    ``accuracy``: the error that modes left out of the time map may make in q and the frame. Raises
-    InvalidInput for another number, Unsolved at rest, on a separatrix (``no-closed-form``) and
-    where theta functions or modes are too many.
+    ``accuracy``: the error that modes left out of the time map may make in q and the frame,
+    10^(3−digits) when left out. Raises InvalidInput for another number, Unsolved at rest, on a
+    separatrix (``no-closed-form``) and where theta functions or modes are too many.
     """
-    accuracy = require_accuracy(accuracy)
+    digits = whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_CLOSED_FORM_DIGITS)
+    accuracy = require_accuracy(accuracy, digits)
+    if digits > FEWEST_DIGITS and isinstance(given, RubberBall):
+        required = f"{FEWEST_DIGITS} (the path of the contact point is in double precision)"
+        raise InvalidInput(("digits",), required, str(digits))
     problem = on_torus(given)
     solution = Solution(problem)
     if solution.separatrices:
@@ -61,14 +74,23 @@ def closed_form(given: Problem, accuracy: float = 1e-12) -> ClosedForm:
             "times instead"
         )
         raise Unsolved("no-closed-form", reason)
-    head = {"format": ClosedForm.format, "version": __version__, "time": problem.time, "digits": 15}
+    head = {
+        "format": ClosedForm.format,
+        "version": __version__,
+        "time": problem.time,
+        "digits": digits,
+    }
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
-    parts = {
-        **_attitude(solution),
-        **_time_map(solution, accuracy),
-        "error": _error(solution, accuracy),
-    }
+    parts = _attitude(solution)
+    if digits == FEWEST_DIGITS:
+        parts |= {**_time_map(solution, accuracy), "error": _error(solution, accuracy)}
+    else:
+        parts |= {
+            **decimal_fields(solution, accuracy, digits),
+            "units": _units(problem.time),
+            "error": _error_of_decimals(solution, accuracy, digits),
+        }
     if isinstance(given, RubberBall):
         parts |= {"path": _path(solution, given, accuracy)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
@@ -127,8 +149,12 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
             "constant": solution.rate_constant / unit,
             "power": TIME_RATE_POWERS[time],
         },
-        "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
+        "units": _units(time),
     }
+
+
+def _units(time: str) -> dict[str, str]:
+    return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
 def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
@@ -229,4 +255,20 @@ def _error(solution: Solution, accuracy: float) -> dict[str, float]:
         "at_start": errors[0] + accuracy,
         "per_unit_time": growth / far,
         "per_cycle": growth / _CYCLES,
+    }
+
+
+def _error_of_decimals(solution: Solution, accuracy: float, digits: int) -> dict[str, float]:
+    """Return the bound for a document with more digits: numbers are right to two units of the last
+    of their digits, and a cycle turns the frame by 2π times its sensitivity along the flow.
+    """
+    last = 10.0 ** (3 - digits - FAR_DIGITS)
+    steep = max(
+        1.0, float(solution.sensitivity.along_flow) / float(np.max(np.abs(solution.in_tau1.rates)))
+    )
+    per_cycle = 2 * math.pi * steep * last * (1 + solution.curve.genus)
+    return {
+        "at_start": accuracy + 10.0 ** (1 - digits) * steep,
+        "per_unit_time": per_cycle * solution.fastest,
+        "per_cycle": per_cycle,
     }

@@ -20,7 +20,7 @@ from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapI
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map"]
+__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "require_few_modes"]
 
 #: Milliseconds with some _DIGITS (fewer and more change all of them alike, about), by genus, the
 #: last for all above: a node of panels; a mode of the Fourier time map at once, where no cut takes
@@ -62,6 +62,31 @@ class UniformTimeMap:
 TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
+def _estimate_modes(coarse: Solution, digits: int, genus: int) -> tuple[float, float]:
+    """Return about how many modes count to so many digits, and the milliseconds that they take."""
+    modes = coarse.modes * (digits / DOUBLE.digits) ** genus
+    # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.
+    nodes = max(1.0, max(coarse.rate.needed_nodes) / _NODES)
+    return modes, modes * _MODE[min(genus, max(_MODE))] * nodes**2
+
+
+def _is_formed_in_minutes(coarse: Solution, digits: int, genus: int) -> bool:
+    modes, forming = _estimate_modes(coarse, digits, genus)
+    growth = (digits / _DIGITS) ** _GROWTH[min(genus, max(_GROWTH))]
+    return modes <= MOST_MODES and forming * growth <= _LONGEST
+
+
+def require_few_modes(coarse: Solution, digits: int) -> None:
+    """Raise Unsolved (``too-many-modes``) where the modes that count to so many digits take more
+    than minutes.
+    """
+    genus = coarse.curve.genus
+    if coarse.problem.time != "tau1" and not _is_formed_in_minutes(coarse, digits, genus):
+        modes, _ = _estimate_modes(coarse, digits, genus)
+        reason = f"with {digits} digits the time map has about {modes:.0f} modes; take fewer digits"
+        raise Unsolved("too-many-modes", reason)
+
+
 def choose_time_map(
     orbit: Orbit, approximate: NDArray[np.float64], coarse: Solution, moving: Moving
 ) -> TimeMap:
@@ -77,9 +102,7 @@ def choose_time_map(
     genus = moving.size - 1
     times = approximate.size
     kind = min(genus, max(_NODE))
-    modes = coarse.modes * (xp.digits / DOUBLE.digits) ** genus
-    # Next to a separatrix cuts take many nodes, and modes turn so much faster on them.
-    forming = modes * _MODE[kind] * max(1.0, max(coarse.rate.needed_nodes) / _NODES) ** 2
+    modes, forming = _estimate_modes(coarse, xp.digits, genus)
     by_modes = forming + times * (modes * _MODE_AT_TIME[kind] + _TIME)
     by_panels = estimate_nodes(orbit, approximate) * _NODE[kind]
     maps: list[Callable[[], ChebyshevTimeMapInBalls | FourierTimeMapInBalls]] = [
@@ -87,8 +110,7 @@ def choose_time_map(
     ]
     # Of a direction that doubles do not see they say nothing.
     known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
-    growth = (xp.digits / _DIGITS) ** _GROWTH[kind]
-    if known and modes <= MOST_MODES and forming * growth <= _LONGEST and not xp.certified:
+    if known and _is_formed_in_minutes(coarse, xp.digits, genus) and not xp.certified:
         maps.insert(int(by_panels < by_modes), partial(FourierTimeMapInBalls, orbit))
     for time_map in maps[:-1]:
         with suppress(Unsolved):

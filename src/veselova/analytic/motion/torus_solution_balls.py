@@ -115,11 +115,11 @@ class SolutionInBalls:
             rate = TimeRate.of(self.spectrum, inversion, problem.time)
             origin = inversion.map(self._angles)[0]
             frequencies = inversion.periods.frequencies
-            self._quotients: ThetaQuotients | None = None
+            self.quotients: ThetaQuotients | None = None
             if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
-                self._quotients = ThetaQuotients(theta, self.frame)
-            time_rate = None if self._quotients is None else self._quotients.time_rate
+                self.quotients = ThetaQuotients(theta, self.frame)
+            time_rate = None if self.quotients is None else self.quotients.time_rate
             # Doubles do not see every direction that moves.
             in_angles = coarse.takes_rate_from_angles(coarse.default_method())
             coarse_rate = (
@@ -149,7 +149,7 @@ class SolutionInBalls:
         unit = xp.number(self.moving.unit)
         points = to_all_directions(points / unit, self.moving.frozen, xp)
         states = States(
-            tau1 * xp.sqrt(unit), self._body.to_axes(velocity), self._body.frames(attitude), points
+            tau1 * xp.sqrt(unit), self.body.to_axes(velocity), self.body.frames(attitude), points
         )
         return series_of(
             problem,
@@ -221,8 +221,8 @@ class SolutionInBalls:
         tau1 = time_map.tau1(times, approximate)
         z = self.orbit.phases(tau1)
         attitude = (
-            self._quotients.at(z)
-            if self._quotients is not None
+            self.quotients.at(z)
+            if self.quotients is not None
             else self.frame.at(self.orbit.rate.inversion.invert(z))
         )
         return (
@@ -232,7 +232,7 @@ class SolutionInBalls:
         )
 
     @cached_property
-    def _body(self) -> BodyFrame:
+    def body(self) -> BodyFrame:
         normals = np.asarray(self.frame.at(self._angles).normals[0])
         return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
 
@@ -247,7 +247,7 @@ class SolutionInBalls:
             return None
         drift = PerturbationBound.of(given, self.moving, xp)
         q = xp.array(self.problem.exact.q)
-        turn = self._body.turn(drift.matrix, self.spectrum.constants, q / xp.sqrt(np.sum(q * q)))
+        turn = self.body.turn(drift.matrix, self.spectrum.constants, q / xp.sqrt(np.sum(q * q)))
         return replace(drift, frames=xp.upper_bound(turn).item())
 
 

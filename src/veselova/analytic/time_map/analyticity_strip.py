@@ -66,17 +66,18 @@ class Orbit:
         z = self.phases(tau1)
         if self.time_rate is None:
             return self.rate.at(self.rate.inversion.invert(z))
-        return np.asarray(self._unit * self.time_rate(z) ** self._power)
+        return np.asarray(self.rate_constant * self.time_rate(z) ** self.power)
 
     @property
-    def _power(self) -> int:
+    def power(self) -> int:
+        """Return the power of √(q,Aq) that d(time)/dτ₁ is."""
         return TIME_RATE_POWERS[self.rate.time]
 
     @cached_property
-    def _unit(self) -> Any:
+    def rate_constant(self) -> Any:
         """Return d(time)/dτ₁ over its power of the stretch, from the start."""
         assert self.time_rate is not None
-        at_start = self.time_rate(self.start[None, :])[0] ** self._power
+        at_start = self.time_rate(self.start[None, :])[0] ** self.power
         return 1 / (self.rate.inversion.arithmetic.number(self.spectrum.time_rate) * at_start)
 
     @cached_property

@@ -41,17 +41,22 @@ _TAIL = 4
 class FourierTimeMapInBalls:
     """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is
     left out is estimated.
+
+    ``cutoff``: the least |F_m| of modes (M, g) that are kept, with their ``coefficients`` (M,); the
+    precision where none is given.
     """
 
     name = "fourier"
 
-    def __init__(self, orbit: Orbit) -> None:
+    def __init__(self, orbit: Orbit, cutoff: float | None = None) -> None:
         self._orbit = orbit
+        self._cutoff = cutoff
         xp: Any = orbit.rate.inversion.arithmetic
         self._xp = xp
         self._mean = orbit.rate.mean
-        self._modes, coefficients, edge = self._select_modes()
-        rates = self._modes @ orbit.frequencies
+        self.modes, coefficients, edge = self._select_modes()
+        self.coefficients = coefficients
+        rates = self.modes @ orbit.frequencies
         self._amplitudes = coefficients / (xp.pi * rates)
         self._slopes = 2 * coefficients
         self._bend = np.sum(xp.upper_bound(2 * xp.pi * rates * self._slopes))
@@ -64,17 +69,17 @@ class FourierTimeMapInBalls:
         )
         #: 1/|m·f| of those kept and of those next to them.
         self._slowness = np.abs(
-            1 / (np.concatenate([self._modes, edge]) @ orbit.frequencies)
+            1 / (np.concatenate([self.modes, edge]) @ orbit.frequencies)
         ).astype(float)
 
     @property
     def size(self) -> int:
         """Return the number of modes kept, m and −m counted once."""
-        return len(self._modes)
+        return len(self.modes)
 
     @cached_property
     def _smallest(self) -> Any:
-        return self._mean * self._xp.epsilon
+        return self._mean * self._xp.epsilon if self._cutoff is None else self._cutoff
 
     def _select_modes(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
@@ -134,13 +139,13 @@ class FourierTimeMapInBalls:
         turns = xp.turns(np.concatenate([start, z + delta[:, None] * self._orbit.frequencies]))
         selected = self._select_by_digits(digits)
         exponentials = sums_over_modes(
-            "sines", self._modes[selected], self._amplitudes[selected], turns, xp.at(digits)
+            "sines", self.modes[selected], self._amplitudes[selected], turns, xp.at(digits)
         )
         value = self._mean * delta + exponentials[1:] - exponentials[0]
         selected = self._select_by_digits(half)
         with xp.at(half) as fewer:
             exponentials = sums_over_modes(
-                "cosines", self._modes[selected], self._slopes[selected], turns[1:], fewer
+                "cosines", self.modes[selected], self._slopes[selected], turns[1:], fewer
             )
             return value, xp.add_error(
                 self._mean + exponentials, np.sum(xp.upper_bound(self._slopes[~selected]))
@@ -155,7 +160,7 @@ class FourierTimeMapInBalls:
     def _near(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return δ in double precision, from the uniform phases (N, g)."""
         selected = self._select_by_digits(DOUBLE.digits)
-        modes = self._modes[selected]
+        modes = self.modes[selected]
         amplitudes = self._amplitudes[selected].astype(float)
         slopes = self._slopes[selected].astype(float)
         frequencies = self._orbit.frequencies.astype(float)

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["evaluate", "lattice_sum", "lattice_within", "neumann_time"]
+__all__ = ["evaluate", "lattice_sum", "lattice_within", "neumann_time", "series_of"]
 
 Array = NDArray[np.float64]
 
 #: Terms below e^(−39) = 1e-17 of the largest are left out: π|x|² ≤ 39.
-_RADIUS = np.sqrt(39.0 / np.pi)
+_NATS = 39.0
 
 #: Entries of one block of (times × modes) or (times × lattice).
 _BLOCK = 400_000
@@ -33,7 +33,7 @@ def evaluate(
     remainders: Array | None = None,
 ) -> dict[str, Array]:
     """Return the series of a document at times (N,), or at times + remainders, by name."""
-    tau1, z = neumann_time(document, arrays, times, remainders)
+    tau1, z, _ = neumann_time(document, arrays, times, remainders)
     values = np.concatenate(
         [lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)]
     )
@@ -56,7 +56,7 @@ def evaluate(
     rate = document["rate"]
     place = int(rate["characteristic"])
     slope = float(rate["constant"]) * np.abs(quotients[:, place]) ** int(rate["power"])
-    series = _series(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
+    series = series_of(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
     if "path" not in document:
         return series
     elapsed = times if remainders is None else times + remainders
@@ -92,16 +92,18 @@ def _contact_point(
     )
 
 
-def _series(
-    document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array
-) -> dict[str, Array]:
+def series_of(
+    document: Mapping[str, Any], A: Any, tau1: Any, frame: Any, velocity: Any, root: Any = np.sqrt
+) -> dict[str, Any]:
     """Return the series under the names of the system; ``velocity`` is that of q in the system's
     own time.
+
+    Numbers may be of any kind whose roots ``root`` takes.
     """
     axes = document.get("axes")
     q = frame[:, :, 0]
     if document["problem"]["system"] == "ellipsoid-geodesic":
-        X = A * q / np.sqrt(np.sum(A * q * q, axis=1))[:, None]
+        X = A * q / root(np.sum(A * q * q, axis=1))[:, None]
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
     if axes is not None:
         matrix = np.array(axes, dtype=np.float64)
@@ -111,8 +113,14 @@ def _series(
     if document["problem"]["system"] == "neumann":
         return {"q": q, "q_prime": velocity, "frame": frame}
     if document["problem"]["system"] in ("veselova-so3", "rubber-ball"):
-        return {"gamma": q, "Omega": np.cross(velocity, q), "frame": frame}
+        return {"gamma": q, "Omega": _cross(velocity, q), "frame": frame}
     return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
+
+
+def _cross(a: Any, b: Any) -> Any:
+    """Return the vector products of rows, (N, 3), of numbers of any kind."""
+    columns = [a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)]
+    return np.stack(columns, axis=1)
 
 
 def _rows(count: int, block: int) -> list[slice]:
@@ -124,8 +132,8 @@ def neumann_time(
     arrays: Mapping[str, Array],
     times: Array,
     remainders: Array | None = None,
-) -> tuple[Array, Array]:
-    """Return τ₁ (N,) and the phases z modulo 2, (N, g).
+) -> tuple[Array, Array, Array]:
+    """Return τ₁ (N,), the phases z modulo 2, (N, g), and δ (N,).
 
     With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰
     + (f/F_0)t + fδ. The left side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals
@@ -141,7 +149,7 @@ def neumann_time(
     if len(modes):
         for rows in _rows(len(times), _BLOCK // len(modes)):
             delta[rows] = _solve_delta(arrays, mean, advance[rows])
-    return times / mean + delta, np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0)
+    return times / mean + delta, np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0), delta
 
 
 def _uniform_advance(document: Mapping[str, Any], rates: Array, times: Array) -> Array:
@@ -236,14 +244,15 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
     return found
 
 
-def lattice_within(form: Array, shift: Array, margin: float) -> Array:
-    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ 39, (X, d), and those within it of some
-    point of |r_i| ≤ margin.
+def lattice_within(form: Array, shift: Array, margin: float, nats: float = _NATS) -> Array:
+    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ nats, (X, d), and those within it of
+    some point of |r_i| ≤ margin.
     """
+    radius = np.sqrt(nats / np.pi)
     if not len(form):
         return np.zeros((1, 0))
     shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
-    widths = np.sqrt(_RADIUS**2 + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
+    widths = np.sqrt(radius**2 + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
     ranges = [
         np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s
         for w, s in zip(widths, shift, strict=True)
@@ -255,4 +264,4 @@ def lattice_within(form: Array, shift: Array, margin: float) -> Array:
     norms = np.einsum("xi,ij,xj->x", points, form, points)
     # The largest term of a characteristic is that of its shortest vector, which is long where a cut
     # is nearly closed.
-    return np.asarray(points[np.sqrt(norms) <= np.sqrt(_RADIUS**2 + norms.min()) + margins])
+    return np.asarray(points[np.sqrt(norms) <= np.sqrt(radius**2 + norms.min()) + margins])

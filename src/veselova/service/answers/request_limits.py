@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.json_text import layers
@@ -67,12 +68,11 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
     elif count * n * n > settings.max_values:
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
         faults.add(("times",), required, str(count * n * n))
-    if isinstance(request, ComparisonRequest):
-        if request.digits > settings.max_digits:
-            required = f"at most {settings.max_digits} on this server"
-            faults.add(("digits",), required, str(request.digits))
-        if not faults.found:
-            faults.attempt(require_hope, request, settings)
+    digits = getattr(request, "digits", FEWEST_DIGITS)
+    if digits > settings.max_digits:
+        faults.add(("digits",), f"at most {settings.max_digits} on this server", str(digits))
+    if isinstance(request, ComparisonRequest) and not faults.found:
+        faults.attempt(require_hope, request, settings)
 
 
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:

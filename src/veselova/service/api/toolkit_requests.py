@@ -9,9 +9,10 @@ from typing import Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field, WithJsonSchema
 
 from veselova.mechanics.core.curve_arguments import curve_arguments, points_with_sheets
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.theta_arguments import ThetaArguments
-from veselova.mechanics.results.closed_form import require_accuracy
+from veselova.mechanics.results.closed_form import MOST_CLOSED_FORM_DIGITS, require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, THETA
 from veselova.service.api.problem_models import NUMBER
@@ -42,14 +43,32 @@ class ClosedFormRequest(TorusRequest):
 
     accuracy: Annotated[
         Any,
-        WithJsonSchema({"type": "number", "minimum": 1e-15, "maximum": 1e-2}),
-        Field(description="error that modes left out of the time map may make"),
-    ] = 1e-12
+        WithJsonSchema(
+            {
+                "anyOf": [
+                    {"type": "number", "exclusiveMinimum": 0, "maximum": 1e-2},
+                    {"type": "null"},
+                ]
+            }
+        ),
+        Field(
+            description="error that modes left out of the time map may make, 10^−digits or more; "
+            "10^(3−digits) when left out"
+        ),
+    ] = None
+    digits: Annotated[
+        int,
+        Field(
+            ge=FEWEST_DIGITS,
+            le=MOST_CLOSED_FORM_DIGITS,
+            description=f"beyond {FEWEST_DIGITS}, numbers are decimal strings",
+        ),
+    ] = FEWEST_DIGITS
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        faults.attempt(require_accuracy, self.accuracy)
+        faults.attempt(require_accuracy, self.accuracy, self.digits)
         return faults.found
 
 

@@ -231,7 +231,7 @@ def closed_form(
     from veselova.service.cli.console import print_json
     from veselova.service.workers.tasks import closed_form_request
 
-    document = _without_motion(_document(file))
+    document = _without_motion(_document(file), but=("digits",))
     request = read_request(ClosedFormRequest, document)
     _check_file("--output", output, (".json",))
     with _within_budget(document):
@@ -301,11 +301,14 @@ def _document(file: str) -> Any:
 _OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
 
 
-def _without_motion(document: Any) -> Any:
-    """Return a request without the fields of a motion: its file serves for its torus too."""
+def _without_motion(document: Any, but: tuple[str, ...] = ()) -> Any:
+    """Return a request without the fields of a motion, but those named: its file serves for its
+    torus too.
+    """
     if not isinstance(document, dict):
         return document
-    return {name: value for name, value in document.items() if name not in _OF_MOTIONS}
+    left_out = set(_OF_MOTIONS) - set(but)
+    return {name: value for name, value in document.items() if name not in left_out}
 
 
 _WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")

@@ -16,7 +16,7 @@ from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.core.times import as_request
-from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
+from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.curve import CurveData
 from veselova.mechanics.results.provenance import Provenance
@@ -162,12 +162,17 @@ def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) 
 
 
 def closed_form_call(
-    problem: Problem | Mapping[str, Any], accuracy: float = 1e-12, *, budget_s: float = 10.0
+    problem: Problem | Mapping[str, Any],
+    accuracy: float | None = None,
+    digits: int = FEWEST_DIGITS,
+    *,
+    budget_s: float = 10.0,
 ) -> Call[ClosedForm]:
     """Return the motion of a problem as data (see ``veselova.closed_form``)."""
     body = {
         "problem": _problem(problem).as_request(),
-        "accuracy": require_accuracy(accuracy),
+        "accuracy": accuracy,
+        "digits": digits,
         "budget_s": budget_s,
     }
     return Call("/v1/closed-forms", body, budget_s, ClosedForm)

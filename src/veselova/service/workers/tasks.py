@@ -89,7 +89,7 @@ def _torus(request: Any) -> dict[str, Any]:
 
 def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
     """Return the closed form that a request asks for."""
-    return closed_form(request.problem.problem(), request.accuracy)
+    return closed_form(request.problem.problem(), request.accuracy, request.digits)
 
 
 def _closed_form(request: Any) -> dict[str, Any]:
