@@ -252,6 +252,16 @@ def test_a_document_of_thirty_digits_lasts_to_ten_to_the_twelve() -> None:
     assert float(max(np.ravel(off))) <= states.error[0] <= 1e-25
 
 
+def test_the_modes_left_out_of_a_large_document_are_within_its_error() -> None:
+    body = vs.Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
+    states = vs.closed_form(body, digits=20).at([77777])
+    wanted = vs.solve(body, [77777], digits=23).decimals
+    assert wanted is not None
+    assert states.decimals is not None
+    off = np.abs(states.decimals["frame"] - wanted.midpoints["frame"])
+    assert float(max(np.ravel(off))) <= states.error[0] <= 2e-17
+
+
 def test_a_coarse_document_of_many_digits_says_how_far_it_is_off() -> None:
     document = vs.closed_form(BODY3, accuracy=1e-18, digits=25)
     wanted = vs.solve(BODY3, [12345], digits=25).decimals

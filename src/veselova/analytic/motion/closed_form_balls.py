@@ -29,6 +29,10 @@ FAR_DIGITS = 15
 _SPARE = 15
 _ATTEMPTS = 4
 
+#: By how much the least coefficient is below the accuracy, at first: slow modes, and many of them,
+#: move τ₁ by more than their coefficients.
+_FEWER_MODES = 200.0
+
 
 def decimal_fields(coarse: Solution, accuracy: float, digits: int) -> dict[str, Any]:
     """Return the fields of the document whose numbers are decimals: strings of ``digits`` and
@@ -162,8 +166,12 @@ class _Numbers:
         mean = float(self._fine.orbit.rate.mean)
         sensitivity = float(coarse.sensitivity.along_flow)
         fastest = float(np.max(np.abs(coarse.in_tau1.rates)))
-        cutoff = accuracy * fastest * mean / (20 * max(1.0, sensitivity))
+        cutoff = accuracy * fastest * mean / (_FEWER_MODES * max(1.0, sensitivity))
         time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff)
+        # what is below the cutoff may move τ₁ by its part of the accuracy
+        while (left := float(time_map.tail(np.inf)) * sensitivity / mean) > accuracy / 4:
+            cutoff *= accuracy / (8 * left)
+            time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff)
         modes = time_map.modes
         pace = np.abs(modes @ self._fine.orbit.frequencies).astype(float)
         reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity

@@ -116,12 +116,12 @@ class FourierTimeMapInBalls:
                 delta = xp.midpoints(delta - value / slope)
         value, slope = self._excess(xp.digits, z, delta)
         tau1 = uniform + delta
-        tail = self._tail(float(np.max(np.abs(tau1.astype(float)))))
+        tail = self.tail(float(np.max(np.abs(tau1.astype(float)))))
         return np.asarray(tau1 - interval_step(xp.add_error(value, tail), slope, self._bend, xp)[0])
 
-    def _tail(self, elapsed: float) -> Any:
-        """Return what the modes left out add up to: what a mode does to t grows until a half of its
-        period, 1/(2 m·f).
+    def tail(self, elapsed: float) -> Any:
+        """Return what the modes left out add up to in t after so much Neumann time: what a mode
+        does to t grows until a half of its period, 1/(2 m·f).
         """
         return (
             _TAIL
