@@ -30,7 +30,7 @@ def test_the_python_of_the_readme_runs(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     scope: dict[str, Any] = {}
     sources = blocks(README, "python")
-    assert len(sources) == 5
+    assert len(sources) == 6
     for source in sources:
         exec(source.replace("http://127.0.0.1:8000", server.url), scope)
     assert scope["comparison"].agrees

@@ -30,6 +30,7 @@ from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.exact_input import over_common_denominator
 
 __all__ = ["RealCurve"]
 
@@ -116,7 +117,9 @@ class RealCurve:
         """Return the period data of the nodal differentials in μ."""
         betas = self.betas
         g = self.genus
-        differences = np.array([[float(b - a) for b in betas] for a in betas])
+        # integers over one denominator: their quotients are correctly rounded
+        whole, common = over_common_denominator(betas)
+        differences = np.array([[(b - a) / common for b in whole] for a in whole])
         origins = tuple(
             BranchPoint("c" if j % 2 == 0 and j < 2 * g else "I", j) for j in range(2 * g + 1)
         )
