@@ -4,6 +4,7 @@ finite-gap waves.
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -276,3 +277,43 @@ def test_every_bad_branch_point_is_named() -> None:
         curves.RealHyperelliptic([0, "x", 1j, float("nan")], 3)
     fields = [fault.field for fault in caught.value.faults]
     assert fields == ["branch_points[1]", "branch_points[2]", "branch_points[3]", "sign"]
+
+
+@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize(
+    ("points", "sign"),
+    [(["0", "1", "1.7", "3", "4.5"], -1), (["0", "1", "1.7", "3", "4.5", "7/2"], 1)],
+)
+def test_the_riemann_matrix_has_the_digits_asked_for(
+    points: list[str], sign: int, certified: bool
+) -> None:
+    curve = curves.RealHyperelliptic(points, sign, digits=30, certified=certified)
+    ordered = [str(b) for b in sorted(map(Fraction, points))]
+    decimals = curve.decimals
+    assert decimals is not None
+    T, radii = decimals.midpoints["riemann_matrix"], decimals.radii["riemann_matrix"]
+    assert max(radii.ravel()) <= Decimal("1e-30")
+    finer = curves.RealHyperelliptic(ordered, sign, digits=60).decimals
+    assert finer is not None
+    assert (np.abs(T - finer.midpoints["riemann_matrix"]) <= radii).all()
+    assert np.allclose(T.astype(float), curve.riemann_matrix.imag, rtol=1e-14, atol=0)
+
+
+def test_thirty_digits_of_a_riemann_matrix_are_those_of_elliptic_integrals() -> None:
+    """Genus 1: T = K'/K of the modulus of the cut, by mpmath."""
+    decimals = curves.RealHyperelliptic(["0", "1", "3"], digits=30, certified=True).decimals
+    assert decimals is not None
+    with mpmath.workdps(45):
+        # the cut is [1, 3]: its modulus is (3−1)/(3−0)
+        m = mpmath.mpf(2) / 3
+        wanted = mpmath.ellipk(1 - m) / mpmath.ellipk(m)
+        off = abs(mpmath.mpf(str(decimals.midpoints["riemann_matrix"][0, 0])) - wanted)
+        assert off <= mpmath.mpf(str(decimals.radii["riemann_matrix"][0, 0]))
+
+
+def test_digits_of_curves_are_bounded_and_named() -> None:
+    assert curves.RealHyperelliptic([0, 1, 2]).decimals is None
+    with pytest.raises(InvalidInput) as caught:
+        curves.RealHyperelliptic([0, 1], digits=2000, certified=1)  # type: ignore[arg-type]
+    fields = [fault.field for fault in caught.value.faults]
+    assert fields == ["branch_points", "digits", "certified"]

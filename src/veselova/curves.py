@@ -28,7 +28,14 @@ from veselova.mechanics.core.curve_arguments import (
     exact_points,
     points_with_sheets,
 )
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
+from veselova.mechanics.core.decimals import (
+    FEWEST_DIGITS,
+    MOST_DIGITS,
+    Decimals,
+    beyond_double,
+)
+from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
+from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.results.curve import CurveData
 
 __all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
@@ -68,6 +75,8 @@ class RealHyperelliptic:
     branch_points   numbers or text ("0.7", "7/10"), taken exactly, in any order; near-coincident
         ones keep their digits
     sign            −1 or 1
+    digits, certified   more digits than a double has (15 … 1000), or proven errors, of the Riemann
+        matrix: ``decimals``
 
     Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once.
     Raises InvalidInput for repeated, complex or too few branch points. Accuracy:
@@ -75,9 +84,24 @@ class RealHyperelliptic:
     digits.
     """
 
-    def __init__(self, branch_points: ArrayLike | Sequence[Any], sign: int = -1) -> None:
-        points, self.sign = curve_arguments(branch_points, sign)
+    def __init__(
+        self,
+        branch_points: ArrayLike | Sequence[Any],
+        sign: int = -1,
+        *,
+        digits: int = FEWEST_DIGITS,
+        certified: bool = False,
+    ) -> None:
+        faults = Faults()
+        known = faults.attempt(curve_arguments, branch_points, sign)
+        faults.attempt(whole_number, digits, ("digits",), FEWEST_DIGITS, MOST_DIGITS)
+        faults.attempt(require_truth_value, certified, "certified")
+        faults.require_none()
+        assert known is not None
+        points, self.sign = known
         self._curve = RealCurve(points, self.sign)
+        self._digits = digits
+        self._certified = certified
 
     def __repr__(self) -> str:
         return (
@@ -174,6 +198,20 @@ class RealHyperelliptic:
         largest = float(np.max(np.abs(periods.riemann_matrix)))
         cancelling = max(1.0, float(np.max(periods.cancellation)))
         return largest * max(_ENTRY_ROUNDING * cancelling, 2 * periods.riemann_matrix_residual)
+
+    @cached_property
+    def decimals(self) -> Decimals | None:
+        """Return T of τ = iT as ``midpoints["riemann_matrix"]`` with so many digits after the
+        point, and its ``radii``, proven where ``certified``; None in double precision.
+
+        Raises Unsolved where a gap is too narrow for the digits.
+        """
+        if not beyond_double(self._digits, self._certified):
+            return None
+        # loads python-flint
+        from veselova.analytic.curve.real_hyperelliptic_balls import riemann_matrix_decimals
+
+        return riemann_matrix_decimals(self._curve, self._digits, self._certified)
 
     @property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:

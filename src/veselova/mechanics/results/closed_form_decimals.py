@@ -93,8 +93,8 @@ class DecimalEvaluator:
         frame[:, 1:] = directions @ normals @ fields["rotation"] + fields["frozen"]
         velocity = directions @ (normals @ entries(document["q_prime"]))
         rate = document["rate"]
-        stretch = abs(quotients[int(rate["characteristic"])]) ** int(rate["power"])
-        velocity = velocity / (mpf(rate["constant"]) * stretch)
+        ratio = abs(quotients[int(rate["characteristic"])]) ** int(rate["power"])
+        velocity = velocity / (mpf(rate["constant"]) * ratio)
         root = np.frompyfunc(self._context.sqrt, 1, 1)
         rows = np.array([tau1], dtype=object), frame[None], velocity[None]
         found = series_of(document, fields["A"], *rows, root=root)
@@ -128,17 +128,17 @@ class DecimalEvaluator:
         f = self._fields["frequencies"]
         modes = np.array(self._document["modes"], dtype=object)
         amplitudes = coefficients / (ctx.pi * (modes @ f))
-        begin = amplitudes @ self._waves(self._fields["phases"])[1]
+        begin = amplitudes @ self._sinusoids(self._fields["phases"])[1]
         smallest = ctx.mpf(10) ** (5 - ctx.dps)
         for _ in range(_MOST_STEPS):
-            cosines, sines = self._waves(z + delta * f)
+            cosines, sines = self._sinusoids(z + delta * f)
             step = (mean * delta + amplitudes @ sines - begin) / (mean + 2 * coefficients @ cosines)
             delta = delta - step
             if abs(step) <= smallest * max(1, abs(delta)):
                 return delta
         raise InternalContradiction("Newton's method for the time map does not converge")
 
-    def _waves(self, z: Objects) -> tuple[Objects, Objects]:
+    def _sinusoids(self, z: Objects) -> tuple[Objects, Objects]:
         """Return cos 2πm·z and sin 2πm·z of all modes."""
         modes = np.array(self._document["modes"], dtype=np.int64)
         found = self._powers(2 * z, modes)
@@ -171,7 +171,7 @@ class DecimalEvaluator:
             half = np.rint(2 * np.linalg.inv(to_doubles).T @ epsilon).astype(np.int64)  # 2ε
             G = lattice.G
             nearest = np.array([int(ctx.nint(x)) for x in y[G]], dtype=object)
-            orders, weights = lattice.waves(tuple(half[lattice.F].tolist()))
+            orders, weights = lattice.points(tuple(half[lattice.F].tolist()))
             total = ctx.mpf(0)
             for k in lattice.cell:
                 whole = nearest + k
@@ -179,8 +179,8 @@ class DecimalEvaluator:
                 gaussian = ctx.exp(-ctx.pi * (d @ lattice.inverse @ d)) if G else ctx.mpf(1)
                 turns = y[lattice.F] + lattice.cross @ d if G else y[lattice.F]
                 factor = ctx.expjpi(ctx.mpf(int(whole @ half[G]))) if G else ctx.mpc(1)
-                waves = self._powers(turns, orders) if lattice.F else np.ones(1, dtype=object)
-                total += gaussian * (factor * (weights @ waves)).real
+                powers = self._powers(turns, orders) if lattice.F else np.ones(1, dtype=object)
+                total += gaussian * (factor * (weights @ powers)).real
             found.append(total)
         return np.array(found, dtype=object)
 
@@ -214,7 +214,7 @@ class _Lattice:
             self.inverse = np.array(context.inverse(block).tolist(), dtype=object)
             self.cross = form[np.ix_(self.F, self.G)] @ self.inverse
             self.form = self.form - self.cross @ form[np.ix_(self.G, self.F)]
-        self._waves: dict[tuple[int, ...], tuple[NDArray[np.int64], Objects]] = {}
+        self._weighted: dict[tuple[int, ...], tuple[NDArray[np.int64], Objects]] = {}
 
     @cached_property
     def cell(self) -> NDArray[np.int64]:
@@ -223,14 +223,14 @@ class _Lattice:
         points = lattice_within(inverse, np.zeros(len(self.G)), 0.5, self._terms_to)
         return np.rint(points).astype(np.int64)
 
-    def waves(self, doubled: tuple[int, ...]) -> tuple[NDArray[np.int64], Objects]:
+    def points(self, doubled: tuple[int, ...]) -> tuple[NDArray[np.int64], Objects]:
         """Return 2x and the weights e^{−πxᵀSx} of x ∈ Z^F + ε_F, whose double is given."""
-        if doubled not in self._waves:
+        if doubled not in self._weighted:
             shift = np.array(doubled) / 2
             points = lattice_within(self.form.astype(float), shift, 0.0, self._terms_to)
             orders = np.rint(2 * points).astype(np.int64)
             whole = orders.astype(object)
             forms = np.sum((whole @ self.form) * whole, axis=1) if self.F else np.zeros(1)
             weight = np.frompyfunc(lambda x: self._context.exp(-self._context.pi * x / 4), 1, 1)
-            self._waves[doubled] = orders, np.asarray(weight(forms), dtype=object)
-        return self._waves[doubled]
+            self._weighted[doubled] = orders, np.asarray(weight(forms), dtype=object)
+        return self._weighted[doubled]
