@@ -293,3 +293,15 @@ def test_more_digits_ask_for_a_as_numbers() -> None:
     body = vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6])
     with pytest.raises(vs.InvalidInput, match="A as n numbers"):
         vs.closed_form(body, digits=20)
+
+
+def test_a_ball_with_a_path_has_the_digits_of_a_double() -> None:
+    ball = vs.RubberBall(
+        inertia=[1, 2, 3],
+        mass=1,
+        radius=1,
+        gamma=["0.6", 0, "0.8"],
+        Omega=["0.8", 1, "-0.6"],
+    )
+    with pytest.raises(vs.InvalidInput, match="digits: required 15"):
+        vs.closed_form(ball, digits=20)
