@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.results.provenance import Provenance as Provenance
     from veselova.mechanics.results.torus import Torus as Torus
     from veselova.mechanics.results.trajectory import Trajectory as Trajectory
+    from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
     from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "AsyncClient": "veselova.service.client.client",
     "BackendMissing": "veselova.mechanics.core.errors",
+    "ChaplyginBall": "veselova.mechanics.systems.chaplygin_ball",
     "Client": "veselova.service.client.client",
     "ClosedForm": "veselova.mechanics.results.closed_form",
     "Comparison": "veselova.mechanics.results.comparison",

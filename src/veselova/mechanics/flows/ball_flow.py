@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.flow import Flow, Operations
+from veselova.mechanics.core.flow import FLOATS, Flow, Operations
 from veselova.mechanics.flows.rigid_body_flow import cross
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 
-__all__ = ["ContactForceFlow", "RollingFlow"]
+__all__ = ["ChaplyginFlow", "ContactForceFlow", "RollingFlow"]
 
 Array = NDArray[np.float64]
 
@@ -75,6 +75,74 @@ class RollingFlow(Flow):
         """Return the series of the attitude, and position."""
         series: dict[str, Array] = self.attitude.unpack(states[:, :12])
         return {**series, "position": self.contact + self.radius * states[:, 12:]}
+
+
+@dataclass(frozen=True)
+class ChaplyginFlow(Flow):
+    """The attitude of Chaplygin's ball: ė_i = e_i×Ω with Ω = B(K + σγ), B = J⁻¹, σ = D(BK,γ)/(1 −
+    D(Bγ,γ)), and the momentum EᵀK constant in space.
+
+    inverse  B, (3, 3) · added  D = ma² · momentum  EᵀK · frame  the start, all in scaled units
+    A state is the momentum and the frame, row-major, of length 12.
+    """
+
+    inverse: Array
+    added: float
+    momentum: Array
+    frame: Array
+    time_unit: float
+
+    @cached_property
+    def initial(self) -> Array:  # type: ignore[override]
+        """Return the start as a state."""
+        return np.concatenate([self.momentum, self.frame.ravel()])
+
+    @cached_property
+    def parameters(self) -> Array:  # type: ignore[override]
+        """Return B and D."""
+        return np.concatenate([self.inverse.ravel(), [self.added]])
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return zero and Ė."""
+        E = state[3:].reshape(3, 3)
+        Omega = self._angular_velocity(state[:3], E, parameters, ops)
+        frame_dot = np.stack([cross(E[:, k], Omega) for k in range(3)], axis=1)
+        return np.concatenate([state[:3] * 0, frame_dot.ravel()])
+
+    def _angular_velocity(self, momentum: Any, E: Any, parameters: Any, ops: Operations) -> Any:
+        gamma = E[:, 0]
+        inverse = parameters[:9].reshape(3, 3)
+        added = parameters[9]
+        Omega = ops.dot(inverse, ops.dot(E, momentum))
+        across = ops.dot(inverse, gamma)
+        share = added * ops.dot(Omega, gamma) / (1 - added * ops.dot(across, gamma))
+        return Omega + share * across
+
+    def project(self, state: Array) -> Array:
+        """Return states (..., 12) with orthonormal frames."""
+        E = orthonormalize(state[..., 3:].reshape(*state.shape[:-1], 3, 3))
+        return np.concatenate([state[..., :3], E.reshape(*E.shape[:-2], 9)], axis=-1)
+
+    def neighbour(self, distance: float) -> ChaplyginFlow:
+        """Return the flow of a start moved by about ``distance``."""
+        direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
+        turn = np.stack([np.cross(e, direction[:3]) for e in self.frame.T], axis=1)
+        size = float(np.linalg.norm(self.momentum))
+        return replace(
+            self,
+            momentum=self.momentum + distance * size * direction[3:],
+            frame=orthonormalize(self.frame + distance * turn),
+        )
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return Omega and frame of states put back on the manifold."""
+        states = self.project(states)
+        frames = states[:, 3:].reshape(-1, 3, 3)
+        Omega = [
+            self._angular_velocity(k, E, self.parameters, FLOATS)
+            for k, E in zip(states[:, :3], frames, strict=True)
+        ]
+        return {"Omega": np.array(Omega) / self.time_unit, "frame": frames}
 
 
 @dataclass(frozen=True)

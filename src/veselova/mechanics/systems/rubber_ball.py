@@ -6,18 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.ball import Ball
-from veselova.mechanics.core.exact_input import given_arguments
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.ball_flow import ContactForceFlow, RollingFlow
-from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
-from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.flows.ball_flow import RollingFlow
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3, multiplier
@@ -31,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class RubberBall(VeselovaSO3):
+class RubberBall(RollingBall, VeselovaSO3):
     """A ball of mass m and radius a that rolls on a plane without slipping, with constant spin
     (Ω,γ) about the vertical γ, zero for no twist: ``VeselovaSO3`` with inertia J = I + ma².
 
@@ -57,8 +53,6 @@ class RubberBall(VeselovaSO3):
     names the field.
     """
 
-    ball: Ball
-
     system: ClassVar[str] = "rubber-ball"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Omega": ("axis",),
@@ -77,57 +71,9 @@ class RubberBall(VeselovaSO3):
         "momentum",
         "multiplier",
     )
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    twists: ClassVar[bool] = False
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
-
-    def __init__(
-        self,
-        inertia: Any,
-        mass: Any,
-        radius: Any,
-        gamma: Any,
-        Omega: Any,
-        frame: Any = None,
-        position: Any = (0, 0),
-        *,
-        strict: bool = True,
-        normalize: bool = False,
-    ) -> None:
-        ball = Ball.of(inertia, mass, radius, position, strict)
-        self._set(ball=ball)
-        super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
-        given = given_arguments(
-            inertia=inertia,
-            mass=mass,
-            radius=radius,
-            gamma=gamma,
-            Omega=Omega,
-            frame=frame,
-            position=position,
-            strict=strict,
-            normalize=normalize,
-        )
-        self._set(given=given)
-
-    def __repr__(self) -> str:
-        parts = [
-            f"{name}={np.array2string(np.asarray(value), precision=6)}"
-            for name, value in (
-                ("inertia", self.ball.tensor),
-                ("mass", float(self.ball.mass)),
-                ("radius", float(self.ball.radius)),
-                ("gamma", self.gamma),
-                ("Omega", self.Omega),
-            )
-        ]
-        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {**super().start, "position": contact}
 
     @cached_property
     def drift(self) -> Drift:
@@ -140,33 +86,14 @@ class RubberBall(VeselovaSO3):
 
     def flow(self, formulation: str = "multiplier") -> Flow:  # type: ignore[override]
         """Return the field in units of this problem."""
+        if formulation == "contact-forces":
+            return self.contact_force_flow()
+        attitude = super().flow(formulation)
         contact = self.start["position"][0]
-        radius = float(self.ball.radius)
-        if formulation != "contact-forces":
-            inner: RigidBodyFlow = super().flow(formulation)
-            return RollingFlow(inner, radius, contact, self.ball.size)
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
-        return ContactForceFlow(
-            inertia=np.ldexp(self.ball.tensor, -power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            Omega=self.Omega / self.turning,
-            frame=self.frame,
-            radius=radius,
-            contact=contact,
-            time_unit=1 / self.turning,
-            size=self.ball.size,
-            twists=False,
-        )
+        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
 
-    def derive(self, name: str, series: Series) -> Array:
-        """Return gamma, velocity, force, momentum or multiplier."""
-        if name not in ("velocity", "force"):
-            return super().derive(name, series)
-        Omega = series["Omega"]
-        frame = series["frame"]
-        if name == "velocity":
-            return self.ball.velocity(Omega, frame)
-        gamma = frame[..., 0]
+    def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
+        """Return Ω̇ = J⁻¹(JΩ×Ω + λγ)."""
         torque = np.cross(Omega @ self.inertia, Omega)
         torque = torque + multiplier(self, Omega, gamma)[..., None] * gamma
-        return self.ball.force(torque @ self.inverse, frame)
+        return np.asarray(torque @ self.inverse)

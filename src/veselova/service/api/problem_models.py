@@ -13,6 +13,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson
 from veselova.mechanics.systems.lr_system import LRSystem
@@ -193,6 +194,14 @@ class RubberBallModel(BallModel):
     system: Literal["rubber-ball"]
 
 
+class ChaplyginBallModel(BallModel):
+    """A ball that rolls on a plane without slipping and is free to twist: Chaplygin's."""
+
+    problem_class: ClassVar[type[Problem]] = ChaplyginBall
+
+    system: Literal["chaplygin-ball"]
+
+
 class StiefelModel(SystemModel):
     """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the
     constraints of rank r.
@@ -292,6 +301,7 @@ SYSTEMS: Mapping[str, type[SystemModel]] = {
     "ellipsoid-geodesic": EllipsoidGeodesicModel,
     "veselova-so3": VeselovaSO3Model,
     "rubber-ball": RubberBallModel,
+    "chaplygin-ball": ChaplyginBallModel,
     "stiefel": StiefelModel,
     "euler-poisson": EulerPoissonModel,
     "lr": LRModel,
@@ -304,6 +314,7 @@ ProblemModel = Annotated[
     | EllipsoidGeodesicModel
     | VeselovaSO3Model
     | RubberBallModel
+    | ChaplyginBallModel
     | StiefelModel
     | EulerPoissonModel
     | LRModel

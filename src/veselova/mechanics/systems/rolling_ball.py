@@ -1,0 +1,117 @@
+"""What balls on a plane share: their data, their start, and the series of the contact point."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.ball import Ball
+from veselova.mechanics.core.exact_input import given_arguments
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.flows.ball_flow import ContactForceFlow
+from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.systems.rigid_body import RigidBody
+
+__all__ = ["RollingBall"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class RollingBall(RigidBody):
+    """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
+    contact point, and the path of that point.
+
+    ball: what was given of the ball · ``inertia`` as an attribute is J
+    """
+
+    ball: Ball
+
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    #: Whether the ball may turn freely about the vertical.
+    twists: ClassVar[bool]
+
+    def __init__(
+        self,
+        inertia: Any,
+        mass: Any,
+        radius: Any,
+        gamma: Any,
+        Omega: Any,
+        frame: Any = None,
+        position: Any = (0, 0),
+        *,
+        strict: bool = True,
+        normalize: bool = False,
+    ) -> None:
+        ball = Ball.of(inertia, mass, radius, position, strict)
+        self._set(ball=ball)
+        super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
+        given = given_arguments(
+            inertia=inertia,
+            mass=mass,
+            radius=radius,
+            gamma=gamma,
+            Omega=Omega,
+            frame=frame,
+            position=position,
+            strict=strict,
+            normalize=normalize,
+        )
+        self._set(given=given)
+
+    def __repr__(self) -> str:
+        parts = [
+            f"{name}={np.array2string(np.asarray(value), precision=6)}"
+            for name, value in (
+                ("inertia", self.ball.tensor),
+                ("mass", float(self.ball.mass)),
+                ("radius", float(self.ball.radius)),
+                ("gamma", self.gamma),
+                ("Omega", self.Omega),
+            )
+        ]
+        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        contact = np.array([[float(x) for x in self.ball.contact]])
+        return {**super().start, "position": contact}
+
+    @property
+    def extent(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return self.ball.size
+
+    def contact_force_flow(self) -> ContactForceFlow:
+        """Return the field of the ball with its contact forces, in units of this problem."""
+        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+        return ContactForceFlow(
+            inertia=np.ldexp(self.ball.tensor, -power),
+            added=float(np.ldexp(float(self.ball.added), -power)),
+            Omega=self.Omega / self.turning,
+            frame=self.frame,
+            radius=float(self.ball.radius),
+            contact=self.start["position"][0],
+            time_unit=1 / self.turning,
+            size=self.ball.size,
+            twists=self.twists,
+        )
+
+    @abstractmethod
+    def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
+        """Return Ω̇ in the body, (..., 3)."""
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return velocity, force, or what the body has."""
+        if name == "velocity":
+            return self.ball.velocity(series["Omega"], series["frame"])
+        if name == "force":
+            frame = series["frame"]
+            return self.ball.force(self.angular_acceleration(series["Omega"], frame[..., 0]), frame)
+        return super().derive(name, series)

@@ -1,0 +1,102 @@
+"""Chaplygin's ball: two formulations against its own equations, its integrals, every door."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from conftest import PATIENCE, Server
+from rolling_truth import roll
+from veselova import ChaplyginBall, InvalidInput
+
+TIMES = np.linspace(0, 20, 9)
+DATA: dict[str, Any] = {
+    "inertia": [1, 1.5, 2],
+    "mass": 0.7,
+    "radius": 0.6,
+    "gamma": [0.6, 0, 0.8],
+    "Omega": [0.8, 1, -0.3],
+}
+
+
+@pytest.mark.parametrize("formulation", ChaplyginBall.formulations)
+@pytest.mark.parametrize(
+    "inertia", [[1, 1.5, 2], [1, 1, 1.5], [[2, 0.3, 0], [0.3, 1.5, 0.1], [0, 0.1, 1.7]]]
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_it_rolls_as_the_ball_itself_does(formulation: str, inertia: Any, seed: int) -> None:
+    gamma, Omega = np.random.default_rng(seed).normal(size=(2, 3))
+    problem = ChaplyginBall(inertia, 0.7, 0.6, gamma, Omega, position=(1, -2), normalize=True)
+    true = roll(problem, TIMES, twists=True)
+    found = vs.solve(problem, TIMES, formulation=formulation)
+    assert found.provenance.engine == "numeric"
+    for name in ("frame", "position", "velocity", "force"):
+        assert np.max(np.abs(found.series(name) - getattr(true, name))) < 1e-10, name
+    for name in problem.bounded:
+        off = np.abs(found.series(name) - getattr(true, name)).reshape(len(TIMES), -1)
+        assert np.all(np.max(off, axis=1) <= found.error + 1e-11)
+    assert max(found.drift.values()) < 1e-12
+
+
+def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> None:
+    """With (K,γ) = 0 the motion across the horizontal momentum is a·2h/|K|, exactly."""
+    gamma = np.array(DATA["gamma"])
+    Omega = np.array([0.8, 1, -0.3])
+    inertia = np.diag(DATA["inertia"])
+    Omega -= (gamma @ inertia @ Omega) / (gamma @ inertia @ gamma) * gamma
+    problem = ChaplyginBall(**{**DATA, "Omega": Omega})
+    found = vs.solve(problem, np.linspace(0, 50, 101))
+    momentum = found.integrals["space_momentum"][0]
+    across = np.cross(momentum, [1, 0, 0])[1:] / np.linalg.norm(momentum)
+    speed = 0.6 * 2 * found.integrals["energy"][0] / np.linalg.norm(momentum)
+    assert abs(found.integrals["area"][0]) < 1e-15
+    assert np.max(np.abs(found.position @ across - speed * found.times)) < 1e-10
+
+
+def test_the_service_answers_and_refuses_by_name(server: Server) -> None:
+    document = {"system": "chaplygin-ball", **DATA}
+    ask = {"problem": document, "times": [0.0, 1.0]}
+    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
+    expected = vs.solve(ChaplyginBall(**DATA), [0.0, 1.0])
+    assert np.allclose(answer["series"]["position"], expected.position, atol=1e-12)
+    for changes, field in (({"mass": -1}, "mass"), ({"inertia": [1, 1, 3]}, "inertia")):
+        with pytest.raises(InvalidInput, match=field):
+            ChaplyginBall(**{**DATA, **changes})
+        bad = {**ask, "problem": {**document, **changes}}
+        refused = server.ask("POST", "/v1/trajectories", json=bad)
+        assert (refused.status_code, field in refused.text) == (422, True)
+    assert server.ask("POST", "/v1/tori", json={"problem": document}).status_code == 422
+
+
+def test_a_ball_at_rest_stays() -> None:
+    found = vs.solve(ChaplyginBall(**{**DATA, "Omega": [0, 0, 0]}), [5.0])
+    assert np.array_equal(found.position, [[0, 0]])
+
+
+@pytest.mark.parametrize("system", [ChaplyginBall, vs.RubberBall])
+def test_taylor_integrates_every_formulation(system: Any) -> None:
+    pytest.importorskip("heyoka")
+    problem = system(**DATA)
+    expected = vs.solve(problem, [3.0], "numeric")
+    for formulation in system.formulations:
+        found = vs.solve(problem, [3.0], "numeric", "taylor", formulation=formulation)
+        assert np.max(np.abs(found.position - expected.position)) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["ball", "chaplygin"])
+def test_the_examples_run_from_the_command_line(name: str) -> None:
+    file = Path(__file__).parent.parent / "examples" / f"{name}.json"
+    answer = subprocess.run(
+        [sys.executable, "-m", "veselova", "solve", str(file), "--json"],
+        capture_output=True,
+        check=True,
+        timeout=PATIENCE,
+    )
+    assert len(json.loads(answer.stdout)["series"]["position"]) == 601
