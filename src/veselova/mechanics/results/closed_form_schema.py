@@ -24,7 +24,17 @@ _NUMBER: dict[str, Any] = {
 }
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
-_HALVES: dict[str, Any] = {"type": "array", "items": {"type": "number", "enum": [0, 0.5]}}
+# no enumerations: generators of clients know none of numbers with fractions
+_HALVES: dict[str, Any] = {
+    "type": "array",
+    "items": {"type": "number", "minimum": 0, "maximum": 0.5, "multipleOf": 0.5},
+}
+_QUARTER_TURN: dict[str, Any] = {
+    "type": "number",
+    "minimum": -0.25,
+    "maximum": 0,
+    "multipleOf": 0.25,
+}
 _PAIR: dict[str, Any] = {
     "type": "array",
     "items": _NUMBER,
@@ -126,7 +136,7 @@ _FURTHER: dict[str, tuple[dict[str, Any], str]] = {
                         "properties": {
                             "modes": {"type": "array", "items": _INTEGERS},
                             "coefficients": _VECTOR,
-                            "turn": {"enum": [0, -0.25]},
+                            "turn": _QUARTER_TURN,
                         },
                     },
                 },
