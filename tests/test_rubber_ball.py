@@ -226,6 +226,8 @@ def test_in_resonance_the_ball_drifts_across_as_predicted(
         ({"mass": 0}, "mass: required a finite number greater than 0; given 0"),
         ({"radius": "-1/2"}, "radius: required a finite number greater than 0"),
         ({"mass": "x", "radius": None, "position": [1]}, "mass: .*radius: .*position: "),
+        ({"mass": "1e-300"}, "mass: required a number between 1e-60 and 1e.60"),
+        ({"mass": 1e-40, "radius": 1e-20}, "mass: required ma² between 1e-60 and 1e.60 of"),
         ({"position": [1, 2, 3]}, "position: required a list of 2 numbers; given 3 entries"),
         ({"strict": "yes"}, "strict: required true or false"),
         ({"gamma": [1, 2, 3]}, "gamma: required a vector of unit length"),

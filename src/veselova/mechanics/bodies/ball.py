@@ -5,6 +5,7 @@ the contact point.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 #: By what part of the largest moment the triangle inequalities may fail: the rounding of moments
 #: that are given in doubles.
 _ROUNDING = Fraction(1, 10**12)
+
+#: Masses, radii, and ma² over the moments, are between this and its inverse: products stay floats.
+_MODERATE = Fraction(10**60)
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,17 @@ class Ball:
         assert exact_mass is not None
         assert exact_radius is not None
         assert contact is not None
-        return cls(tensor, exact_mass, exact_radius, contact)
+        ball = cls(tensor, exact_mass, exact_radius, contact)
+        ball._require_moderate()
+        return ball
+
+    def _require_moderate(self) -> None:
+        """Raise InvalidInput unless ma² and the moments can stand in one matrix of floats."""
+        largest = Fraction(float(np.max(np.abs(self.tensor))))
+        if not 1 / _MODERATE <= self.added / largest <= _MODERATE:
+            required = f"ma² between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e} of the "
+            given = f"ma² = {_decimal(self.added)} and {float(largest):.3g}"
+            raise InvalidInput(("mass",), required + "largest entry of inertia", given)
 
     @property
     def added(self) -> Fraction:
@@ -101,10 +115,18 @@ class Ball:
         return float(self.mass) * self.velocity(Omega_dot, frame)
 
 
+def _decimal(number: Fraction) -> str:
+    """Return a positive rational to three digits, beyond the range of floats too."""
+    return f"{Decimal(number.numerator) / Decimal(number.denominator):.3g}"
+
+
 def _positive(value: Any, name: str) -> Fraction:
     number = exact_number(value, (name,))
     if number <= 0:
         raise InvalidInput((name,), "a finite number greater than 0", show(value))
+    if not 1 / _MODERATE <= number <= _MODERATE:
+        limits = f"a number between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e}"
+        raise InvalidInput((name,), limits, show(value))
     return number
 
 

@@ -79,13 +79,16 @@ class RollingFlow(Flow):
 
 @dataclass(frozen=True)
 class ChaplyginFlow(Flow):
-    """The attitude of Chaplygin's ball: ė_i = e_i×Ω with Ω = B(K + σγ), B = J⁻¹, σ = D(BK,γ)/(1 −
-    D(Bγ,γ)), and the momentum EᵀK constant in space.
+    """The attitude of Chaplygin's ball: ė_i = e_i×Ω with Ω = B(K + σγ), B = J⁻¹, σ =
+    D(BK,γ)/(Bγ,Iγ), and the momentum EᵀK constant in space; 1 − D(Bγ,γ) = (Bγ,Iγ) without
+    cancellation.
 
-    inverse  B, (3, 3) · added  D = ma² · momentum  EᵀK · frame  the start, all in scaled units
+    inertia, inverse  I and B, (3, 3) · added  D = ma² · momentum  EᵀK · frame  the start; all of
+    them in scaled units
     A state is the momentum and the frame, row-major, of length 12.
     """
 
+    inertia: Array
     inverse: Array
     added: float
     momentum: Array
@@ -99,8 +102,8 @@ class ChaplyginFlow(Flow):
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
-        """Return B and D."""
-        return np.concatenate([self.inverse.ravel(), [self.added]])
+        """Return B, D and I."""
+        return np.concatenate([self.inverse.ravel(), [self.added], self.inertia.ravel()])
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return zero and Ė."""
@@ -115,7 +118,8 @@ class ChaplyginFlow(Flow):
         added = parameters[9]
         Omega = ops.dot(inverse, ops.dot(E, momentum))
         across = ops.dot(inverse, gamma)
-        share = added * ops.dot(Omega, gamma) / (1 - added * ops.dot(across, gamma))
+        inertia = parameters[10:].reshape(3, 3)
+        share = added * ops.dot(Omega, gamma) / ops.dot(across, ops.dot(inertia, gamma))
         return Omega + share * across
 
     def project(self, state: Array) -> Array:

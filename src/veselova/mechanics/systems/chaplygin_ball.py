@@ -68,6 +68,7 @@ class ChaplyginBall(RollingBall):
         _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
         momentum = self.derive("momentum", self.start)[0] / self.turning
         attitude = ChaplyginFlow(
+            inertia=np.ldexp(self.ball.tensor, -power),
             inverse=np.ldexp(self.inverse, power),
             added=float(np.ldexp(float(self.ball.added), -power)),
             momentum=np.ldexp(self.frame.T @ momentum, -power),
@@ -84,7 +85,8 @@ class ChaplyginBall(RollingBall):
         free = torque @ self.inverse
         across = gamma @ self.inverse
         share = added * np.sum(free * gamma, axis=-1)
-        share = share / (1 - added * np.sum(across * gamma, axis=-1))
+        # 1 − D(Bγ,γ), without cancellation where I is small beside D
+        share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
         return np.asarray(free + share[..., None] * across)
 
     def derive(self, name: str, series: Series) -> Array:
