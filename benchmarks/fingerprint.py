@@ -3,10 +3,10 @@ errors, by version.
 
     python benchmarks/fingerprint.py
 
-Cached answers and sweeps are trusted as long as the version stays. ``tests/test_fingerprint.py``
-compares the results of this checkout with ``tests/reference/fingerprint.json`` and fails when a
-value differs by more than the two errors together. Bump ``src/veselova/version.py`` first, and then
-run this command.
+Cached answers and sweeps are trusted as long as the version stays.
+``tests/agreement/test_fingerprint.py`` compares the results of this checkout with
+``tests/reference/fingerprint.json`` and fails when a value differs by more than the two errors
+together. Bump ``src/veselova/version.py`` first, and then run this command.
 """
 
 from __future__ import annotations

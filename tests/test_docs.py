@@ -100,7 +100,7 @@ def test_links_and_named_files_exist(name: str) -> None:
 
 
 def test_named_tests_exist() -> None:
-    sources = "".join(path.read_text() for path in (ROOT / "tests").glob("test_*.py"))
+    sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     for name in re.findall(r"`(test_\w+)`", (ROOT / "docs" / "errata.md").read_text()):
         assert f"def {name}(" in sources
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 import zarr
+from test_sweeps import request as sweep_request
 
 from postgresql import postgresql_server, settings_in
-from test_sweeps import request as sweep_request
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import connect, schema_differences
 from veselova.service.access.keys import open_keys

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from test_many_digits import in_rationals
 
 import veselova as vs
-from test_many_digits import in_rationals
 from veselova.analytic.arithmetic.balls import Balls, balls
 from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.curve.interval import Interval

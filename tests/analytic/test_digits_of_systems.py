@@ -14,12 +14,12 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from test_cli import run
 
 import veselova as vs
 from conftest import Server
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
-from test_cli import run
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.mechanics.core.decimals import Decimals

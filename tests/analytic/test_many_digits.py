@@ -9,10 +9,10 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
+from test_theta import all_characteristics, as_flint_orders
 
 import veselova as vs
 from draws import random_riemann_matrix
-from test_theta import all_characteristics, as_flint_orders
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, extended_arithmetic
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.arithmetic.fixed_point import FixedPoint

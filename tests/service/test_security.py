@@ -18,11 +18,11 @@ from urllib.parse import urlsplit
 
 import httpx2
 import pytest
+from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from hostile_bodies import hostile_bodies, hostile_sweeps
-from test_http import is_problem, post
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_lr import DRIFT
 
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on
-from test_lr import DRIFT
 from veselova import LRSystem, Trajectory, solve
 
 pytestmark = pytest.mark.sweep

@@ -23,13 +23,13 @@ import anyio
 import httpx2
 import pytest
 import sqlalchemy as sa
+from test_access import keys, new_key
+from test_http import ENDLESS, JSON, is_problem
+from test_sweeps import request as sweep_request
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from postgresql import postgresql_server, settings_in
-from test_access import keys, new_key
-from test_http import ENDLESS, JSON, is_problem
-from test_sweeps import request as sweep_request
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import (
     api_keys,

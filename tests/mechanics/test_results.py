@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_engines import METHODS
 
 import veselova
 from problems import tagged
-from test_engines import METHODS
 from veselova import (
     BackendMissing,
     Comparison,

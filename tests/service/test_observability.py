@@ -25,10 +25,10 @@ import anyio
 import httpx2
 import pytest
 from fastapi import FastAPI
+from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, samples, wait_until
 from hostile import GOOD
-from test_http import is_problem, post
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
@@ -402,7 +402,7 @@ assert not any("SSSS" in span.to_json() for span in spans)
 
 
 def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) -> None:
-    text = (Path(__file__).parent.parent / "docs" / "service.md").read_text()
+    text = (Path(__file__).parent.parent.parent / "docs" / "service.md").read_text()
     settings = set(re.findall(r"VESELOVA_([A-Z_]+[A-Z])", text)) - {"API_KEY"}
     assert settings >= {"KEYS", "RATE_LIMIT", "LOG_FORMAT"}
     assert {name.lower() for name in settings} <= set(Settings.model_fields)

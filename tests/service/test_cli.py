@@ -24,7 +24,7 @@ from veselova import __version__, solve
 from veselova.service.api.examples import BODY4
 from veselova.service.cli.main import main
 
-BODY4_FILE = Path(__file__).parent.parent / "examples" / "body4.json"
+BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
 
 
 def run(

@@ -10,12 +10,12 @@ from typing import Any
 import jsonschema_rs
 import numpy as np
 import pytest
+from test_http import is_problem, post
 from typer.testing import CliRunner
 
 import veselova as vs
 from conftest import Server
 from hostile import BUDGET_S
-from test_http import is_problem, post
 from veselova import curves, theta
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 from veselova.service.api.examples import BODY3_PROBLEM, CURVE, THETA

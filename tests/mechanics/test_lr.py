@@ -506,7 +506,7 @@ def test_fields_beyond_so_12_have_no_symbols() -> None:
         solve(LRSystem(13, 1, {"special": [1] * 13}, None, omega), [1.0], method="taylor")
 
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "lr4.json"
+EXAMPLE = Path(__file__).parent.parent.parent / "examples" / "lr4.json"
 
 
 def test_the_example_is_solved_on_the_command_line() -> None:

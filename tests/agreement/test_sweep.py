@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_engines import METHODS
 
 from draws import random_problem
-from test_engines import METHODS
 from truth import true_motion
 from veselova import solve
 

@@ -16,7 +16,7 @@ import pytest
 import veselova as vs
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
-EXAMPLES = Path(__file__).parent.parent / "examples" / "closed_form"
+EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
 
 BODY3 = vs.Veselova(["3", "2", "1.5"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225"])
 

@@ -9,7 +9,7 @@ import pytest
 
 from veselova.service.api.settings import Settings
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 PAGE = (ROOT / "docs" / "service.md").read_text()
 
 #: Limits that are no numbers.

@@ -20,10 +20,10 @@ from typing import Any
 
 import httpx2
 import pytest
+from test_http import is_problem
 
 from conftest import PATIENCE, Server, running_server
 from hostile import GOOD
-from test_http import is_problem
 from veselova import Client, InvalidInput, ProblemResponse, Veselova
 from veselova.service.api import rate_limits as rates
 from veselova.service.api.rate_limits import network_of, rate_of

@@ -8,10 +8,10 @@ import pickle
 from typing import Any
 
 import pytest
+from test_http import is_problem, post
 
 import veselova as vs
 from conftest import Server
-from test_http import is_problem, post
 from veselova.mechanics.core.errors import did_you_mean
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.request_models import TrajectoryRequest, read_request

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import zstandard
 from pyarrow import ipc, parquet
+from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, slow, wait_until
 from hostile import GOOD
-from test_http import is_problem, post
 from veselova import Trajectory, Veselova, solve
 from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS

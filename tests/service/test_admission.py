@@ -8,10 +8,10 @@ from typing import Any
 
 import httpx2
 import pytest
+from test_http import is_problem, post
 
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
-from test_http import is_problem, post
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest, read_request

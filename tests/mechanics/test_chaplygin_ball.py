@@ -92,7 +92,7 @@ def test_taylor_integrates_every_formulation(system: Any) -> None:
 
 @pytest.mark.parametrize("name", ["ball", "chaplygin"])
 def test_the_examples_run_from_the_command_line(name: str) -> None:
-    file = Path(__file__).parent.parent / "examples" / f"{name}.json"
+    file = Path(__file__).parent.parent.parent / "examples" / f"{name}.json"
     answer = subprocess.run(
         [sys.executable, "-m", "veselova", "solve", str(file), "--json"],
         capture_output=True,

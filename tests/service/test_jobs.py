@@ -22,10 +22,10 @@ import httpx2
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
+from test_http import is_problem, post
 
 import veselova
 from conftest import PATIENCE, Server, free_port, running_server
-from test_http import is_problem, post
 
 BASE = {
     "system": "veselova",
