@@ -71,7 +71,7 @@ def rate(system: LRSystem, function: Any) -> Any:
 def test_the_reduced_equations_are_those_of_the_motion(rng: np.random.Generator) -> None:
     """(1.2) gives the acceleration that the LR system has: Proposition pro, to rounding."""
     for system in systems(rng):
-        reduction, W = ChaplyginReduction(system), system.distribution.seen
+        reduction, W = ChaplyginReduction(system), system.distribution.in_body
 
         def quasivelocity(g: Any, omega: Any) -> Any:
             return W(g)[0] @ omega  # noqa: B023 - called at once
@@ -94,7 +94,7 @@ def test_the_left_side_of_the_reduced_equations_is_lagrange_s(
         system.distribution.components(system.g, system.omega)[0],
     )
     acceleration, step = reduction.acceleration(system.g, velocity(system)), 1e-3
-    variations = system.g @ group.element(system.distribution.seen(system.g)[0])
+    variations = system.g @ group.element(system.distribution.in_body(system.g)[0])
     forces = reduction.constraint_force(system.g, velocity(system), variations)
 
     def L(x: Any, v: Any) -> float:
@@ -117,11 +117,13 @@ def test_the_left_side_of_the_reduced_equations_is_lagrange_s(
         force = reduction.constraint_force(
             system.g,
             velocity(system),
-            system.g @ group.element(system.distribution.seen(system.g)[0][l]),
+            system.g @ group.element(system.distribution.in_body(system.g)[0][l]),
         )
         assert abs(left - force) < 1e-7
     forces = reduction.constraint_force(
-        system.g, velocity(system), system.g @ group.element(system.distribution.seen(system.g)[0])
+        system.g,
+        velocity(system),
+        system.g @ group.element(system.distribution.in_body(system.g)[0]),
     )
     assert np.max(np.abs(forces)) > 1e-3
 
@@ -139,7 +141,7 @@ def test_the_reduced_momentum_equation_holds_along_motions(rng: np.random.Genera
         group = distribution.group
 
         def projected(g: Any, omega: Any) -> Any:
-            W, _ = distribution.seen(g)  # noqa: B023 - called at once
+            W, _ = distribution.in_body(g)  # noqa: B023 - called at once
             return (W @ inertia(omega)) @ W  # noqa: B023
 
         phi_star = reduction.momentum(system.g, velocity(system))
@@ -226,7 +228,7 @@ def test_the_reduced_equations_integrated_are_the_projected_motion(
 
     def field(_t: float, state: Any) -> Any:
         g, u = state[: n * n].reshape(n, n), state[n * n :]
-        g_dot = g @ group.element(u @ distribution.seen(g)[0])
+        g_dot = g @ group.element(u @ distribution.in_body(g)[0])
         return np.concatenate([g_dot.ravel(), reduction.acceleration(g, g_dot)])
 
     u = distribution.components(start, system.omega)[0]

@@ -48,6 +48,20 @@ PROBLEMS: dict[str, dict[str, Any]] = {
         "Omega": ["0.8", 1, "-0.6"],
         "potential": {"clebsch": 1},
     },
+    "rubber-ball": {
+        "inertia": [1, 2, "2.5"],
+        "mass": 1,
+        "radius": "0.5",
+        "gamma": ["0.6", 0, "0.8"],
+        "Omega": ["0.8", 1, "-0.6"],
+    },
+    "chaplygin-ball": {
+        "inertia": [1, 2, "2.5"],
+        "mass": 1,
+        "radius": "0.5",
+        "gamma": ["0.6", 0, "0.8"],
+        "Omega": ["0.8", 1, "0.2"],
+    },
     "euler-poisson": {
         "inertia": [1, 2, 3],
         "gamma": ["0.6", 0, "0.8"],

@@ -325,6 +325,8 @@ def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str,
     if "problem" in left:
         left["problem"] = dict(left["problem"])
     for item in items:
+        if not item["loc"]:  # a fault of the document as a whole, which no field can mend
+            continue
         first, *rest = item["loc"]
         if first == "problem":
             place, values = rest[1:], left.get("problem", {})

@@ -179,10 +179,11 @@ class SweepRequest(TorusRequest):
                 faults.add(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
         if not faults.found:
             faults.attempt(self._require_one_valid)
-        try:
-            _ = self.canonical
-        except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
-            faults.add((), "texts of whole characters", "half of a surrogate pair")
+        if isinstance(self.vary, dict):
+            try:
+                _ = self.canonical
+            except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
+                faults.add((), "texts of whole characters", "half of a surrogate pair")
         return faults.found
 
     def data_faults(self) -> list[InvalidInput]:
