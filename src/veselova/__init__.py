@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.core.errors import InternalContradiction as InternalContradiction
     from veselova.mechanics.core.errors import InvalidInput as InvalidInput
     from veselova.mechanics.core.errors import InvalidRequest as InvalidRequest
+    from veselova.mechanics.core.errors import OverBudget as OverBudget
     from veselova.mechanics.core.errors import ProblemResponse as ProblemResponse
     from veselova.mechanics.core.errors import ServiceError as ServiceError
     from veselova.mechanics.core.errors import ServiceUnreachable as ServiceUnreachable
@@ -67,6 +68,7 @@ _HOMES = {
     "LRSystem": "veselova.mechanics.systems.lr_system",
     "MatrixGroup": "veselova.mechanics.groups.matrix_group",
     "NeumannSystem": "veselova.mechanics.systems.neumann",
+    "OverBudget": "veselova.mechanics.core.errors",
     "ProblemResponse": "veselova.mechanics.core.errors",
     "Provenance": "veselova.mechanics.results.provenance",
     "RubberBall": "veselova.mechanics.systems.rubber_ball",

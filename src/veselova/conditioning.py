@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from veselova.engines import solve
 from veselova.mechanics.core.checkpoints import checkpoints
-from veselova.mechanics.core.errors import Unsolved, VeselovaError
+from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
 from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.problem import NO_DIGIT, Problem
 from veselova.mechanics.results.trajectory import Trajectory
@@ -133,6 +133,8 @@ class _Departure:
                 )
                 one, other = map(self._motion, moved)
                 pairs.append((one, other))
+            except OverBudget:
+                raise
             except VeselovaError:  # the data have no such neighbour
                 continue
         return pairs
@@ -151,6 +153,8 @@ class _Departure:
         at which all motions are known."""
         try:
             found = [[motion.at(self.side * instants) for motion in pair] for pair in pairs]
+        except OverBudget:
+            raise
         except VeselovaError:
             half = instants.size // 2
             first = self._apart(pairs, instants[:half]) if half else np.empty(0)

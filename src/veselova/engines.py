@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
 from veselova.mechanics.core.exact_input import require_truth_value
@@ -44,6 +45,8 @@ def solve(
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
     formulation: str | None = None,
+    budget_s: float | None = None,
+    progress: Progress = None,
 ) -> Trajectory:
     """Return the motion of a problem at the given times, in the order in which they are given; the
     start is t = 0.
@@ -62,12 +65,24 @@ def solve(
     ``digits`` (15 … 1000, analytic): beyond 15 every number of the answer also comes as a decimal
     with that many digits after the point in q and frame, ``trajectory.decimals``. Data are taken at
     their word: strings exactly, doubles as the dyadic numbers they store. ``certified`` (analytic):
-    the error of every such number is a proven bound. Raises InvalidInput for bad input, Unsolved
-    where the engine cannot serve the problem, BackendMissing without its library.
+    the error of every such number is a proven bound.
+
+    ``budget_s``: seconds after which the work stops; None for no limit. ``progress``: None shows
+    the progress of long work on standard error where that is a terminal or a notebook; True shows
+    it anywhere, False nowhere; a function is called with (done, total) of each step.
+    Raises InvalidInput for bad input, Unsolved where the engine cannot serve the problem,
+    OverBudget when the budget is used up, BackendMissing without the engine's library.
     """
-    return _solve(
-        problem, times, engine, method, digits=digits, certified=certified, formulation=formulation
-    )
+    with limits(budget_s, progress):
+        return _solve(
+            problem,
+            times,
+            engine,
+            method,
+            digits=digits,
+            certified=certified,
+            formulation=formulation,
+        )
 
 
 def _solve(
@@ -189,7 +204,14 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
-def compare(problem: Problem, times: Any, method: str | None = None) -> Comparison:
+def compare(
+    problem: Problem,
+    times: Any,
+    method: str | None = None,
+    *,
+    budget_s: float | None = None,
+    progress: Progress = None,
+) -> Comparison:
     """Return both engines' answers and their differences; ``method`` is the numerical one
     (``dop853`` or ``taylor``).
     """
@@ -201,7 +223,10 @@ def compare(problem: Problem, times: Any, method: str | None = None) -> Comparis
     if isinstance(problem, Problem):
         faults.attempt(require_options, type(problem), "numeric", method, None)
     faults.require_none()
-    return Comparison(solve(problem, grid, "analytic"), solve(problem, grid, "numeric", method))
+    with limits(budget_s, progress):
+        return Comparison(
+            _solve(problem, grid, "analytic", None), _solve(problem, grid, "numeric", method)
+        )
 
 
 def from_torus(
@@ -227,7 +252,12 @@ def from_torus(
 
 
 def closed_form(
-    problem: Problem, accuracy: float | None = None, digits: int = FEWEST_DIGITS
+    problem: Problem,
+    accuracy: float | None = None,
+    digits: int = FEWEST_DIGITS,
+    *,
+    budget_s: float | None = None,
+    progress: Progress = None,
 ) -> ClosedForm:
     """Return the motion of a problem as data: a document of a few kilobytes that any language can
     evaluate at any time.
@@ -244,7 +274,8 @@ def closed_form(
         )
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
-    return closed_form_of(problem, accuracy, digits)
+    with limits(budget_s, progress):
+        return closed_form_of(problem, accuracy, digits)
 
 
 def drift(problem: RubberBall) -> Drift:
@@ -254,11 +285,12 @@ def drift(problem: RubberBall) -> Drift:
     return drift_of(problem)
 
 
-def torus(problem: Problem) -> Torus:
+def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress = None) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.
     """
-    return _torus(problem)
+    with limits(budget_s, progress):
+        return _torus(problem)
 
 
 def _torus(problem: Problem, solution: Solution | None = None) -> Torus:

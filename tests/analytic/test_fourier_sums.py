@@ -174,7 +174,7 @@ def test_modes_take_over_where_panels_do_not_reach(
 ) -> None:
     body, times = (
         vs.Veselova(A, [1, 1, 1, 1][-len(A) :], [1, -2, 3, 1][-len(A) :], normalize=True),
-        ["-1e-30", "0.5", 7],
+        ["-1e-30", "0.5", 3],
     )
     by_panels = vs.solve(body, times, digits=20)
     monkeypatch.setattr(enclosed_clock, "_MOST_NODES", 10)

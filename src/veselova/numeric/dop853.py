@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from veselova.mechanics.core.budget import checkpoint, has_budget
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.flow import Flow
 from veselova.numeric.integrator import Integrator
@@ -40,7 +41,7 @@ class Dop853(Integrator):
             raise self._flow.ending(start, state)
         outputs = wanted if wanted.size and wanted[-1] == stop else np.append(wanted, stop)
         answer = solve_ivp(
-            self._flow.vector_field,
+            self._stoppable if has_budget() else self._flow.vector_field,
             (start, stop),
             state,
             method="DOP853",
@@ -59,6 +60,11 @@ class Dop853(Integrator):
         self._steps += answer.nfev // 12  # twelve stages a step
         states = np.ascontiguousarray(answer.y.T)
         return states[: wanted.size], states[-1]
+
+    def _stoppable(self, time: float, state: Array) -> Array:
+        """Return the field at a state: a stiff one takes many steps between two projections."""
+        checkpoint()
+        return self._flow.vector_field(time, state)
 
     @property
     def steps(self) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.checkpoints import checkpoints_until
 from veselova.mechanics.core.errors import Unsolved, unknown_name
 from veselova.mechanics.core.flow import Flow
@@ -159,6 +160,8 @@ def _largest(values: Array) -> Array:
 def _integrate(flow: Flow, scaled: Array, integrator: Integrator) -> Array:
     """Return the states at the scaled times, integrating outwards from t = 0 in both directions."""
     states = np.empty((scaled.size, flow.initial.size))
+    whole = max(float(scaled[-1]), 0.0) - min(float(scaled[0]), 0.0)
+    passed = 0.0
     for direction in (1.0, -1.0):
         indices = np.flatnonzero(scaled >= 0) if direction > 0 else np.flatnonzero(scaled < 0)[::-1]
         state = flow.initial
@@ -172,6 +175,7 @@ def _integrate(flow: Flow, scaled: Array, integrator: Integrator) -> Array:
                 np.searchsorted(direction * scaled[indices[done:]], stop, side="right")
             )
             wanted = scaled[indices[done:reached]]
+            checkpoint("integration", passed + start, whole)
             if stop > start:
                 states[indices[done:reached]], state = integrator.advance(
                     state, direction * start, direction * stop, wanted
@@ -181,6 +185,7 @@ def _integrate(flow: Flow, scaled: Array, integrator: Integrator) -> Array:
                 states[indices[done:reached]] = state
             start = stop
             done = reached
+        passed += start
     return states
 
 

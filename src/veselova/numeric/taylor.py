@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.budget import checkpoint, has_budget
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
 from veselova.mechanics.core.flow import Flow, Operations
 from veselova.numeric.integrator import Integrator
@@ -51,7 +52,8 @@ class Taylor(Integrator):
         integrator = self._integrator
         integrator.time = start
         integrator.state[:] = state
-        ending = None if self._flow.endless else self._goes_on
+        watched = has_budget() or not self._flow.endless
+        ending = self._goes_on if watched else None
         outcome, _, _, steps, dense, _ = integrator.propagate_until(
             stop, c_output=wanted.size > 0, callback=ending
         )
@@ -68,7 +70,8 @@ class Taylor(Integrator):
         return states, np.array(integrator.state)
 
     def _goes_on(self, integrator: Any) -> bool:
-        return self._flow.clearance(integrator.state) > 0
+        checkpoint()
+        return self._flow.endless or self._flow.clearance(integrator.state) > 0
 
     @property
     def steps(self) -> int:

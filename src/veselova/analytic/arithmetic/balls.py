@@ -20,6 +20,7 @@ import flint
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
+from veselova.mechanics.core.budget import acquire, checkpoint, iterate
 
 __all__ = ["Balls", "balls"]
 
@@ -30,6 +31,9 @@ _GUARD = 6
 #: asks for.
 _COARSE_DIGITS = 20
 _EXTRA_TERMS = 6
+
+#: Entries of an array that are computed between two checkpoints.
+_AT_ONCE = 1000
 
 #: Nodes from which series are formed by products of polynomials.
 _MANY_NODES = 300
@@ -51,8 +55,25 @@ _ZERO = Decimal(0)
 _global = threading.RLock()
 
 
-def _entrywise(method: str) -> Any:
-    return np.frompyfunc(lambda x: getattr(flint.arb(x), method)(), 1, 1)
+def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function of every entry, with checkpoints: at many digits an array takes seconds."""
+    of_entries = np.frompyfunc(function, 1, 1)
+
+    def apply(values: Any) -> Any:
+        checkpoint()
+        if np.size(values) <= _AT_ONCE:
+            return of_entries(values)
+        flat, result = np.ravel(values), np.empty(np.size(values), dtype=object)
+        for first in range(0, flat.size, _AT_ONCE):
+            checkpoint()
+            result[first : first + _AT_ONCE] = of_entries(flat[first : first + _AT_ONCE])
+        return result.reshape(np.shape(values))
+
+    return apply
+
+
+def _method(name: str) -> Callable[[Any], Any]:
+    return _entrywise(lambda x: getattr(flint.arb(x), name)())
 
 
 class Balls(Arithmetic):
@@ -61,14 +82,14 @@ class Balls(Arithmetic):
     """
 
     has_radii: ClassVar[bool] = True
-    exp = staticmethod(_entrywise("exp"))
-    sinh = staticmethod(_entrywise("sinh"))
-    cosh = staticmethod(_entrywise("cosh"))
-    log = staticmethod(_entrywise("log"))
-    sin = staticmethod(_entrywise("sin"))
-    cos = staticmethod(_entrywise("cos"))
+    exp = staticmethod(_method("exp"))
+    sinh = staticmethod(_method("sinh"))
+    cosh = staticmethod(_method("cosh"))
+    log = staticmethod(_method("log"))
+    sin = staticmethod(_method("sin"))
+    cos = staticmethod(_method("cos"))
     #: Radicands are known to be nonnegative; their balls may reach below zero.
-    sqrt = staticmethod(np.frompyfunc(lambda x: flint.arb(x).nonnegative_part().sqrt(), 1, 1))
+    sqrt = staticmethod(_entrywise(lambda x: flint.arb(x).nonnegative_part().sqrt()))
     #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
     floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
 
@@ -82,7 +103,7 @@ class Balls(Arithmetic):
             self.epsilon = flint.arb(10) ** -digits
 
     def __enter__(self) -> Balls:
-        _global.acquire()
+        acquire(_global)
         self._before.append(flint.ctx.prec)
         flint.ctx.prec = self._bits
         return self
@@ -130,14 +151,17 @@ class Balls(Arithmetic):
         """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a
         singular one.
         """
+        checkpoint()
         return self._array(_matrix(matrix).inv())
 
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
+        checkpoint()
         return _matrix(matrix).det()
 
     def product(self, a: Values, b: Values) -> Values:
         """Return the matrix product."""
+        checkpoint()
         return self._array(_matrix(a) * _matrix(b))
 
     def add_error(self, values: Any, bound: Any) -> Any:
@@ -208,6 +232,7 @@ class Balls(Arithmetic):
         kernel = flint.acb_poly(_conjugate(chirp)[np.abs(np.arange(1 - count, count))].tolist())
         result = np.empty((values.size // count, count), dtype=object)
         for row, out in zip(values.reshape(-1, count), result, strict=True):
+            checkpoint()
             product = flint.acb_poly((row * chirp).tolist()) * kernel
             out[:] = _real(np.array([product[m + count - 1] for m in order], dtype=object) * ends)
         result = result * 2 / count
@@ -274,7 +299,7 @@ class _Series:
                 points = [flint.acb(x.cos(), x.sin()) for x in centre[:, s]]
                 for k, whole in enumerate(self._polynomials[s]):
                     series = whole.truncate(terms) if terms < self._terms else whole
-                    result[:, k, s] = [getattr(series(point), part) for point in points]
+                    result[:, k, s] = [getattr(series(point), part) for point in iterate(points)]
         result = result + self._slack + spread[:, None, :] * self._sensitivity
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
@@ -282,7 +307,7 @@ class _Series:
 _lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
 _contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
 _upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
-_turn = np.frompyfunc(lambda x: flint.acb(x.cos_pi(), x.sin_pi()), 1, 1)
+_turn = _entrywise(lambda x: flint.acb(x.cos_pi(), x.sin_pi()))
 _conjugate = np.frompyfunc(flint.acb.conjugate, 1, 1)
 _real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 _imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
@@ -313,6 +338,7 @@ def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Valu
     for column, base in zip(exponents.T, bases.T, strict=True):
         powers = [1 + 0 * base, base]
         for m in range(2, int(np.max(np.abs(column), initial=0)) + 1):
+            checkpoint()
             powers.append(powers[m // 2] * powers[m - m // 2])
         # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
         powers += [inverse(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]

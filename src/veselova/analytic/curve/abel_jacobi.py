@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Sums, Values
 from veselova.analytic.curve.angle_series import AngleSeries
+from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["NARROW_GAP", "AbelJacobi"]
@@ -111,6 +112,7 @@ class AbelJacobi(Generic[P]):
         step_fraction = np.ones(z.shape[0])
         tolerance = _CONVERGED * DOUBLE.epsilon
         for _ in range(_MOST_STEPS):
+            checkpoint()
             size = np.max(np.abs(residual[open_]), axis=1)
             open_ = open_[size > tolerance]
             if open_.size == 0:
@@ -136,7 +138,7 @@ class AbelJacobi(Generic[P]):
                 ~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)
             ]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
-        for i in open_:
+        for i in iterate(open_.tolist()):
             psi[i] = self._continue_angles(z[i])
         return psi
 

@@ -25,6 +25,7 @@ from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.spectrum.branch_points import COINCIDE, Resolved, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Periods", "resolve_periods"]
@@ -151,6 +152,7 @@ class Periods(AngleSeries):
         """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an
         interval's series.
         """
+        checkpoint()
         count = self.node_count(interval)
         if self.arithmetic.has_radii and count > _MOST_NODES:
             wanted = (
@@ -185,6 +187,7 @@ class Periods(AngleSeries):
         """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value =
         Σ_m h_m cos mψ.
         """
+        checkpoint()
         coefficients = self.arithmetic.cosine_series(forms)
         if self.arithmetic.certified:
             coefficients[:, 0] = self._mean(interval, forms)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.dense_output.piecewise_polynomial import PiecewisePolynomial
 from veselova.analytic.time_map.chebyshev_panels import are_settled
+from veselova.mechanics.core.budget import iterate
 
 __all__ = ["MOST_HALVINGS", "NODES", "SUM_ROUNDING", "Evaluation", "WindowBatch", "WindowGrid"]
 
@@ -77,7 +78,10 @@ class WindowGrid:
     def remaining(self, attempt: Callable[[WindowGrid], WindowGrid]) -> WindowGrid:
         """Return the windows that attempts at a few at once leave."""
         return WindowGrid.concatenate(
-            [attempt(self[first : first + _AT_ONCE]) for first in range(0, len(self), _AT_ONCE)]
+            [
+                attempt(self[first : first + _AT_ONCE])
+                for first in iterate(range(0, len(self), _AT_ONCE), "motion")
+            ]
         )
 
     def halve(self) -> WindowGrid:

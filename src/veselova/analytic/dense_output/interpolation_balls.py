@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
 from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, estimate_terms
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["WindowsInBalls"]
 
@@ -82,6 +83,10 @@ class WindowsInBalls:
         count, nodes = choices[cost]
         return cls(xp, times[0], (times[-1] - times[0]) / (2 * count), count, nodes)
 
+    def cost_at(self, times: int) -> float:
+        """Return what so many times take once the nodes are known, in motions at a time."""
+        return times * self.nodes * _TERM
+
     def finer(self) -> WindowsInBalls:
         """Return the windows with more nodes."""
         return replace(self, nodes=math.ceil(MORE * self.nodes))
@@ -118,6 +123,7 @@ class WindowsInBalls:
         sums = ChebyshevSeriesInBalls(series.reshape(self.count, columns, -1), xp)
         slack = slack.reshape(self.count, columns)
         for w, rows in self._rows(times):
+            checkpoint("interpolation", w, self.count)
             x = (self._centres[w] - times[rows]) / self.half
             result[rows] = xp.add_error(sums(w, x), slack[w])
         return result

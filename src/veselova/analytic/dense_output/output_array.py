@@ -18,6 +18,7 @@ from veselova.analytic.dense_output.chebyshev_window import (
 )
 from veselova.analytic.dense_output.piecewise_polynomial import PiecewisePolynomial
 from veselova.analytic.time_map.rate import TimeMap
+from veselova.mechanics.core.budget import iterate
 
 __all__ = ["AT_ONCE", "OutputArray", "Samples"]
 
@@ -78,7 +79,7 @@ class OutputArray:
     def complete(self) -> Samples:
         """Return the answer, with what is still open evaluated time by time."""
         rest = np.flatnonzero(self._open)
-        for k in range(0, rest.size, AT_ONCE):
+        for k in iterate(range(0, rest.size, AT_ONCE), "motion"):
             rows = rest[k : k + AT_ONCE]
             tau1, z = self._time_map.tau1(self._times[rows], self._remainders_at(rows))
             _, series = self._evaluation(tau1, z)

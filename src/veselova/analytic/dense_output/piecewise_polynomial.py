@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import exact_sum
 from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor, increasing_root
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ORDER", "PiecewisePolynomial"]
 
@@ -149,6 +150,7 @@ class PiecewisePolynomial:
         scales = (2 / np.diff(self.borders)).ravel()
         ends = np.append(_first_from(times, begins[1:], offsets[1:]), times.size)
         for first in range(0, times.size, _PLACED):
+            checkpoint()
             block = times[first : first + _PLACED]
             counts = np.diff(np.clip(ends - first, 0, block.size), prepend=0)
             x = block - np.repeat(begins, counts)

@@ -47,8 +47,9 @@ def decimal_fields(coarse: Solution, accuracy: float, digits: int) -> dict[str, 
             "A as n numbers (a matrix is diagonalised in double precision)",
             "A as a matrix",
         )
-    require_few_modes(coarse, max(FEWEST_DIGITS, math.ceil(-math.log10(accuracy))))
+    counted = max(FEWEST_DIGITS, math.ceil(-math.log10(accuracy)))
     wanted = digits + FAR_DIGITS
+    require_few_modes(coarse, counted, wanted + _SPARE)
     spare = _SPARE
     for _ in range(_ATTEMPTS):
         try:

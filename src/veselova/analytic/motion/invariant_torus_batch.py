@@ -22,6 +22,7 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.invariant_torus import actions
 from veselova.analytic.spectrum.branch_points_batch import Spectra
 from veselova.analytic.time_map.rate import TimeRate, rate_factor
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["Tori", "tori"]
 
@@ -133,6 +134,7 @@ def _stacks(spectra: Spectra) -> Iterator[tuple[NDArray[np.intp], dict[str, Any]
         curves = Curve(DOUBLE, points.high, (points[:, None, :] - points[:, :, None]).high, origins)
         nodes = _node_counts(Periods(curves))
         for count in np.unique(nodes[nodes > 0]):
+            checkpoint()
             chosen = np.flatnonzero(nodes == count)
             stack = Curve(DOUBLE, points.high[chosen], curves.differences[chosen], origins)
             yield (

@@ -34,6 +34,7 @@ from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.rate import TimeMap, TimeRate, time_rate
 from veselova.mechanics.core.errors import Unsolved
 
@@ -78,6 +79,8 @@ class SolutionInBalls:
         problem = coarse.problem
         self._coarse = coarse
         given = self._given = moving_part(problem)
+        costs = _estimate_costs(coarse, digits, certified, method)
+        costs.require_affordable(costs.set_up)
         if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
             reason = (
                 "on and near a separatrix phases say little of the body, and theta functions "
@@ -116,9 +119,10 @@ class SolutionInBalls:
             origin = inversion.map(self._angles)[0]
             frequencies = inversion.periods.frequencies
             self.quotients: ThetaQuotients | None = None
-            if method == "theta":
+            if costs.by_theta:
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
                 self.quotients = ThetaQuotients(theta, self.frame)
+            self._costs = replace(costs, genus=curve.genus, terms=max(rate.needed_nodes))
             time_rate = None if self.quotients is None else self.quotients.time_rate
             # Doubles do not see every direction that moves.
             in_angles = coarse.takes_rate_from_angles(coarse.default_method())
@@ -184,7 +188,9 @@ class SolutionInBalls:
             cycles = self._coarse.fastest * abs(float(times[-1] - times[0]))
             windows = WindowsInBalls.worth_while(times, cycles, sampled, self.arithmetic)
         while windows is not None:
-            tau1, attitude, details = self._evaluate(windows.times, coarse)
+            interpolation = windows.cost_at(len(times)) * self._costs.state
+            interpolation += len(times) * self._costs.output(self.problem.n)
+            tau1, attitude, details = self._evaluate(windows.times, coarse, interpolation)
             normals = attitude.normals if size != 3 else attitude.normals[:, :, :1]  # γ = ±q×n_2
             table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
             found = windows.at(times, np.column_stack(table))
@@ -208,7 +214,7 @@ class SolutionInBalls:
         return self._evaluate(times, coarse)
 
     def _evaluate(
-        self, times: Values, coarse: TimeMap
+        self, times: Values, coarse: TimeMap, interpolation: float = 0.0
     ) -> tuple[Values, Attitude, Mapping[str, Any]]:
         approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(
             self._coarse.moving.unit / self.moving.unit
@@ -217,7 +223,10 @@ class SolutionInBalls:
         # time map in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
-        time_map = choose_time_map(self.orbit, approximate, self._coarse, self.moving)
+        states = len(times) * (self._costs.state + self._costs.output(self.problem.n))
+        time_map = choose_time_map(
+            self.orbit, approximate, self._coarse, self.moving, self._costs, states + interpolation
+        )
         tau1 = time_map.tau1(times, approximate)
         z = self.orbit.phases(tau1)
         attitude = (
@@ -249,6 +258,15 @@ class SolutionInBalls:
         q = xp.array(self.problem.exact.q)
         turn = self.body.turn(drift.matrix, self.spectrum.constants, q / xp.sqrt(np.sum(q * q)))
         return replace(drift, frames=xp.upper_bound(turn).item())
+
+
+def _estimate_costs(coarse: Solution, digits: int, certified: bool, method: str) -> CostsInBalls:
+    """Return what a solution costs, from the series of the one in double precision.
+
+    Bounds of truncation take twice the terms, as half of the strip is given up for them.
+    """
+    terms = max(coarse.rate.needed_nodes) * digits * (2 if certified else 1) // DOUBLE.digits
+    return CostsInBalls(coarse.curve.genus, digits, terms, method == "theta")
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, FixedPoint
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ChebyshevSeriesInBalls"]
 
@@ -76,6 +77,7 @@ class ChebyshevSeriesInBalls:
         )
 
     def _at(self, interval: int, x: Values) -> Values:
+        checkpoint()
         spread = max(float(ball.rad()) for ball in x)
         inside = float(np.max(np.abs(x.astype(float)))) + spread <= 1 + _ROUNDING
         if inside and self._in_fixed_point is not None:

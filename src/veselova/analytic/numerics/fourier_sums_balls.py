@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.fixed_point import LARGEST, LEAST, UPWARDS, FixedPoint
+from veselova.mechanics.core.budget import checkpoint, iterate
 
 __all__ = ["SumsOverPoints", "sums_over_modes"]
 
@@ -67,7 +68,7 @@ def sums_over_modes(
         fixed = _OverModes(part, modes, coefficients, arithmetic)
     result = np.empty(len(turns), dtype=object)
     points = max(1, _EXPONENTIALS // max(1, len(modes)) if fixed is None else fixed.points)
-    for first in range(0, len(turns), points):
+    for first in iterate(range(0, len(turns), points)):
         some = slice(first, first + points)
         if fixed is None or (found := fixed(turns[some])) is None:
             exponentials = arithmetic.exponentials(modes, turns[some])[part]
@@ -206,7 +207,7 @@ class _OverModes:
         others = [_from_lowest(turns.powers(k)) for k in range(1, genus)]
         step = max(1, _PLACES // self._behind)
         total = np.zeros((count, size))
-        for start in range(0, self._shape[1], step):
+        for start in iterate(range(0, self._shape[1], step)):
             box = self._box(start, min(step, self._shape[1] - start))
             sums = table.weighted_sums(FixedPoint(box.reshape(*box.shape[:2], -1)))
             inner = sums.limbs.reshape(count, 2, size, *box.shape[2:])
@@ -267,6 +268,7 @@ class _OverPoints:
         last = modes[:, -1]
         missing = [row for row in dict.fromkeys(map(tuple, leading)) if row not in self._rows]
         for first in range(0, len(missing), _ROWS):
+            checkpoint()
             self._add(missing[first : first + _ROWS])
         limbs = np.empty(
             (len(self._scaled.numbers.limbs), *modes.shape[:1], self._sensitivity.shape[1])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import InternalContradiction
 
 __all__ = [
@@ -64,6 +65,7 @@ def increasing_root(
     # no slope, no step: what is not inside the bracket is not taken
     with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(_MOST_STEPS):
+            checkpoint()
             value, slope = function(x, rows)
             step = value / slope
             moved = x - step

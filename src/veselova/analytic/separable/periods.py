@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Double
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.separable.curve import AnyCut
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparatedPeriods"]
@@ -94,6 +95,7 @@ class SeparatedPeriods(AngleSeries):
         """
         count = _FEWEST_NODES
         while count <= _MOST_NODES:
+            checkpoint()
             coefficients = self.arithmetic.cosine_series(function(self.arithmetic.nodes(count)))
             size = np.max(np.abs(coefficients), axis=1, keepdims=True)
             if np.all(np.abs(coefficients[:, -2:]) <= _RESOLVED * size):

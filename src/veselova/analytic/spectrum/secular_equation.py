@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals, Values
 from veselova.analytic.arithmetic.double_double import DoubleDouble, where
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["TooFewDigits", "zeros_between_poles", "zeros_of_many"]
 
@@ -121,6 +122,7 @@ def _distance(
     own = width * near[0][1] / (near[0][1] + far[0][1])
     own = min(own, most)
     for step in range(_MOST_STEPS):
+        checkpoint()
         value, derivative = _scaled_secular(near, far, constant, width, own)
         if value == 0:
             return own

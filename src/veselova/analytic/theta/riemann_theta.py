@@ -37,6 +37,7 @@ from veselova.analytic.theta.lattice import (
     schur,
 )
 from veselova.analytic.theta.theta_tables import SIGNS, Blocks, Family, Group, in_blocks
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["Theta"]
 
@@ -165,6 +166,7 @@ class Theta:
         for first in range(0, z.shape[0], block):
             rows = slice(first, first + block)
             for k in range(0, len(groups), at_once):
+                checkpoint()
                 self._fill(groups[k : k + at_once], y[rows], result[:, rows])
         return result.T
 

@@ -24,6 +24,7 @@ from scipy.sparse import csr_array
 
 from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
 from veselova.analytic.theta.siegel_reduction import SiegelReduction
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["SiegelTheta"]
 
@@ -287,6 +288,7 @@ class SiegelTheta:
         roundings = np.empty(count)
         block = max(1, _BLOCK // self._table.width)
         for first in range(0, count, block):
+            checkpoint()
             rows = slice(first, first + block)
             moments, sizes[rows], roundings[rows] = self._table.moments(v[rows], order)
             sums[0][rows], shift = moments[0], own[rows]

@@ -27,6 +27,7 @@ from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor,
 from veselova.analytic.time_map.fourier_modes import Integers, find_significant_modes
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TimeMap, TorusRate
+from veselova.mechanics.core.budget import checkpoint
 
 __all__ = [
     "COLUMN_ROUNDING",
@@ -265,6 +266,7 @@ class _Sum:
         block = max(1, min(count, _BLOCK // max(modes, 1)))
         room = np.empty((2, modes, block))
         for first in range(0, count, block):
+            checkpoint()
             rows = slice(first, first + block)
             half = waves_at(
                 np.pi * advance[rows], self.orders, self.highest, room[:, :, : count - first]

@@ -43,14 +43,15 @@ class FourierTimeMapInBalls:
     left out is estimated.
 
     ``cutoff``: the least |F_m| of modes (M, g) that are kept, with their ``coefficients`` (M,); the
-    precision where none is given.
+    precision where none is given. ``expected``: about how many modes there are.
     """
 
     name = "fourier"
 
-    def __init__(self, orbit: Orbit, cutoff: float | None = None) -> None:
+    def __init__(self, orbit: Orbit, cutoff: float | None = None, *, expected: float = 0.0) -> None:
         self._orbit = orbit
         self._cutoff = cutoff
+        self._expected = expected
         xp: Any = orbit.rate.inversion.arithmetic
         self._xp = xp
         self._mean = orbit.rate.mean
@@ -98,9 +99,9 @@ class FourierTimeMapInBalls:
             values = rate.scale * values
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
-        return find_significant_modes(
-            rate.inversion.periods.genus, determinants, 2 * MOST_MODES
-        )  # those at the edge are looked at too
+        # those at the edge are looked at too
+        genus = rate.inversion.periods.genus
+        return find_significant_modes(genus, determinants, 2 * MOST_MODES, expected=self._expected)
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ +

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Integers", "find_significant_modes"]
@@ -27,6 +28,7 @@ def find_significant_modes(
     *,
     origin: Integers | None = None,
     stride: int = 1,
+    expected: float = 0.0,
 ) -> tuple[Integers, NDArray[Any], Integers]:
     """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, these, and
     the modes next to them.
@@ -51,6 +53,7 @@ def find_significant_modes(
     kept_modes = []
     kept_values = []
     while layer.size:
+        checkpoint("Fourier modes", looked_at, max(expected, looked_at) if expected else 0.0)
         values, large = coefficients(layer)
         kept_modes.append(layer[large])
         kept_values.append(values[large])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.time_map.chebyshev_panels import TAIL, Panels, are_settled
 from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["integrate_between", "integrate_on_panels"]
@@ -178,7 +179,8 @@ class _Panels:
         z = self.in_tau1.phases(lefts)[:, None, :] + offsets * self.in_tau1.rates
         z = z.reshape(-1, z.shape[2])
         values = [
-            self.integrand(z[first : first + _BLOCK]) for first in range(0, z.shape[0], _BLOCK)
+            self.integrand(z[first : first + _BLOCK])
+            for first in iterate(range(0, z.shape[0], _BLOCK), "time map")
         ]
         coefficients = np.concatenate(values).reshape(lefts.size, -1) @ to_coefficients
         # zero is resolved

@@ -25,6 +25,7 @@ from veselova.analytic.numerics.monotone_root import (
     is_shown,
 )
 from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["ChebyshevTimeMapInBalls", "estimate_nodes"]
@@ -41,8 +42,9 @@ _LONGEST_IN_STRIPS = 8.0
 #: Nodes per cycle and digit.
 _NODES_PER_DIGIT = 2.6
 
-#: Nodes that a time map is willing to evaluate: minutes.
-_MOST_NODES = 100_000
+#: Nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the rest.
+_MOST_NODES = 1_000_000
+_BLOCK = 5000
 
 #: Panels looked at to see how fast series fall.
 _SAMPLED_PANELS = 200
@@ -68,13 +70,20 @@ class ChebyshevTimeMapInBalls:
 
     ``certified``: what series leave out follows from the strip of analyticity; otherwise from their
     last coefficients, which takes a third of the nodes. Raises Unsolved where the times are too far
-    for panels.
+    for panels, and what ``require_nodes`` raises for a number of nodes before their evaluation.
     """
 
     name = "panels"
 
-    def __init__(self, orbit: Orbit, approximate: NDArray[np.float64], certified: bool) -> None:
+    def __init__(
+        self,
+        orbit: Orbit,
+        approximate: NDArray[np.float64],
+        certified: bool,
+        require_nodes: Callable[[float], None] = lambda count: None,
+    ) -> None:
         self._orbit = orbit
+        self._require_nodes = require_nodes
         self._certified = certified
         self._xp: Any = orbit.rate.inversion.arithmetic
         self._forward = self._panels(max(0.0, float(np.max(approximate))), 1)
@@ -151,19 +160,23 @@ class ChebyshevTimeMapInBalls:
 
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
+            self._require_nodes(math.inf)
             wanted = (
                 f"a time map of {self._xp.digits} digits would take {nodes:.3g} evaluations or "
-                "more at that time"
+                f"more at that time, and {_MOST_NODES} at most are kept"
             )
-            raise Unsolved("too-far", f"{wanted}; at most {_MOST_NODES} are made")
+            raise Unsolved("too-far", f"{wanted}; ask for fewer digits or nearer times")
 
     def _evaluate(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         self._require_few(count * nodes)
+        self._require_nodes(count * nodes)
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])
         exponentials = xp.cos(xp.nodes(nodes))
-        values = self._orbit.rates(direction * (centres[:, None] - half * exponentials).ravel())
+        tau1 = direction * (centres[:, None] - half * exponentials).ravel()
+        blocks = iterate(range(0, len(tau1), _BLOCK), "time map")
+        values = np.concatenate([self._orbit.rates(tau1[k : k + _BLOCK]) for k in blocks])
         return _Panels(
             xp,
             half,
@@ -175,11 +188,16 @@ class ChebyshevTimeMapInBalls:
 
 
 def estimate_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
-    """Return about how many nodes panels to the farthest time take, truncation judged by
-    coefficients.
-    """
-    cycles = float(np.max(np.abs(approximate))) * max(abs(float(f)) for f in orbit.frequencies)
-    return cycles * orbit.rate.inversion.arithmetic.digits * _NODES_PER_DIGIT
+    """Return about how many nodes panels to the farthest times take."""
+    xp: Any = orbit.rate.inversion.arithmetic
+    reach = max(0.0, float(np.max(approximate))) - min(0.0, float(np.min(approximate)))
+    if xp.certified:
+        # As many as a panel has, which is so many half widths of the strip long.
+        decay = _PANEL_IN_STRIPS * 2 + math.hypot(1, _PANEL_IN_STRIPS * 2)
+        panels = reach / (2 * _PANEL_IN_STRIPS * orbit.strip[0])
+        return math.ceil(panels) * float(xp.nats) / math.log(decay)
+    cycles = reach * max(abs(float(f)) for f in orbit.frequencies)
+    return cycles * float(xp.digits) * _NODES_PER_DIGIT
 
 
 @dataclass(frozen=True)
@@ -250,7 +268,7 @@ class _Panels:
             for digits in [*doublings(self.arithmetic.digits), self.arithmetic.digits]
         }
         result = np.empty(times.shape, dtype=object)
-        for place, panel in enumerate(panels.tolist()):
+        for place, panel in enumerate(iterate(panels.tolist(), "inverse time map")):
             rows = np.flatnonzero(places == place)
             time_maps = {digits: partial(series, place) for digits, series in steps.items()}
             result[rows] = self._roots_on(panel, time_maps, times[rows], approximate[rows])

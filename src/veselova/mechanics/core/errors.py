@@ -5,6 +5,7 @@ VeselovaError
     ValueError)
 │   └── InvalidRequest      several such faults at once
 ├── Unsolved                an engine's named outcome: it cannot serve this problem, and why
+├── OverBudget              the work takes longer than its budget              (also a TimeoutError)
 ├── BackendMissing          an optional library that was asked for is not installed          (also
     an ImportError)
 ├── InternalContradiction   two results that must agree do not: a bug of ours
@@ -28,6 +29,7 @@ __all__ = [
     "InternalContradiction",
     "InvalidInput",
     "InvalidRequest",
+    "OverBudget",
     "ProblemResponse",
     "ServiceError",
     "ServiceUnreachable",
@@ -38,6 +40,7 @@ __all__ = [
     "missing_fields",
     "show",
     "summary",
+    "two_digits",
     "unknown_fields",
     "unknown_name",
 ]
@@ -301,6 +304,27 @@ class Unsolved(VeselovaError):
         self.outcome = outcome
         self.reason = reason
         super().__init__(f"{outcome}: {reason}")
+
+
+def two_digits(seconds: float) -> str:
+    """Return seconds to two significant digits, without an exponent."""
+    return f"{float(f'{seconds:.2g}'):g}" if seconds < 1e5 else f"{seconds:.2g}"
+
+
+class OverBudget(VeselovaError, TimeoutError):
+    """The work was stopped when its budget was used up, or not begun where it would take longer.
+
+    ``budget_s``: the budget in seconds. ``estimate_s``: about what the work would take, None where
+    it was begun.
+    """
+
+    def __init__(self, budget_s: float, estimate_s: float | None = None, remedy: str = "") -> None:
+        self.budget_s, self.estimate_s = budget_s, estimate_s
+        message = f"the work was stopped after its budget of {budget_s:g} s"
+        if estimate_s is not None:
+            work = f"about {two_digits(estimate_s)} s of work, as estimated"
+            message = f"{work}, for a budget of {budget_s:g} s"
+        super().__init__(message + remedy)
 
 
 class BackendMissing(VeselovaError, ImportError):

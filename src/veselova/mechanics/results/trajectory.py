@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
     BackendMissing,
@@ -204,17 +205,18 @@ class Trajectory:
             vars(self)[CONDITIONING] = values
         return self
 
-    def at(self, times: Any) -> Trajectory:
-        """Return the same motion at other times; raises Unsolved where the engine left no dense
-        answer.
-        """
+    def at(
+        self, times: Any, *, budget_s: float | None = None, progress: Progress = None
+    ) -> Trajectory:
+        """Return the same motion at other times; raises Unsolved without a dense answer."""
         if self.dense is None:
             raise Unsolved(
                 "no-dense-answer",
                 f"a trajectory of method {self.provenance.method} is known at its times "
                 "only; solve again",
             )
-        return self.dense(times)
+        with limits(budget_s, progress):
+            return self.dense(times)
 
     def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
         """Return the flat table of all or the chosen series: time, error, every component, named

@@ -17,6 +17,7 @@ from veselova.mechanics.core.errors import (
     InternalContradiction,
     InvalidInput,
     InvalidRequest,
+    OverBudget,
     Unsolved,
     summary,
 )
@@ -42,6 +43,7 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
     InvalidInput: (422, "invalid-input", "The input is not valid"),
     InvalidRequest: (422, "invalid-input", "The input is not valid"),
     Unsolved: (422, "unsolved", "The engine cannot serve this problem"),
+    OverBudget: (504, "over-budget", "The time budget was used up"),
     BackendMissing: (501, "backend-missing", "An optional library is not installed on this server"),
     InternalContradiction: (500, "internal-contradiction", "Two results that must agree do not"),
     Exception: (500, "internal-error", "The server failed"),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import anyio
 from anyio.from_thread import start_blocking_portal
 
+from veselova.mechanics.core.budget import Progress, reporting
 from veselova.mechanics.core.errors import (
     BackendMissing,
     InvalidInput,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["local_settings", "run_sweep", "sweep"]
 
 #: Called with the numbers of problems done and in all.
-Report = Callable[[int, int], None]
+Report = Callable[[int, int], object]
 
 #: So many problems are computed in this process, and more where they take less than so many
 #: seconds: starting others takes some.
@@ -72,7 +73,7 @@ def sweep(
     budget_s: float = 10.0,
     workers: int | None = None,
     folder: str | Path | None = None,
-    progress: Report | None = None,
+    progress: Progress = None,
 ) -> Any:
     """Return the tori and, with ``times``, the motions of many problems as an xarray Dataset.
 
@@ -85,8 +86,8 @@ def sweep(
     ``outputs``, and with ``trajectories`` these themselves. A problem that cannot be solved, or not
     within ``budget_s`` seconds, has its reason in ``outcome`` and ``detail``. What is done is kept
     in ``folder`` (default: that of the account's state), and a second call with the same arguments
-    goes on from there. ``workers``: processes; all processors when left out. ``progress(done,
-    total)`` is called a few times a second. Raises InvalidInput or InvalidRequest for bad input,
+    goes on from there. ``workers``: processes; all processors when left out. ``progress``: as
+    in ``veselova.solve``, of problems. Raises InvalidInput or InvalidRequest for bad input,
     BackendMissing without the extra ``sweeps``.
     """
     asked = sweep_document(problem, vary, times)
@@ -100,11 +101,17 @@ def sweep(
     options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
     request = read_request(SweepRequest, {**asked, **options})
     settings = local_settings(folder, workers)
-    job, jobs = run_sweep(request, settings, progress or (lambda done, total: None))
+    with reporting(progress) as report:
+        heard = report or _ignore
+        job, jobs = run_sweep(request, settings, lambda done, total: heard("sweep", done, total))
     from veselova.service.api.sweep_dataset import sweep_dataset
 
     kept = jobs.packed_path(job.id)
     return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
+
+
+def _ignore(step: str, done: float, total: float) -> None:
+    """Hear of progress, and do nothing."""
 
 
 def local_settings(folder: str | Path | None, workers: int | None) -> Settings:

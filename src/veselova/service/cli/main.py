@@ -7,7 +7,7 @@ import re
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -87,26 +87,13 @@ def _give_up_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-@contextmanager
-def _within_budget(document: Any) -> Iterator[None]:
-    """Stop the work after the ``budget_s`` that a file states; without one it may take as long as
-    it takes.
+def _limits(request: Any) -> AbstractContextManager[None]:
+    """Stop the work after the ``budget_s`` that a file states, never without one, and show its
+    progress on a terminal.
     """
-    stated = document.get("budget_s") if isinstance(document, dict) else None
-    if not isinstance(stated, (int, float)) or stated <= 0 or not hasattr(signal, "setitimer"):
-        yield
-        return
-    from veselova.service.api.problem_details import Refused
+    from veselova.mechanics.core.budget import limits
 
-    def stop(*_: object) -> None:
-        raise Refused("over-budget", f"the work was stopped after its budget of {stated:g} s")
-
-    signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, stated)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+    return limits(request.budget_s if "budget_s" in request.model_fields_set else None, None)
 
 
 def _fail(message: str, status: int) -> None:
@@ -151,7 +138,7 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     document = _document(file)
     request = read_request(TrajectoryRequest, document)
     _check_files(output, plot)
-    with _within_budget(document):
+    with _limits(request):
         trajectory = solve_request(request)
     if output:
         _write(trajectory, output, request.outputs)
@@ -190,7 +177,7 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
         document = {name: value for name, value in document.items() if name != "engine"}
     request = read_request(ComparisonRequest, document)
     _check_files(output, plot)
-    with _within_budget(document):
+    with _limits(request):
         comparison = compare_request(request)
     if output:
         _write(comparison.analytic, output, request.outputs)
@@ -212,7 +199,7 @@ def torus(file: _File, json: _Json = False) -> None:
 
     document = _without_motion(_document(file))
     request = read_request(TorusRequest, document)
-    with _within_budget(document):
+    with _limits(request):
         answer = torus_request(request)
     if json:
         print_json(answer.as_dict())
@@ -234,7 +221,7 @@ def closed_form(
     document = _without_motion(_document(file), but=("digits",))
     request = read_request(ClosedFormRequest, document)
     _check_file("--output", output, (".json",))
-    with _within_budget(document):
+    with _limits(request):
         answer = closed_form_request(request)
     if output:
         output.write_text(answer.to_json() + "\n", encoding="utf-8")

@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any
@@ -15,7 +16,8 @@ import numpy as np
 import orjson
 
 from veselova.engines import Prepared
-from veselova.mechanics.core.errors import Unsolved, VeselovaError
+from veselova.mechanics.core.budget import limits
+from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.problem_details import problem_code
@@ -30,6 +32,10 @@ from veselova.version import __version__
 __all__ = ["SOLVED", "Chunk", "OtherVersion", "compute_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
+
+#: What is not stopped after its budget is interrupted after so many times the budget, and seconds.
+_LATE = 1.1
+_LATE_S = 1.0
 
 #: What the column ``outcome`` says of a problem that was solved; else it names the reason, and
 #: ``detail`` explains it.
@@ -98,13 +104,22 @@ def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> 
     answered one by one.
     """
     try:
-        with time_limit(sweep.budget_s * len(values)):
+        with _within(sweep.budget_s * len(values)):
             return columns_at_once(sweep, values)
-    except TimeIsUp:
+    except (OverBudget, TimeIsUp):
         return {}
     except Exception:
         _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
         return {}
+
+
+@contextmanager
+def _within(seconds: float) -> Iterator[None]:
+    """Stop the work in the block after so many seconds: between two steps, as ``limits`` does, or
+    anywhere where no step has ended for much longer.
+    """
+    with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
+        yield
 
 
 def _answer(
@@ -118,7 +133,7 @@ def _answer(
     found = {}
     kept: dict[str, Any] = {}
     try:
-        with time_limit(sweep.budget_s):
+        with _within(sweep.budget_s):
             for column, value in _findings(sweep.request_of(values), kept, sweep.trajectories):
                 found[column] = value
         outcome = SOLVED

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import anyio
 from anyio.abc import TaskGroup
 
+from veselova.mechanics.core.errors import OverBudget
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import MEGABYTE, Settings
 from veselova.service.observability.metrics import Metrics
@@ -151,6 +152,8 @@ class Workers:
                 async with self._shares.place(caller):
                     answer: T = await self._ask(call)
                     return answer
+        except OverBudget:  # the worker knows, and lives on
+            raise
         except TimeoutError:
             raise Refused(
                 "over-budget", f"The work was stopped after its budget of {budget_s:g} s."

@@ -1,0 +1,409 @@
+"""Budgets, estimates and progress: work ends in time, says what it would take, and leaves nothing
+half made.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pickle
+import pty
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+
+import veselova as vs
+from conftest import PATIENCE
+from draws import random_problem
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.time_map import cost_model_balls
+from veselova.mechanics.core import progress as progress_lines
+from veselova.mechanics.core.budget import checkpoint, iterate, limits, stated_s
+from veselova.mechanics.core.progress import ProgressLine, has_reader
+from veselova.service.api.examples import BODY4
+from veselova.service.api.problem_details import problem_document
+from veselova.service.workers import worker_process
+
+#: Seconds that a stop may come late. Time is that of the processor, which other work leaves alone.
+LATE_S = 0.5
+
+BODY = vs.Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
+WIDE = vs.Veselova([8, 7, 6, 5, 4, 3, 2, 1], [1] * 8, [1, -2, 3, -1, 2, 1, -3, 2], normalize=True)
+LARGE = vs.Veselova(np.linspace(1, 3, 300), np.ones(300), np.cos(np.arange(300.0)), normalize=True)
+TOP = vs.VeselovaSO3([1, 2, 3], ["0.6", 0, "0.8"], ["0.8", "1", "-0.6"])
+POINT = vs.NeumannSystem([4, 3, 2, 1], ["0.5"] * 4, ["0.5", "-0.5", "0.5", "-0.5"])
+LINE = vs.EllipsoidGeodesic([4, 3, 2, 1], [1, 1, 1, 1], [1, -1, 1, -1], normalize=True)
+
+#: Work of ten seconds and more, through every engine and door.
+LONG: dict[str, Callable[..., Any]] = {
+    "dop853": lambda **o: vs.solve(BODY, [1e6], "numeric", **o),
+    "windows": lambda **o: vs.solve(BODY, np.linspace(0, 1e5, 9_000_000), **o),
+    "theta": lambda **o: vs.solve(BODY, np.geomspace(1, 1e9, 3_000_000), method="theta", **o),
+    "angles": lambda **o: vs.solve(WIDE, np.geomspace(1, 1e4, 600_000), **o),
+    "compare": lambda **o: vs.compare(BODY, [1e6], **o),
+    "torus": lambda **o: vs.torus(LARGE, **o),
+    "closed form": lambda **o: vs.closed_form(WIDE, **o),
+    "at": lambda **o: vs.solve(BODY, [0.0], "numeric").at([1e6], **o),
+}
+
+#: The same beyond double precision, where it is refused before it is begun, and begun where
+#: estimates are left out.
+EXACT: dict[str, Callable[..., Any]] = {
+    "modes": lambda **o: vs.solve(BODY, [3000], digits=60, **o),
+    "panels": lambda **o: vs.solve(WIDE, [1], digits=120, **o),
+    "set-up": lambda **o: vs.solve(WIDE, ["1e-9"], digits=900, **o),
+    "certified": lambda **o: vs.solve(WIDE, [1], digits=60, certified=True, **o),
+    "many times": lambda **o: vs.solve(BODY, np.linspace(0, 3, 200_000), digits=40, **o),
+    "veselova-so3": lambda **o: vs.solve(TOP, [300], digits=300, **o),
+    "neumann": lambda **o: vs.solve(POINT, np.linspace(0, 10, 40_000), digits=200, **o),
+    "ellipsoid-geodesic": lambda **o: vs.solve(LINE, [500], digits=60, **o),
+}
+
+
+@pytest.mark.parametrize("name", [*LONG, *EXACT])
+def test_work_is_stopped_when_its_budget_is_used_up(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
+    began = time.thread_time()
+    with pytest.raises(vs.OverBudget, match=r"stopped after its budget of 0\.4 s") as stopped:
+        {**LONG, **EXACT}[name](budget_s=0.4)
+    assert time.thread_time() - began < 0.4 + LATE_S
+    assert (stopped.value.budget_s, stopped.value.estimate_s) == (0.4, None)
+
+
+def test_taylor_series_are_stopped_too() -> None:
+    pytest.importorskip("heyoka")
+    vs.solve(BODY, [1.0], "numeric", "taylor")  # compiled
+    began = time.thread_time()
+    with pytest.raises(vs.OverBudget):
+        vs.solve(BODY, [1e7], "numeric", "taylor", budget_s=0.4)
+    assert time.thread_time() - began < 0.4 + LATE_S
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_what_is_far_beyond_a_budget_is_not_begun(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cost_model_balls, "_SLACK", 0.02)  # 1.2 s of a budget that no load uses up
+    began = time.thread_time()
+    with pytest.raises(vs.OverBudget, match="as estimated, for a budget of 60 s") as refused:
+        EXACT[name](budget_s=60)
+    assert time.thread_time() - began < 1.2 + LATE_S
+    assert refused.value.estimate_s > 1.2
+
+
+@pytest.mark.parametrize("n", range(2, 9))
+@pytest.mark.parametrize(
+    ("digits", "certified"), [(20, False), (40, False), (200, False), (1000, False), (30, True)]
+)
+def test_far_times_are_answered_or_refused_before_the_work(
+    n: int, digits: int, certified: bool
+) -> None:
+    """The estimate comes after the set-up, which is within the limit itself."""
+    problem = random_problem(np.random.default_rng(n), n)
+    began = time.thread_time()
+    outcome, reason = "", ""
+    try:
+        # A budget keeps the answers that take seconds out of this test.
+        found = vs.solve(
+            problem, [8461 / problem.turning], digits=digits, certified=certified, budget_s=2
+        )
+    except vs.OverBudget as error:
+        outcome, reason = "over-budget", str(error)
+    except vs.Unsolved as error:
+        outcome, reason = error.outcome, error.reason
+    assert time.thread_time() - began < 2 + LATE_S
+    assert outcome in ("", "over-budget", "too-far")
+    assert outcome or max(found.decimals.error) < Decimal(10) ** -digits
+    assert outcome != "too-far" or "ask for fewer digits or nearer times" in reason
+
+
+def test_forty_digits_of_four_dimensions_far_out_are_refused_with_a_remedy() -> None:
+    began = time.thread_time()
+    problem = random_problem(np.random.default_rng(2), 4)
+    with pytest.raises(vs.Unsolved, match=r"too-far: about .* s of work, as estimated") as refused:
+        vs.solve(problem, [8461 / problem.turning], digits=40)
+    assert "fewer digits, or nearer or fewer times, or allow it by budget_s=" in str(refused.value)
+    assert time.thread_time() - began < 5
+
+
+def test_the_budget_that_a_refusal_names_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost_model_balls, "_LONGEST_S", 0.2)
+    problem = random_problem(np.random.default_rng(1), 4)
+    with pytest.raises(vs.Unsolved) as refused:
+        vs.solve(problem, [20], digits=40)
+    named = float(refused.value.reason.split("budget_s=")[1].split()[0])
+    assert named < 60
+    # A busy machine takes longer than its processor.
+    assert max(vs.solve(problem, [20], digits=40, budget_s=named + 60).decimals.error) < 1e-40
+
+
+def test_many_digits_of_many_times_are_refused_as_too_costly() -> None:
+    with pytest.raises(vs.Unsolved, match=r"too-costly: about \d+ s of work"):
+        vs.solve(BODY, np.linspace(0, 5, 2_000_000), digits=30)
+
+
+def same(one: vs.Trajectory, other: vs.Trajectory) -> bool:
+    names = one.problem.stored
+    alike = all(np.array_equal(one.series(name), other.series(name)) for name in names)
+    return alike and np.array_equal(one.error, other.error)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"engine": "numeric"},
+        {"engine": "analytic"},
+        {"method": "angles"},
+        {"digits": 30},
+        {"certified": True},
+    ],
+)
+def test_limits_change_no_bit(options: dict[str, Any]) -> None:
+    times = np.linspace(-1, 3, 700)
+    plain = vs.solve(BODY, times, **options)
+    watched = vs.solve(BODY, times, **options, budget_s=600, progress=lambda done, total: None)
+    assert same(plain, watched)
+
+
+def test_what_was_stopped_leaves_nothing_half_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same motion object goes on answering, and with the same bits, after many stops."""
+    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
+    precision = flint.ctx.prec
+    for options in ({"engine": "analytic"}, {"digits": 40}):
+        expected = vs.solve(WIDE, [0.5, 2.0], **options)
+        again = vs.solve(WIDE, [0.0], **options)
+        for budget_s in np.geomspace(1e-4, 0.3, 25):
+            try:
+                again.at([0.5, 2.0], budget_s=budget_s)
+            except vs.OverBudget:
+                assert flint.ctx.prec == precision
+        assert same(again.at([0.5, 2.0]), expected)
+
+
+def test_budgets_nest_and_the_earliest_ends() -> None:
+    with limits(0.05), limits(60):
+        assert stated_s() == 0.05
+        time.sleep(0.06)
+        with pytest.raises(vs.OverBudget, match=r"0\.05 s"):
+            checkpoint()
+    with limits(60):
+        with limits(0.01):
+            time.sleep(0.02)
+            with pytest.raises(vs.OverBudget, match=r"0\.01 s"):
+                checkpoint()
+        checkpoint()
+        assert stated_s() == 60
+    assert stated_s() == np.inf
+    checkpoint()
+
+
+def test_each_thread_has_its_own_budget() -> None:
+    ended: dict[str, Any] = {}
+
+    def run(name: str, time: float, **options: Any) -> None:
+        try:
+            ended[name] = vs.solve(BODY, [time], "numeric", **options)
+        except vs.OverBudget as error:
+            ended[name] = error
+
+    threads = [
+        threading.Thread(target=run, args=("short", 1e6), kwargs={"budget_s": 0.1}),
+        threading.Thread(target=run, args=("long", 50.0), kwargs={"budget_s": 600}),
+        threading.Thread(target=run, args=("none", 50.0)),
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert isinstance(ended["short"], vs.OverBudget)
+    assert same(ended["long"], ended["none"])
+
+
+def test_waiting_for_balls_is_within_the_budget() -> None:
+    held, done = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with balls(20):
+            held.set()
+            done.wait(PATIENCE)
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    try:
+        assert held.wait(PATIENCE)
+        began = time.thread_time()
+        with pytest.raises(vs.OverBudget):
+            vs.solve(BODY, [1.0], digits=20, budget_s=0.2)
+        assert time.thread_time() - began < 0.2 + LATE_S
+    finally:
+        done.set()
+        thread.join()
+    assert max(vs.solve(BODY, [1.0], digits=20, budget_s=60).decimals.error) < 1e-20
+
+
+@pytest.mark.parametrize("given", [0, -1, float("nan"), float("inf"), True, "5", [1]])
+def test_a_budget_is_a_number_of_seconds(given: Any) -> None:
+    for door in (vs.torus, lambda problem, **o: vs.solve(problem, [1.0], **o)):
+        with pytest.raises(vs.InvalidInput, match="budget_s: required a finite number of seconds"):
+            door(BODY, budget_s=given)
+    assert vs.torus(BODY, budget_s=10**400).n == 4
+
+
+def test_progress_is_a_truth_value_or_a_function() -> None:
+    with pytest.raises(vs.InvalidInput, match=r"progress: required True, False, None or a funct"):
+        vs.torus(BODY, progress="yes")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["dop853", "windows", "panels", "modes"])
+def test_progress_is_told_of_every_kind_of_work(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
+    heard: list[tuple[float, float]] = []
+
+    def hear(done: float, total: float) -> None:
+        heard.append((done, total))
+        if len(heard) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        {**LONG, **EXACT}[name](budget_s=600, progress=hear)
+    assert all(0 <= done <= total for done, total in heard)
+
+
+def test_who_hears_of_progress_may_stop_the_work() -> None:
+    def stop(done: float, total: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        vs.solve(BODY, [1e6], "numeric", progress=stop)
+    assert vs.solve(BODY, [1.0], "numeric").error.size == 1
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def shown_by(text: str) -> str:
+    """Return what a terminal shows of a line that is written again and again."""
+    cells: list[str] = []
+    at = 0
+    for letter in text:
+        if letter == "\r":
+            at = 0
+            continue
+        cells[at : at + 1] = [letter]
+        at += 1
+    return "".join(cells)
+
+
+def test_a_line_appears_after_a_second_and_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert has_reader()
+    with limits(progress=None):
+        for _ in iterate(range(3), "motion"):
+            time.sleep(0.15)
+    assert terminal.getvalue() == ""
+    monkeypatch.setattr(progress_lines, "_PATIENCE_S", 0.2)
+    with limits(progress=None):
+        for _ in iterate(range(5), "motion"):
+            time.sleep(0.15)
+        assert shown_by(terminal.getvalue()).startswith("veselova: motion [####")
+        assert "80 %" in terminal.getvalue()
+    assert shown_by(terminal.getvalue()).strip() == ""
+    assert terminal.getvalue().endswith("\r")
+    assert "\n" not in terminal.getvalue()
+
+
+def test_nobody_else_is_shown_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress_lines, "_PATIENCE_S", 0.0)
+    quiet = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", quiet)
+    assert not has_reader()
+    for progress in (None, False):
+        vs.solve(BODY, [20], "numeric", progress=progress)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    vs.solve(BODY, [20], "numeric", progress=False)
+    with limits(progress=False):  # as in the workers of a server
+        vs.solve(BODY, [20], "numeric")
+    inside: list[bool] = []
+    thread = threading.Thread(target=lambda: inside.append(has_reader()))
+    thread.start()
+    thread.join()
+    assert inside == [False]
+    assert sys.stderr.getvalue() == quiet.getvalue() == ""
+    monkeypatch.setattr(sys, "stderr", None)
+    assert not has_reader()
+    ProgressLine()("motion", 1, 2)
+
+
+def test_a_notebook_is_shown_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    output = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    monkeypatch.setattr(sys, "stderr", output)
+    monkeypatch.setattr(progress_lines, "_PATIENCE_S", 0.1)
+    vs.solve(BODY, [300], "numeric")
+    assert "veselova: integration [" in output.getvalue()
+    assert shown_by(output.getvalue()).strip() == ""
+
+
+def test_the_command_line_shows_progress_on_a_terminal_alone() -> None:
+    """Standard error is a terminal here, and standard output holds nothing but the answer."""
+    ours, theirs = pty.openpty()
+    asked = {**BODY4, "times": [1e7], "engine": "numeric", "budget_s": 8}
+    command = [sys.executable, "-m", "veselova", "solve", "-", "--json"]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=theirs
+    )
+    os.close(theirs)
+    output, _ = process.communicate(json.dumps(asked).encode(), timeout=PATIENCE)
+    seen = os.read(ours, 100_000).decode()
+    os.close(ours)
+    assert "veselova: integration [" in seen
+    assert (process.returncode, output) == (1, b"")
+    assert "stopped after its budget of 8 s" in seen
+
+
+def test_a_worker_ends_its_work_itself_and_lives_on() -> None:
+    task = worker_process.message((vs.solve, (BODY, [1e6], "numeric"), 0.3))
+    began = time.thread_time()
+    answer = worker_process.answer(task[worker_process.SIZE.size :])
+    assert time.thread_time() - began < 0.3 + LATE_S
+    succeeded, error = pickle.loads(answer[worker_process.SIZE.size :])
+    assert not succeeded
+    document = problem_document(error)
+    assert (document["status"], document["type"]) == (504, "urn:veselova:problem:over-budget")
+    assert str(error) == str(pickle.loads(pickle.dumps(error))) == document["detail"]
+    assert isinstance(error, TimeoutError)
+
+
+def test_conditioning_is_stopped_too() -> None:
+    found = vs.solve(BODY, [1.0])
+    with limits(1e-3):
+        time.sleep(2e-3)
+        with pytest.raises(vs.OverBudget):
+            _ = found.conditioning
+    assert found.conditioning.shape == (1,)
+
+
+def test_a_checkpoint_costs_next_to_nothing() -> None:
+    """Below a microsecond without limits, and with them."""
+    for inside in (limits(), limits(600, lambda done, total: None)):
+        with inside:
+            best = np.inf
+            for _ in range(20):
+                began = time.perf_counter()
+                for _ in range(1000):
+                    checkpoint()
+                best = min(best, time.perf_counter() - began)
+        assert best < 1e-3
