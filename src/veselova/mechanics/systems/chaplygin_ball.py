@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -36,16 +35,6 @@ class ChaplyginBall(RollingBall):
     """
 
     system: ClassVar[str] = "chaplygin-ball"
-    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "Omega": ("axis",),
-        "gamma": ("axis",),
-        "frame": ("axis", "vector"),
-        "position": ("horizontal",),
-        "velocity": ("horizontal",),
-        "force": ("horizontal",),
-        "momentum": ("axis",),
-    }
-    derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
     twists: ClassVar[bool] = True
     constrained: ClassVar[bool] = False

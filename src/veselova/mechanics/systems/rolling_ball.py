@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -34,6 +35,16 @@ class RollingBall(RigidBody):
     bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     #: Whether the ball may turn freely about the vertical.
     twists: ClassVar[bool]
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "Omega": ("axis",),
+        "gamma": ("axis",),
+        "frame": ("axis", "vector"),
+        "position": ("horizontal",),
+        "velocity": ("horizontal",),
+        "force": ("horizontal",),
+        "momentum": ("axis",),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
 
     def __init__(
         self,

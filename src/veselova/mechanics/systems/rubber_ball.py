@@ -55,22 +55,10 @@ class RubberBall(RollingBall, VeselovaSO3):
 
     system: ClassVar[str] = "rubber-ball"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "Omega": ("axis",),
-        "gamma": ("axis",),
-        "frame": ("axis", "vector"),
-        "position": ("horizontal",),
-        "velocity": ("horizontal",),
-        "force": ("horizontal",),
-        "momentum": ("axis",),
+        **RollingBall.outputs,
         "multiplier": (),
     }
-    derived: ClassVar[tuple[str, ...]] = (
-        "gamma",
-        "velocity",
-        "force",
-        "momentum",
-        "multiplier",
-    )
+    derived: ClassVar[tuple[str, ...]] = (*RollingBall.derived, "multiplier")
     twists: ClassVar[bool] = False
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
