@@ -72,13 +72,14 @@ class EvaluationPlan:
             fewest = times.size + 1 if few else costs.fewest_in_window(NODES, name)
             return Windows(times, solution.fastest, fewest, remainders)
 
+        by_fourier = intervals("fourier")
         estimates: Mapping[str, float] = {}
         if solution.problem.time == "tau1":
             _require_known_phases(cycles)
             chosen = "uniform"
         else:
             # The Fourier map is inverted at every time, or at the starts of intervals.
-            inversions = times.size if times.size < FEW_TIMES else intervals("fourier").inversions
+            inversions = times.size if times.size < FEW_TIMES else by_fourier.inversions
             estimates = costs.estimates(inversions)
             chosen = _choose(solution, costs, inversions, time_map)
         return cls(
@@ -88,7 +89,7 @@ class EvaluationPlan:
             chosen,
             in_angles,
             cycles,
-            intervals(chosen),
+            by_fourier if chosen == "fourier" else intervals(chosen),
             estimates,
         )
 
