@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.engines import solve
-from veselova.mechanics.core.checkpoints import checkpoints
 from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
 from veselova.mechanics.core.exact_input import exact_number
+from veselova.mechanics.core.fixed_instants import fixed_instants
 from veselova.mechanics.core.problem import NO_DIGIT, Problem
 from veselova.mechanics.results.trajectory import Trajectory
 
@@ -107,7 +107,7 @@ class _Departure:
             pairs = self._pairs(multiple) or pairs
             small = _BLOCK
             while pairs and small == _BLOCK and not (instants.size and instants[-1] >= farthest):
-                block = checkpoints(instants.size, _BLOCK) / turning
+                block = fixed_instants(instants.size, _BLOCK) / turning
                 apart = self._apart(pairs, block)
                 small = int(np.argmin(np.append(apart < lost, False)))
                 kept = small + (multiple == 1 and small < apart.size)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.checkpoints import checkpoints_until
 from veselova.mechanics.core.errors import Unsolved, unknown_name
+from veselova.mechanics.core.fixed_instants import fixed_instants_until
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
@@ -120,8 +120,8 @@ def _integrate_twice(
     asked = grid.doubles / flow.time_unit
     # Two runs may agree by chance at the few times asked for, and where both dwell at the same
     # equilibrium; not at all of these too, which no time that is asked for changes.
-    before = -checkpoints_until(max(-asked[0], 0.0), _EVERY)
-    fixed = np.concatenate([before[:0:-1], checkpoints_until(max(asked[-1], 0.0), _EVERY)])
+    before = -fixed_instants_until(max(-asked[0], 0.0), _EVERY)
+    fixed = np.concatenate([before[:0:-1], fixed_instants_until(max(asked[-1], 0.0), _EVERY)])
     scaled = np.union1d(asked, fixed)
     neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)
     answer = backend(flow, backend.tolerances[0])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.checkpoints import checkpoints
+from veselova.mechanics.core.fixed_instants import fixed_instants
 
 __all__ = ["DepartureBound"]
 
@@ -64,7 +64,7 @@ class DepartureBound:
         """
         instants, bounds = self._known.get(side, (np.zeros(0), np.zeros((0, 2))))
         while not instants.size or (instants[-1] < farthest and bounds[-1, 0] <= self.lost):
-            further = checkpoints(len(instants), _BLOCK) / self.turning
+            further = fixed_instants(len(instants), _BLOCK) / self.turning
             in_order = slice(None, None, int(side))
             (first, *others), error = self.motions(further[in_order] * side)
             differences = np.max(

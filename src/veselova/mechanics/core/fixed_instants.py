@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["checkpoints", "checkpoints_until"]
+__all__ = ["fixed_instants", "fixed_instants_until"]
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 _STEP, _EVEN, _GROWTH = 0.25, 256, 1.02
 
 
-def checkpoints(first: int, count: int) -> Array:
+def fixed_instants(first: int, count: int) -> Array:
     """Return ``count`` instants from number ``first`` on, in radians of turning; number 0 is zero.
 
     They are evenly apart at first, then farther and farther.
@@ -27,10 +27,10 @@ def checkpoints(first: int, count: int) -> Array:
     return np.asarray(_STEP * np.where(numbers <= _EVEN, numbers, _EVEN * farther))
 
 
-def checkpoints_until(farthest: float, every: int = 1) -> Array:
+def fixed_instants_until(farthest: float, every: int = 1) -> Array:
     """Return the instants from zero to at most ``farthest`` radians, or every second, third …"""
     count = farthest / _STEP
     if count > _EVEN:
         count = _EVEN + np.log(count / _EVEN) / np.log(_GROWTH)
-    found = checkpoints(0, int(count) + 2)[::every]
+    found = fixed_instants(0, int(count) + 2)[::every]
     return found[found <= farthest]
