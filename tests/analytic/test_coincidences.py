@@ -79,7 +79,7 @@ def test_certified_motions_of_equal_A_hold_the_integrated_ones(problem: vs.Vesel
 def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(
     problem: vs.Veselova, digits: int
 ) -> None:
-    """Equal A's drawn apart by 10^(−2·digits−10): the motions of the two bodies are at most so far
+    """Equal A's separated by 10^(−2·digits−10): the motions of the two bodies are at most so far
     from each other.
     """
     times, given = [-1, 1, 3], moving_part(problem)

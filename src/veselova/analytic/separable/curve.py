@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 #: Digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
 
-#: I's nearer than this part of themselves are drawn apart by it: far below any digit, and products
+#: I's nearer than this part of themselves are separated by it: far below any digit, and products
 #: of such differences are floats.
 _APART = Fraction(1, 10**30)
 
@@ -262,7 +262,7 @@ AnyCut: TypeAlias = SeparatedCut | OpenInterval
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Return increasing numbers, of which those that are equal, or nearly so, are drawn apart by
+    """Return increasing numbers, of which those that are equal, or nearly so, are separated by
     1e-30 of themselves.
     """
     result = list(values)

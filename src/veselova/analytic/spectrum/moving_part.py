@@ -78,7 +78,7 @@ class Moving:
         return math.exp(power * (math.log(self.A[0].numerator) - math.log(self.A[0].denominator)))
 
     def separate(self, distance: Fraction, closeness: Fraction) -> Moving:
-        """Return the part with A's that are nearer than ``closeness``, relatively, drawn apart by
+        """Return the part with A's that are nearer than ``closeness``, relatively, separated by
         ``distance``.
         """
         A = list(self.A)
