@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -18,36 +19,71 @@ from veselova import __version__
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
+PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))]
+#: Numbers whose size alone is promised: roundings, which differ from one processor to another.
+ROUNDING = 1e-6
 
 
 def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_python_of_the_readme_runs(
-    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(NUMBER, text)]
+
+
+NUMBER = r"(?<![\w.])-?\d+(?:\.\d*)?(?:e[-+]?\d+)?"
+
+
+def assert_same_output(shown: str, printed: str) -> None:
+    """Assert that words are the same, numbers equal to six digits, and roundings of one size."""
+    assert re.sub(NUMBER, "#", shown).split() == re.sub(NUMBER, "#", printed).split()
+    for old, new in zip(numbers(shown), numbers(printed), strict=True):
+        if 0 < abs(old) < ROUNDING:
+            assert abs(new) < 30 * abs(old)
+        else:
+            assert new == pytest.approx(old, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if "```python" in (ROOT / page).read_text()]
+)
+def test_the_python_of_the_pages_runs_and_prints_what_they_show(
+    page: str,
+    server: Server,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    scope: dict[str, Any] = {}
-    sources = blocks(README, "python")
-    assert len(sources) == 6
-    for source in sources:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / page).read_text()
+    scope: dict[str, Any] = {"__name__": "__main__"}
+    for source, shown in re.findall(
+        r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?", text, re.MULTILINE | re.DOTALL
+    ):
         exec(source.replace("http://127.0.0.1:8000", server.url), scope)
-    assert scope["comparison"].agrees
-    assert scope["torus"].n == 4
-    assert (scope["dataset"].outcome == "solved").all()
-    assert scope["certified"].certified
-    assert scope["geodesic"].quadrics.shape == (1,)
-    assert scope["body"].system == "veselova-so3"
+        printed = capsys.readouterr().out
+        if shown:
+            assert_same_output(shown, printed)
 
 
-COMMANDS = next(block for block in blocks(README, "sh") if "veselova demo" in block).splitlines()
+COMMANDS = [
+    line
+    for block in blocks((ROOT / "docs" / "command-line.md").read_text(), "sh")
+    for line in block.splitlines()
+]
+
+
+def test_the_commands_of_the_readme_are_those_of_the_page() -> None:
+    shown = [line for block in blocks(README, "sh") for line in block.splitlines()]
+    assert {line for line in shown if line.startswith("veselova ")} <= {*COMMANDS}
 
 
 @pytest.mark.parametrize(
     "command", [slow(line) if "bench" in line else line for line in COMMANDS[:-1]]
 )
-def test_the_commands_of_the_readme_run(command: str, tmp_path: Path) -> None:
+def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     assert COMMANDS[-1] == "veselova serve"
@@ -66,8 +102,9 @@ def test_the_commands_of_the_readme_run(command: str, tmp_path: Path) -> None:
             assert (tmp_path / words[words.index(option) + 1]).exists()
 
 
-def test_the_request_of_the_readme_is_answered(server: Server) -> None:
-    body = re.search(r"-d '(\{.*?\})'$", README, re.MULTILINE | re.DOTALL)
+def test_the_request_of_the_page_is_answered(server: Server) -> None:
+    page = (ROOT / "docs" / "http.md").read_text()
+    body = re.search(r"-d '(\{.*?\})'$", page, re.MULTILINE | re.DOTALL)
     assert body
     response = server.ask(
         "POST", "/v1/trajectories", content=body[1], headers={"content-type": "application/json"}
@@ -76,24 +113,62 @@ def test_the_request_of_the_readme_is_answered(server: Server) -> None:
     assert list(response.json()["series"]) == ["q", "frame"]
 
 
+def sentences(text: str) -> list[str]:
+    """Return the sentences of Markdown or of a docstring, without code, tables and headings."""
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"`[^`\n]*`", "x", re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text))
+    parts = re.split(r"\n\s*\n|\n\s*(?=[-*] |\d+\. |\||#|    )", text)
+    prose = [
+        " ".join(part.split())
+        for part in parts
+        if not part.lstrip("\n").startswith(("|", "#", "    "))
+    ]
+    return [
+        sentence
+        for part in prose
+        for sentence in re.split(r"(?<=[.!?:;])\s+(?=[A-Z\[(x])", part)
+        if re.search("[A-Za-z]", sentence)
+    ]
+
+
+def docstrings(folder: Path) -> str:
+    nodes = [node for path in folder.glob("*.py") for node in ast.walk(ast.parse(path.read_text()))]
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    found = [ast.get_docstring(node) or "" for node in nodes if isinstance(node, documented)]
+    return "\n\n".join(found)
+
+
+#: Nine sentences of ten have at most so many words.
+WORDS = 30
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(pytest.param((ROOT / page).read_text(), id=page) for page in PAGES),
+        *(
+            pytest.param((ROOT / page).read_text(), id=page)
+            for page in ("ARCHITECTURE.md", "CONTRIBUTING.md", "CONVENTIONS.md", "SECURITY.md")
+        ),
+        *(
+            pytest.param(docstrings(folder), id=str(folder.relative_to(ROOT / "src")))
+            for folder in sorted({path.parent for path in (ROOT / "src").rglob("*.py")})
+        ),
+    ],
+)
+def test_sentences_are_short(text: str) -> None:
+    lengths = sorted(len(re.findall(r"\S*[A-Za-z]\S*", sentence)) for sentence in sentences(text))
+    assert lengths[int(0.9 * (len(lengths) - 1))] <= WORDS
+
+
 @pytest.mark.parametrize(
     "name",
-    [
-        "README.md",
-        "ARCHITECTURE.md",
-        "CONVENTIONS.md",
-        "CHANGELOG.md",
-        "SECURITY.md",
-        "docs/container.md",
-        "docs/service.md",
-        "docs/accuracy.md",
-        "docs/performance.md",
-    ],
+    [*PAGES, "ARCHITECTURE.md", "CONTRIBUTING.md", "CONVENTIONS.md", "CHANGELOG.md", "SECURITY.md"],
 )
 def test_links_and_named_files_exist(name: str) -> None:
     text = (ROOT / name).read_text()
-    prose = re.sub(r"`[^`\n]*`", "", text)  # a code span holds formulas, never links
-    for target in re.findall(r"\]\(([^)#:]+)\)", prose):
+    # A target has a suffix; θ[ε;δ](z) is a formula.
+    for target in re.findall(r"\]\(([^)#:]+\.\w+)(?:#[^)]*)?\)", text):
         assert ((ROOT / name).parent / target).exists(), target
     for target in re.findall(r"`((?:tests|benchmarks|examples|docs|src)/[\w/.]+\.\w+)`", text):
         assert (ROOT / target).exists(), target

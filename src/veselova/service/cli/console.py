@@ -123,7 +123,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     for name, value in comparison.deviation.items():
         table.add_row(name, f"{value:.1e}")
     console.print(table)
-    _heading(console, "What to hold it against")
+    _heading(console, "Bounds")
     table = _table("bound", "largest value")
     table.add_row("error bound, analytic", f"{np.max(comparison.analytic.error):.1e}")
     table.add_row("error bound, numeric", f"{np.max(comparison.numeric.error):.1e}")
