@@ -42,8 +42,10 @@ _BLOCK = 2_000_000
 class Attitude:
     """The body at N points of the torus, along sorted principal axes.
 
-    q (N, n) · normals (N, n, g) columns n_2 … n_{n−1}, γ · components (N, g) of q' along them ·
-    spheroconic (N, g)
+    - q: (N, n)
+    - normals: (N, n, g) columns n_2 … n_{n−1}, γ
+    - components: (N, g) of q' along them ·
+    - spheroconic: (N, g)
     """
 
     q: Values

@@ -24,11 +24,14 @@ _CURVATURE = 4.0
 @dataclass(frozen=True)
 class Sensitivity:
     """Derivatives of numbers x of a state, such as the entries of its frame, at N points of the
-    torus, or their maxima over points. Each is the largest over the numbers.
+    torus, or their maxima over points. Each is the largest over the numbers, (N,) or one number.
 
-    by_phase |∂x/∂z_k|, (N, g) or (g,) · the others (N,) or numbers: along_flow |dx/dτ₁| · together
-    √Σ_k (∂x/∂z_k)² · by_rates Σ_k |f_k ∂x/∂z_k| · by_start √Σ_j (Σ_k ∂x/∂z_k δ_kj)², where source j
-    of rounding at the start moves phase k by δ_kj
+    - by_phase: |∂x/∂z_k|, (N, g) or (g,)
+    - along_flow: |dx/dτ₁|
+    - together: √Σ_k (∂x/∂z_k)²
+    - by_rates: Σ_k |f_k ∂x/∂z_k|
+    - by_start: √Σ_j (Σ_k ∂x/∂z_k δ_kj)², where source j of rounding at the start moves phase k
+      by δ_kj
     """
 
     by_phase: Array

@@ -53,9 +53,11 @@ def sample_phases(genus: int) -> Array:
 class SensitivitySampling:
     """The frame around a torus, from the angles (g,) of its start.
 
-    rates: f, cycles per unit of τ₁, (g,) · sources: δ (g, S) of ``Sensitivity`` · half_periods,
-    steep: whether the attitudes at half periods, and the sensitivity, are wanted · point: what the
-    positions q (N, m) are normals at, the point of a geodesic; None for other motions
+    - rates: f, cycles per unit of τ₁, (g,)
+    - sources: δ (g, S) of ``Sensitivity``
+    - half_periods, steep: whether the attitudes at half periods, and the sensitivity, are wanted
+    - point: what the positions q (N, m) are normals at, the point of a geodesic; None for other
+      motions
     """
 
     frame: Frame

@@ -35,13 +35,14 @@ class BranchPoint:
 class Layout:
     """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
 
-    places (m,) their indices j · sides (g, m) the sign of λ_s − b_k
-    beyond (g, m) the number of the point of the same kind on the far side of cut s as seen from k
-    (m where there is none)
-    partners (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with those
-    below, the others with those above
-    ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1 where
-    that is of the other kind
+    - places: (m,) their indices j
+    - sides: (g, m) the sign of λ_s − b_k
+    - beyond: (g, m) the number of the point of the same kind on the far side of cut s as seen
+      from k (m where there is none)
+    - partners: (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with
+      those below, the others with those above
+    - ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1
+      where that is of the other kind
     """
 
     places: NDArray[np.intp]

@@ -99,9 +99,10 @@ class WindowBatch:
     """W windows in Neumann time: Chebyshev coefficients of dt/dτ₁ (W, NODES) and of the series (W,
     NODES, C).
 
-    starts (W,) and stretch: where they start and how long they are, in τ₁ · sizes (C,) of the
-    series, of the ``shapes``
-    before (W,) tails of longer windows
+    - starts: (W,) and stretch: where they start and how long they are, in τ₁
+    - sizes: (C,) of the
+    - series, of: the ``shapes``
+    - before: (W,) tails of longer windows
     """
 
     rates: Array

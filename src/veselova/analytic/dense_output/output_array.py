@@ -34,8 +34,8 @@ class Samples:
     """A motion at N times: τ₁ (N,), its series, and the error (N,) that interpolation adds,
     relative to their size.
 
-    evaluations: how often the motion was evaluated
-    time_map: the one that was used, on the panels of the intervals where these adjoin
+    - evaluations: how often the motion was evaluated
+    - time_map: the one that was used, on the panels of the intervals where these adjoin
     """
 
     tau1: Array

@@ -65,9 +65,11 @@ def _restriction(nodes: int, count: int) -> Array:
 class PiecewisePolynomial:
     """The pieces of W windows.
 
-    borders (W, count+1) in time since the window's start · tables (W, count, C, ORDER) of powers;
-    the first row is the part of the window's Neumann time that has passed · tails (W,) the largest
-    of the last Chebyshev coefficients, against their sizes
+    - borders: (W, count+1) in time since the window's start
+    - tables: (W, count, C, ORDER) of powers; the first row is the part of the window's Neumann
+      time that has passed
+    - tails: (W,) the largest
+    - of: the last Chebyshev coefficients, against their sizes
     """
 
     borders: Array

@@ -41,12 +41,16 @@ class PerturbationBound:
     """The bounds for one start, in units where the largest I of the moved one is 1; small numbers
     are balls, others doubles.
 
-    apart: |u(0)| + |w(0)|/μ + f/M · matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose
-    eigenvectors natural frames are
-    frames: how far the frames are from each other at t = 0 · growth: μ · speed: a bound of |q'| ·
-    bend: one of |q''|
-    time_maps, time_slope: |ρ₀−ρ₁| ≤ time maps + clock_slope·|u| · slowest: the least d(time)/dτ₁ ·
-    inverses: δ · highest: max a
+    - apart: |u(0)| + |w(0)|/μ + f/M
+    - matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
+    - frames: how far the frames are from each other at t = 0
+    - growth: μ
+    - speed: a bound of |q'| ·
+    - bend: one of |q''|
+    - time_maps, time_slope: |ρ₀−ρ₁| ≤ time maps + clock_slope·|u|
+    - slowest: the least d(time)/dτ₁ ·
+    - inverses: δ
+    - highest: max a
     """
 
     apart: Any
@@ -125,10 +129,11 @@ class PerturbationBound:
 @dataclass(frozen=True)
 class _Rates:
     """ρ = d(time)/dτ₁ = k (q,Aq)^p of both motions: p = 1/2 for t, −1 for arc length s, and 0 for
-    τ₁ itself.
+    τ₁ itself. With a in [low, high], (q,Aq) lies between 1/high and 1/low.
 
-    power: p · apart: |k₀−k₁|, a ball · least, most: doubles below and above both k. With a in [low,
-    high], (q,Aq) lies between 1/high and 1/low.
+    - power: p
+    - apart: |k₀−k₁|, a ball
+    - least, most: doubles below and above both k
     """
 
     power: float

@@ -32,10 +32,11 @@ _BETWEEN = 2.0
 class DepartureBound:
     """The bound of one motion, extended when times ask for it.
 
-    motions: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n), and
-    the error of the motion's evaluation there, (N,) · turning: radians a unit of time
-    lost: the difference beyond which nothing is known; instants after the first such one are not
-    evaluated
+    - motions: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n),
+      and the error of the motion's evaluation there, (N,)
+    - turning: radians a unit of time
+    - lost: the difference beyond which nothing is known; instants after the first such one are
+      not evaluated
     """
 
     motions: Callable[[Array], tuple[Sequence[Array], Array]]

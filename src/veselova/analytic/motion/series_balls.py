@@ -21,8 +21,10 @@ __all__ = ["States", "series_of", "to_all_directions"]
 class States:
     """States along the principal axes, in units of the problem.
 
-    tau1 (N,) · velocity (N, n): dq/d(time) in the problem's own time · frame (N, n, n) ·
-    spheroconic (N, n−1)
+    - tau1: (N,)
+    - velocity: (N, n): dq/d(time) in the problem's own time
+    - frame: (N, n, n) ·
+    - spheroconic: (N, n−1)
     """
 
     tau1: Values

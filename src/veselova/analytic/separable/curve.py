@@ -63,9 +63,11 @@ class SeparableStart:
     """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all exact;
     (q,q̇) = 0, |q| any.
 
-    inverse (n,) distinct I's, increasing · q, q_dot (n,) along these axes · polynomial: the v_m ·
-    centrifugal (n,) the β_i, none of them at q_i = 0 · size: 1 where q̇ is scaled as q is, (q,q)
-    where it is the velocity of the unit vector
+    - inverse: (n,) distinct I's, increasing
+    - q, q_dot: (n,) along these axes
+    - polynomial: the v_m ·
+    - centrifugal: (n,) the β_i, none of them at q_i = 0
+    - size: 1 where q̇ is scaled as q is, (q,q) where it is the velocity of the unit vector
     """
 
     inverse: tuple[Fraction, ...]
@@ -188,12 +190,14 @@ class SeparatedCut:
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
     roots of R next to them.
 
-    ends a, b, exact: lower a · width b−a
-    left (…) a−r of the real roots r < a, the nearest last · right (…) r−b of those above, the
-    nearest first
-    pairs (…, 2) a−Re r, Im r of complex ones · leading |leading coefficient of R| · below, above:
-    λ_s−a and b−λ_s at the start
-    axes: the numbers of the I's that are a and b, None where an end is none
+    - ends: a, b, exact: lower a
+    - width: b−a
+    - left: (…) a−r of the real roots r < a, the nearest last
+    - right: (…) r−b of those above, the nearest first
+    - pairs: (…, 2) a−Re r, Im r of complex ones
+    - leading: |leading coefficient of R|
+    - below, above: λ_s−a and b−λ_s at the start
+    - axes: the numbers of the I's that are a and b, None where an end is none
     """
 
     ends: tuple[Fraction, Fraction]

@@ -51,10 +51,11 @@ class Spectrum:
     """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate
     ``with spectrum.working()``.
 
-    inverse (m,) the I's, the last one 1 · q, q_prime (m,) along the moving directions, q_prime =
-    dq/dτ₁
-    constants (m−1,) c_1 … c_{m−1} · spheroconic (m−1,) λ's at the start · time_rate dτ₁/d(time)
-    there
+    - inverse: (m,) the I's, the last one 1
+    - q, q_prime: (m,) along the moving directions, q_prime = dq/dτ₁
+    - constants: (m−1,) c_1 … c_{m−1}
+    - spheroconic: (m−1,) λ's at the start
+    - time_rate: dτ₁/d(time) there
     """
 
     arithmetic: Arithmetic | Decimals

@@ -28,12 +28,15 @@ _CONTRADICTION = 1e-18
 class Spectra:
     """The spectra of N starts, in units of the largest I of each.
 
-    axes (N, n) the body axes by decreasing A · unit (N,) the least A, which counts as 1 · energy
-    (N,) h
-    inverse (N, n) the I's, the last one 1 · constants (N, n−1) c_1 = 0 … c_{n−1} · spheroconic (N,
-    n−1) λ's at the start
-    increasing (N, n−1) whether they increase there · time_rate (N,) dτ₁/dt there · known (N,)
-    which starts are of this kind
+    - axes: (N, n) the body axes by decreasing A
+    - unit: (N,) the least A, which counts as 1
+    - energy: (N,) h
+    - inverse: (N, n) the I's, the last one 1
+    - constants: (N, n−1) c_1 = 0 … c_{n−1}
+    - spheroconic: (N, n−1) λ's at the start
+    - increasing: (N, n−1) whether they increase there
+    - time_rate: (N,) dτ₁/dt there
+    - known: (N,) which starts are of this kind
     """
 
     axes: NDArray[np.intp]

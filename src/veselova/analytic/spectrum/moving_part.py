@@ -33,15 +33,17 @@ class Moving:
     """A start along its m moving directions, sorted by decreasing A; exact, with A in units of its
     smallest entry.
 
-    A (m,) · q_squared, v_squared, qv (m,): q_a², q̇_a², q_aq̇_a; q_a ≥ 0, and q̇_a > 0 where q_a =
-    0, by choice of the directions
-    vectors (m,) orthogonal vectors, of any length, as {principal axis: component} · n the number of
-    principal axes
-    axes (m,) the principal axis of each, or the first of its group · unit: the A that counts as 1
-    frozen: the A's of the directions that do not move, in the problem's units
-    turned: whether a group of equal A's has two moving directions
-    time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and c_1 need
-    not be zero
+    - A: (m,)
+    - q_squared, v_squared, qv: (m,) q_a², q̇_a², q_aq̇_a. Directions are chosen so that q_a ≥ 0,
+      and q̇_a > 0 where q_a = 0
+    - vectors: (m,) orthogonal vectors, of any length, as {principal axis: component}
+    - n: the number of principal axes
+    - axes: (m,) the principal axis of each, or the first of its group
+    - unit: the A that counts as 1
+    - frozen: the A's of the directions that do not move, in the problem's units
+    - turned: whether a group of equal A's has two moving directions
+    - time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and
+      c_1 need not be zero
     """
 
     A: tuple[Fraction, ...]

@@ -215,8 +215,9 @@ class _Sums:
     """The sums of a family over its waves x: Σ_x Re i^{2x·2δ_F} (R_x + iI_x) e^{2πix·y_F}, class of
     k by class, at N points.
 
-    orders (X, |F|): 2x · real, imaginary (classes, X, N): R and I · waves (X, N) each: cos and sin
-    2πx·y_F, None without F
+    - orders: (X, |F|): 2x
+    - real, imaginary: (classes, X, N): R and I · waves (X, N) each: cos and sin 2πx·y_F, None
+      without F
     """
 
     def __init__(

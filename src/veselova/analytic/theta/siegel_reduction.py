@@ -70,10 +70,11 @@ def reduce_lattice(form: Array) -> Integers:
 class SiegelReduction:
     """A reduced matrix τ' and the way there: θ[ε;δ](z|τ) = e^{c} e^{πi zᵀQz} θ[ε';δ'](Lz|τ').
 
-    tau (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1 · linear L (g, g) ·
-    quadratic Q (g, g)
-    symplectic (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
-    rounding about the error of the entries of τ'
+    - tau: (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1
+    - linear: L (g, g) ·
+    - quadratic: Q (g, g)
+    - symplectic: (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
+    - rounding: about the error of the entries of τ'
 
     Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
     bits more where the processor has them. Integers are chosen in doubles.

@@ -36,10 +36,13 @@ def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np
 class Panels:
     """τ₁ ↦ ∫_0^{τ₁} f(z) along an orbit, on P panels.
 
-    borders (P+1,) in τ₁, zero among them · lengths (P,) integrals (P, 2, N+1), coefficients of the
-    integral from the left border, and of its derivative in x, −1 … 1 on a panel
-    values (P+1,) of the integral at the borders · tails (P+1,), what series and rounding leave out
-    of them mean_size of f over τ₁
+    - borders: (P+1,) in τ₁, zero among them
+    - lengths: (P,)
+    - integrals: (P, 2, N+1) coefficients of the integral from the left border, and of its
+      derivative in x, −1 … 1 on a panel
+    - values: (P+1,) of the integral at the borders
+    - tails: (P+1,) what series and rounding leave out of them
+    - mean_size: of f over τ₁
     """
 
     borders: Array

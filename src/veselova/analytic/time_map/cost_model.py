@@ -79,8 +79,8 @@ def estimate_modes(genus: int, log_determinant: float) -> float:
 class Costs:
     """The costs of an orbit over so many cycles of its fastest phase.
 
-    modes: about how many the Fourier time map has · in_angles: whether panels take dt/dτ₁ from
-    angles, not from theta functions
+    - modes: about how many the Fourier time map has
+    - in_angles: whether panels take dt/dτ₁ from angles, not from theta functions
     """
 
     genus: int

@@ -53,8 +53,10 @@ _TIME = 1e-4
 class CostsInBalls:
     """The seconds that the parts of a motion take in balls.
 
-    genus · digits: the working ones · terms: of the longest angle series · by_theta: whether rate
-    and attitude come from theta functions
+    - genus
+    - digits: the working ones
+    - terms: of the longest angle series
+    - by_theta: whether rate and attitude come from theta functions
     """
 
     genus: int

@@ -204,8 +204,10 @@ def estimate_nodes(orbit: Orbit, approximate: NDArray[np.float64]) -> float:
 class _Panels:
     """Series in cos mθ of dt/dx on panels x = centre − half·cos θ from 0 on, x = |τ₁|.
 
-    rates (P, N) · truncation (P,) what they leave out · steepest: a bound of |d²t/dx²|, None where
-    there is none but that of the series, |dT_m/dx| ≤ m²/half
+    - rates: (P, N)
+    - truncation: (P,) what they leave out
+    - steepest: a bound of |d²t/dx²|, None where there is none but that of the series, |dT_m/dx|
+      ≤ m²/half
     """
 
     arithmetic: Any

@@ -39,8 +39,9 @@ _MODERATE = Fraction(10**60)
 class Ball:
     """A ball, and where it touches the plane at t = 0, exactly as given.
 
-    inertia   principal moments (3,) about the centre, or the symmetric matrix, (3, 3)
-    mass, radius  positive · contact (2,) the contact point in the plane, along e_2 and e_3
+    - inertia: principal moments (3,) about the centre, or the symmetric matrix, (3, 3)
+    - mass, radius: positive
+    - contact: (2,) the contact point in the plane, along e_2 and e_3
     """
 
     inertia: tuple[Any, ...]

@@ -56,8 +56,9 @@ _ONE = 1 << _BITS
 class WideAxes:
     """The principal axes of a symmetric matrix to 2^−256, determinant +1.
 
-    values  the eigenvalues, increasing, (n,): multiple ones are equal numbers columns the axes as
-    columns of integers, 2^320 for one, (n, n) · rounded: the same as floats, each correctly rounded
+    - values: (n,) the eigenvalues, increasing; multiple ones are equal numbers
+    - columns: (n, n) the axes as columns of integers, 2^320 for one
+    - rounded: the same as floats, each correctly rounded
     """
 
     values: tuple[Fraction, ...]

@@ -29,9 +29,9 @@ class Operations:
     """What a field may do besides + − × ÷, in floating point or with the symbols of a Taylor
     integrator.
 
-    dot: the matrix product ``a @ b`` of arrays of one or two dimensions
-    solve: the solution of ``a @ x = b`` for symmetric positive definite ``a`` and columns ``b`` (or
-    a stack of each)
+    - dot: the matrix product ``a @ b`` of arrays of one or two dimensions
+    - solve: the solution of ``a @ x = b`` for symmetric positive definite ``a`` and columns
+      ``b`` (or a stack of each)
     """
 
     sqrt: Callable[[Any], Any]
@@ -46,9 +46,10 @@ class Flow(ABC):
     """A vector field with a start. States are flat arrays; redundant coordinates are put back on
     the manifold by ``project``.
 
-    initial     the start, (m,) · parameters  the numbers that the field depends on, (k,)
-    time_unit   one unit of scaled time, in units of the problem's time
-    size        what the bounded outputs are measured in, in the problem's units
+    - initial: the start, (m,)
+    - parameters: the numbers that the field depends on, (k,)
+    - time_unit: one unit of scaled time, in units of the problem's time
+    - size: what the bounded outputs are measured in, in the problem's units
     """
 
     initial: Array

@@ -55,13 +55,14 @@ _REQUIRED = "a number, a list of numbers, or exactly the fields start, stop, cou
 
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
-    """The different times asked for, in increasing order, and where each time asked for is among
+    """The different requested times in increasing order, and the place of each requested time among
     them.
 
-    doubles (N,) nearest to the exact times, increasing; two different times may have one double ·
-    remainders (N,) what the exact times are beyond the doubles, None where that is nothing ·
-    places (M,) of the M times asked for, None where these are the N times in this order ·
-    rationals: what makes the exact times of arithmetic beyond double precision
+    - doubles: (N,) nearest to the exact times, increasing; two different times may have one
+      double
+    - remainders: (N,) the exact times less the doubles, None where they are zero
+    - places: (M,) of the M requested times, None where these are the N times in this order
+    - rationals: what makes the exact times of arithmetic beyond double precision
     """
 
     doubles: Array

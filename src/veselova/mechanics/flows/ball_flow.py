@@ -25,9 +25,10 @@ Array = NDArray[np.float64]
 class RollingFlow(Flow):
     """A flow of the attitude, and the contact point by ẋ_k = −a(e_k, γ̇).
 
-    attitude  a flow whose state is three numbers and the frame, row-major, (12,) · radius  a ·
-    contact (2,) the contact point at the start
-    A state is that of the attitude and (x−x(0))/a, of length 14.
+    - attitude: a flow whose state is three numbers and the frame, row-major, (12,)
+    - radius: a ·
+    - contact: (2,) the contact point at the start A state is that of the attitude and
+      (x−x(0))/a, of length 14.
     """
 
     attitude: Any
@@ -83,9 +84,11 @@ class ChaplyginFlow(Flow):
     D(BK,γ)/(Bγ,Iγ), and the momentum EᵀK constant in space; 1 − D(Bγ,γ) = (Bγ,Iγ) without
     cancellation.
 
-    inertia, inverse  I and B, (3, 3) · added  D = ma² · momentum  EᵀK · frame  the start; all of
-    them in scaled units
-    A state is the momentum and the frame, row-major, of length 12.
+    - inertia, inverse: I and B, (3, 3)
+    - added: D = ma²
+    - momentum: EᵀK
+    - frame: the start; all of them in scaled units A state is the momentum and the frame,
+      row-major, of length 12.
     """
 
     inertia: Array
@@ -154,8 +157,11 @@ class ContactForceFlow(Flow):
     """The ball itself: IΩ̇ = IΩ×Ω + torques and mv̇ = force, with the constraints v_k = a(Ω×γ, e_k)
     and, where it may not twist, (Ω,γ) = const, kept by multipliers.
 
-    inertia (3, 3) about the centre · added  ma² · Omega, frame  the start, all in scaled units ·
-    radius, contact  in the problem's units · twists  whether the ball is free to twist
+    - inertia: (3, 3) about the centre
+    - added: ma²
+    - Omega, frame: the start, all in scaled units ·
+    - radius, contact: in the problem's units
+    - twists: whether the ball is free to twist
 
     A state is Ω, v/a, the frame and (x−x(0))/a, of length 16. With b_k = γ×e_k, fixed in space, the
     constraints are v_k/a = (Ω, b_k), whose derivatives have no further term, since (Ω, b_k×Ω) = 0.

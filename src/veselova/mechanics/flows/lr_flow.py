@@ -31,10 +31,10 @@ _LARGEST_SYMBOLIC = 66
 class LRFlow(SingularFlow):
     """An LR system in scaled units: moments of inertia near one, angular velocities near one.
 
-    along (d,)   m_k = ⟨𝓘ω, 𝒲_k⟩ at the start · across (m,)  the constants c_s = ⟨ω, ℱ_s⟩ of the
-        constraints
-    conserves    whether the Jacobi–Painlevé integral is one: not where v changes along constants
-        c_s ≠ 0
+    - along: (d,) m_k = ⟨𝓘ω, 𝒲_k⟩ at the start
+    - across: (m,) the constants c_s = ⟨ω, ℱ_s⟩ of the constraints
+    - conserves: whether the Jacobi–Painlevé integral is one: not where v changes along
+      constants c_s ≠ 0
     """
 
     distribution: Distribution

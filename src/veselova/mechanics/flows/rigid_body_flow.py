@@ -31,12 +31,13 @@ class RigidBodyFlow(SingularFlow):
     """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E =
     [e_1 e_2 e_3], e_1 = γ.
 
-    inertia, inverse  the tensor and its inverse, (3, 3) · potential  V(γ) · Omega, frame  the
-        start, all in scaled units
-    constrained  whether a multiplier λγ keeps (Ω,γ) constant
-    spatial      states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of
-                 (Ω, E): with V = 0 the equation is one of first order on the group alone, and in
-                 any potential m_1 = (𝔪,γ) does not move
+    - inertia, inverse: the tensor and its inverse, (3, 3)
+    - potential: V(γ)
+    - Omega, frame: the start, all in scaled units
+    - constrained: whether a multiplier λγ keeps (Ω,γ) constant
+    - spatial: states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of
+      (Ω, E): with V = 0 the equation is one of first order on the group alone, and in any
+      potential m_1 = (𝔪,γ) does not move
 
     A state is flat, of length 3 + 9; frames are row-major.
     """

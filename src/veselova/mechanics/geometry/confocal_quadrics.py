@@ -45,8 +45,9 @@ def lax_partner(A: Array, x: Array, V: Array) -> Array:
 class Contacts:
     """The quadrics that tangents of a geodesic touch besides Q(0), k = 2…n−1.
 
-    quadrics (..., n−2) α_k, decreasing · points (..., n−2, n) where each is touched · normals (...,
-    n−2, n) unit normals there
+    - quadrics: (..., n−2) α_k, decreasing
+    - points: (..., n−2, n) where each is touched
+    - normals: (..., n−2, n) unit normals there
     """
 
     quadrics: Array

@@ -36,8 +36,8 @@ INPUT_TOLERANCE = 1e-9
 class ExactState:
     """The data as exact rationals in principal axes, q not yet scaled and q_dot not yet projected.
 
-    frame: rows of the frame as given (along the body axes, where A was a matrix), None where the
-    natural one was left to us
+    - frame: rows of the frame as given, along the body axes where A was a matrix; None for the
+      natural frame
     """
 
     A: tuple[Fraction, ...]

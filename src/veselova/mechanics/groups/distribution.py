@@ -34,8 +34,8 @@ _MOST_ENTRIES = 2_000_000
 class Distribution:
     """The splitting 𝔤 = 𝔡 ⊕ 𝔥 that a right-invariant distribution is.
 
-    space   (D, D) orthonormal coordinate rows: w_1 … w_d of 𝔡, then h_1 … h_m of 𝔥
-    rank    d = dim 𝔡
+    - space: (D, D) orthonormal coordinate rows: w_1 … w_d of 𝔡, then h_1 … h_m of 𝔥
+    - rank: d = dim 𝔡
 
     At g the constraints are ω ∈ g⁻¹𝔡g, or f_s = ⟨ω, ℱ_s⟩ = c_s with ℱ_s = g⁻¹h_s g, equation
     (dist); 𝒲_k = g⁻¹w_k g.

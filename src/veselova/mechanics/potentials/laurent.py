@@ -25,8 +25,8 @@ class LaurentPolynomial:
     """Σ_k c_k Π_j γ_j^{p_kj} with integer powers of either sign; no two terms share their powers,
     no coefficient is zero.
 
-    powers        of each term, three integers
-    coefficients  (k,)
+    - powers: of each term, three integers
+    - coefficients: (k,)
     """
 
     powers: tuple[Powers, ...]

@@ -47,8 +47,8 @@ _VANISHES = 1e-9
 class GroupPotential:
     """v(g) = Σ_k c_k Π g_ij^p.
 
-    coefficients (K,) · powers  for every monomial its factors (i, j, p), i and j from 0, p ≠ 0, no
-        entry twice
+    - coefficients: (K,)
+    - powers: for every monomial its factors (i, j, p), i and j from 0, p ≠ 0, no entry twice
     """
 
     coefficients: Array

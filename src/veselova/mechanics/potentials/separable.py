@@ -53,7 +53,8 @@ class SeparablePotential:
     = Σ I_i − (A⁻¹q,q), and all are polynomials in the moments (A⁻ʲq,q), of degree 2j in q. Powers m
     < n−2 give V = 0.
 
-    polynomial   v_0, v_1, … · centrifugal  β_1 … β_n
+    - polynomial: v_0, v_1, …
+    - centrifugal: β_1 … β_n
     """
 
     polynomial: Array

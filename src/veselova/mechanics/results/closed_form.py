@@ -52,11 +52,12 @@ def require_accuracy(accuracy: Any, digits: int = 15) -> float:
 class ClosedFormStates:
     """States evaluated from a closed-form document.
 
-    times (N,) · error (N,) a bound on every component of q and the frame · series by name, first
-    axis the times, which are
-    attributes too: those of the system that follow from attitude and velocity
-    decimals: the same series as arrays of ``decimal.Decimal``, where the document has more digits
-    than a double; ``error`` is that of these numbers
+    - times: (N,)
+    - error: (N,) a bound on every component of q and the frame
+    - series: by name, first axis the times: those of the system that follow from attitude and
+      velocity. They are attributes too
+    - decimals: the same series as arrays of ``decimal.Decimal``, where the document has more
+      digits than a double; ``error`` is then that of these numbers
     """
 
     times: Array

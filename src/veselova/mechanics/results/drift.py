@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 class Drift:
     """The mean velocity of a contact point over all times, along e_2 and e_3.
 
-    velocity (2,) · resonance: the whole numbers M with Σ_s M_s f_s = 0 by which the ball also
-    drifts across the direction of its generic motions; None where there are none
+    - velocity: (2,)
+    - resonance: the whole numbers M with Σ_s M_s f_s = 0 by which the ball also drifts across
+      the direction of its generic motions; None where there are none
     """
 
     velocity: Array

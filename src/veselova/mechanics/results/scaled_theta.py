@@ -20,8 +20,9 @@ _LARGEST_EXPONENT = 709.0
 class ScaledTheta:
     """Theta values as ``mantissa``·exp(``exponent``), whatever their size.
 
-    mantissa: complex, the shape of the values · exponent, error: real, without the axes of
-    derivatives. The mantissa is off by at most ``error``.
+    - mantissa: complex, the shape of the values
+    - exponent, error: real, without the axes of derivatives. The mantissa is off by at most
+      ``error``.
     """
 
     mantissa: NDArray[np.complex128]

@@ -17,23 +17,27 @@ Array = NDArray[np.float64]
 class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.
 
-    energy h (of Neumann's motion for that system; ½ for a geodesic), None where it leaves the range
-    of a float constants c_2 ≤ … ≤ c_{n−1}, and c_1 first for Neumann's system
-    branch_points (2g+1,) b_0 < … < b_{2g}, b_0 = c_1 = 0 but for Neumann's
-    origins (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a c_k
-    (``c1`` is 0)
-    periods (g, g) a_{ks} = (−1)^{g−s} ∮ λ^{k−1}dλ/(2√|R|) over cut s, which scale like A^{g+½−k},
-    None where one of them leaves the range of a float · riemann_matrix (g, g) T, Riemann matrix iT
-    actions (g,) J_s = (1/2π)∮ p_s dλ_s of the Neumann motion, p_s = ½√|λ Π(λ−c_k)/Π(λ−I_i)| ·
-    rotation_numbers (g,) Ω_s/Ω_1
-    signs (n,) of the q_i at the start (of q̇_i where q_i = 0): with energy, constants and phases
-    they give the start back
-    riemann_matrix_residual: max |T − Tᵀ|/max |T| before symmetrisation frequencies_tau1,
-    frequencies_t (g,) cycles per unit of τ₁ and of the problem's own time (t, s or τ₁) · phases
-    (g,) z⁰ in [0, 1) · mean_rate: mean of d(time)/dτ₁
-    regime: ``generic``, ``closed-cut`` (directions that do not move, or equal A's) or
-    ``separatrix`` (some c_k = I_i: periods are infinite there, and the torus is that of a start
-    1e-40 away)
+    - energy: h, that of Neumann's motion for that system, ½ for a geodesic; None where it leaves
+      the range of a float
+    - constants: c_2 ≤ … ≤ c_{n−1}, with c_1 first for Neumann's system
+    - branch_points: (2g+1,) b_0 < … < b_{2g}, with b_0 = c_1 = 0 but for Neumann's system
+    - origins: (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a
+      c_k (``c1`` is 0)
+    - periods: (g, g) a_{ks} = (−1)^{g−s} ∮ λ^{k−1}dλ/(2√|R|) over cut s, which scale like
+      A^{g+½−k}; None where one of them leaves the range of a float
+    - riemann_matrix: (g, g) T; the Riemann matrix is iT
+    - riemann_matrix_residual: max |T − Tᵀ|/max |T| before symmetrisation
+    - actions: (g,) J_s = (1/2π)∮ p_s dλ_s of the Neumann motion, p_s = ½√|λ Π(λ−c_k)/Π(λ−I_i)|
+    - frequencies_tau1: (g,) cycles per unit of τ₁
+    - frequencies_t: (g,) cycles per unit of the problem's own time (t, s or τ₁)
+    - rotation_numbers: (g,) Ω_s/Ω_1
+    - phases: (g,) z⁰ in [0, 1)
+    - mean_rate: mean of d(time)/dτ₁
+    - signs: (n,) of the q_i at the start (of q̇_i where q_i = 0). With energy, constants and
+      phases they determine the start
+    - regime: ``generic``, ``closed-cut`` (directions that do not move, or equal A's) or
+      ``separatrix`` (some c_k = I_i: periods are infinite there, and the torus is that of a
+      start 1e-40 away)
     """
 
     n: int

@@ -41,17 +41,21 @@ class Trajectory:
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as
     ``trajectory.q``.
 
-    times (N,) · error (N,) bounds the true error of every component of the problem's ``bounded``
-    series: true ≤ error
-    arrays: the series that do not follow from others, by name, first axis the times, which may be
-    the last in memory
-    decimals: the same series to more digits, or with certified errors, where that was asked for
-    remainders (N,) what the exact times, as they were asked for, are beyond ``times``; None where
-    they are doubles
+    - times: (N,)
+    - error: (N,) bounds the true error of every component of the problem's ``bounded`` series:
+      true ≤ error
+    - arrays: the series that do not follow from others, by name; the first axis is the times,
+      which may be the last in memory
+    - decimals: the same series to more digits, or with certified errors; None unless requested
+    - remainders: (N,) the exact times less ``times``; None where the exact times are doubles
 
-    System veselova: q (N, n) · q_dot (N, n) · frame (N, n, n) columns e_i, along the body axes of
-    the problem · omega (N, n, n) = q∧q̇, equation (44.3) · spheroconic (N, n−1), increasing · tau1
-    (N,) Neumann time, zero at t = 0
+    Series of the system veselova:
+
+    - q, q_dot: (N, n)
+    - frame: (N, n, n) columns e_i, along the body axes of the problem
+    - omega: (N, n, n) q∧q̇, equation (44.3)
+    - spheroconic: (N, n−1), increasing
+    - tau1: (N,) Neumann time, zero at t = 0
     """
 
     problem: Problem

@@ -43,15 +43,17 @@ Array = NDArray[np.float64]
 class EllipsoidGeodesic(TorusProblem):
     """A geodesic X(s) on the ellipsoid Σ X_i²/A_i = 1 in ℝⁿ, n ≥ 2, with s its arc length.
 
-    A      the squares of the semiaxes, n positive numbers
-    X      the point at s = 0, (n,)
-    X_dot  the unit tangent dX/ds there, (n,)
+    - A: the squares of the semiaxes, n positive numbers
+    - X: (n,) the point at s = 0
+    - X_dot: (n,) the unit tangent dX/ds there
 
-    X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9; with
-    ``normalize=True`` X is scaled onto the ellipsoid and X_dot projected and scaled first. The
-    frame is [q, n_2 … n_{n−1}, γ]: the normal of the ellipsoid, those of the confocal quadrics that
-    the tangent touches (Chasles; see ``quadrics``), and the tangent γ = dX/ds itself, with
-    determinant 1 for n > 2.
+    X must lie on the ellipsoid, and X_dot be a tangent of unit length, to 1e-9. With
+    ``normalize=True`` X is scaled onto the ellipsoid and X_dot projected and scaled first.
+
+    The frame is [q, n_2 … n_{n−1}, γ], with determinant 1 for n > 2. q is the normal of the
+    ellipsoid, n_k are the normals of the confocal quadrics that the tangent touches (Chasles; see
+    ``quadrics``), and γ = dX/ds is the tangent itself.
+
     Raises InvalidInput, which names the field, what was required and what was given.
     """
 

@@ -51,16 +51,16 @@ class LRSystem(Problem):
     On SO(n), with D_r of (4.1), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on`` takes any
     compact group and any 𝔥):
 
-    n, rank    the dimension, 2 ≤ n ≤ 64, and r from 1 to n−1
-    inertia    {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive
-               definite, in the basis E_i∧E_j, i < j, lexicographic
-    g          the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A
-        reflected frame is taken too
-    omega      the angular velocity ω = g⁻¹ġ in the body at t = 0, (n, n), skew
-    potential  None, or v as a list of monomials {"coefficient": c, "powers": [[i, j, p], …]}: c Π
-        g_ij^p, i and j from 1
-    homogeneous  True: ω must satisfy the constraints with c = 0 to 1e-9, and is projected; False: c
-        is what ω gives
+    - n, rank: the dimension, 2 ≤ n ≤ 64, and r from 1 to n−1
+    - inertia: {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive
+      definite, in the basis E_i∧E_j, i < j, lexicographic
+    - g: the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A
+      reflected frame is taken too
+    - omega: the angular velocity ω = g⁻¹ġ in the body at t = 0, (n, n), skew
+    - potential: None, or v as a list of monomials {"coefficient": c, "powers": [[i, j, p], …]}:
+      c Π g_ij^p, i and j from 1
+    - homogeneous: True: ω must satisfy the constraints with c = 0 to 1e-9, and is projected;
+      False: c is what ω gives
 
     Attributes: ``g`` on the group, ``omega`` (D,) in coordinates, ``constraint`` (m,) the c_s,
     ``distribution``, ``inertia``. Raises InvalidInput, which names the field, what was required and

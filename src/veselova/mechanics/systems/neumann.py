@@ -44,9 +44,9 @@ class NeumannSystem(TorusProblem):
     """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q,
     equation (4.7), in time τ₁.
 
-    A        n positive numbers
-    q        the unit vector at τ₁ = 0, (n,)
-    q_prime  its velocity dq/dτ₁, tangent to the sphere, (n,)
+    - A: n positive numbers
+    - q: the unit vector at τ₁ = 0, (n,)
+    - q_prime: its velocity dq/dτ₁, tangent to the sphere, (n,)
 
     q must have unit length and q_prime be tangent to 1e-9; with ``normalize=True`` q is scaled and
     q_prime projected first. On F_0 = 0, equation (4.8), the motion is that of a Veselova problem

@@ -49,13 +49,16 @@ class RigidBody(Problem):
     """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 =
     γ, e_2, e_3, in body axes.
 
-    moments, wide_axes  principal moments (3,), exact where given so, and the principal axes where a
-        matrix was given
-    inertia, inverse  the tensor and its inverse, (3, 3) · Omega, gamma (3,), frame (3, 3) at t = 0
-        · potential  V(γ)
-    linear   the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
-    exact_gamma, exact_Omega, exact_frame  the state as given, rationals: γ not yet scaled, the
-        frame None for the natural one · exact_inertia  moments or matrix, as given
+    - moments: (3,) principal moments, exact where given so
+    - wide_axes: the principal axes where a matrix was given
+    - inertia, inverse: (3, 3) the tensor and its inverse
+    - Omega, gamma: (3,)
+    - frame: (3, 3) at t = 0
+    - potential: V(γ)
+    - linear: the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
+    - exact_gamma, exact_Omega, exact_frame: the state as given, rationals: γ not yet scaled,
+      the frame None for the natural one
+    - exact_inertia: moments or matrix, as given
     """
 
     moments: tuple[Fraction, ...]

@@ -53,10 +53,10 @@ class SeparableVeselova(Problem):
     V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5) where n = 3 and A =
     𝓘⁻¹.
 
-    A          n distinct positive numbers
-    q, q_dot   the unit vector e_1 at t = 0 and its velocity, tangent to the sphere, (n,)
-    potential  {"quartic": α₁, "quadratic": α₂, "centrifugal": [β_1 … β_n]}, what is left out being
-        zero
+    - A: n distinct positive numbers
+    - q, q_dot: the unit vector e_1 at t = 0 and its velocity, tangent to the sphere, (n,)
+    - potential: {"quartic": α₁, "quadratic": α₂, "centrifugal": [β_1 … β_n]}, what is left out
+      being zero
 
     q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and
     q_dot projected first. In time τ the motion separates in spheroconic coordinates, for any n

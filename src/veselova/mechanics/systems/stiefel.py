@@ -48,12 +48,12 @@ class StiefelFlow(Problem):
     """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P), for any inertia and every
     rank 1 ≤ r ≤ n.
 
-    inertia  {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix": …},
-             symmetric and positive definite, on the coefficients of E_i∧E_j, i < j, in
-             lexicographic order
-    X        (e_1 … e_r) at t = 0, (n, r), orthonormal columns
-    P        the momentum ∂L/∂Ẋ, equation (dotX->P), (n, r), with XᵀP + PᵀX = 0, (condX); or
-    X_dot    the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X)
+    - inertia: {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix":
+      …}, symmetric and positive definite, on the coefficients of E_i∧E_j, i < j, in
+      lexicographic order
+    - X: (e_1 … e_r) at t = 0, (n, r), orthonormal columns
+    - P: the momentum ∂L/∂Ẋ, equation (dotX->P), (n, r), with XᵀP + PᵀX = 0, (condX); or
+    - X_dot: the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X)
 
     The constraints must hold to 1e-9; with ``normalize=True`` X becomes the nearest orthonormal
     matrix and P or X_dot is projected first. What is off by less is projected too. Raises

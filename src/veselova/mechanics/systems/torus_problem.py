@@ -23,15 +23,17 @@ Array = NDArray[np.float64]
 
 class TorusProblem(Problem):
     """A point q on Sⁿ⁻¹ that is Neumann's in τ₁, with the frame [q, n_2 … n_{n−1}, γ] or a rotated
-    one.
+    one. Subclasses differ in their time.
 
-    Subclasses differ in their time.
-    A (n,) along principal axes · frame (n, n) at the start, along them · near_frame: the same in
-    double precision, at less cost; a natural one is turned by ε/(distance of its constants) ·
-    exact: the data as rationals · axes (n, n): the principal axes as columns, None where they are
-    the body's. The series of an engine are ``tau1``, ``frame``, ``spheroconic`` and ``q_dot``, the
-    velocity in the problem's own ``time``: t, s or tau1; ``completed`` makes the problem's series
-    of them.
+    - A: (n,) along principal axes
+    - frame: (n, n) at the start, along them
+    - near_frame: the same in double precision, at less cost; a natural one is turned by
+      ε/(distance of its constants)
+    - exact: the data as rationals
+    - axes: (n, n) the principal axes as columns, None where they are the body's
+
+    The series of an engine are ``tau1``, ``frame``, ``spheroconic`` and ``q_dot``, the velocity in
+    the problem's own ``time``: t, s or tau1. ``completed`` makes the problem's series of them.
     """
 
     A: Array

@@ -50,19 +50,19 @@ class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
     constraint (44), n ≥ 2.
 
-    A        n positive numbers, or a symmetric positive definite n × n matrix, which is
-             diagonalised: the body axes then stay the given ones, and A, q, q_dot, frame below are
-             in the principal axes (``axes`` maps back)
-    q        the unit vector e_1 at t = 0, seen from the body, (n,)
-    q_dot    its velocity, tangent to the sphere, (n,); zero is a body at rest
-    frame    the frame [e_1 … e_n] at t = 0, (n, n), columns e_i, e_1 = q; None for the natural
-        frame (Theorem recon0)
+    - A: n positive numbers, or a symmetric positive definite n × n matrix. A matrix is
+      diagonalised: the body axes stay the given ones, and the attributes A, q, q_dot, frame are
+      in the principal axes (``axes`` maps back)
+    - q: (n,) the unit vector e_1 at t = 0, seen from the body
+    - q_dot: (n,) its velocity, tangent to the sphere; zero is a body at rest
+    - frame: (n, n) the frame [e_1 … e_n] at t = 0, columns e_i, e_1 = q; None for the natural
+      frame (Theorem recon0)
 
-    q must have unit length and q_dot be tangent to 1e-9; with ``normalize=True`` q is scaled and
-    q_dot projected first, and the frame made orthonormal with e_1 = q, its determinant keeping its
-    sign (``given_frame``). Every number may be given as a string ("0.7", "7/10") and is then taken
-    exactly. What is off the manifold by less than the tolerance is projected onto it. Raises
-    InvalidInput, which names the field, what was required and what was given.
+    q must have unit length and q_dot be tangent to 1e-9. With ``normalize=True`` q is scaled and
+    q_dot projected first, and the frame is made orthonormal with e_1 = q; its determinant keeps
+    its sign (``given_frame``). Every number may be a string ("0.7", "7/10") and is then taken
+    exactly. Smaller defects are projected away. Raises InvalidInput, which names the field, what
+    was required and what was given.
     """
 
     A: Array
