@@ -48,14 +48,6 @@ class Trajectory:
       which may be the last in memory
     - decimals: the same series to more digits, or with certified errors; None unless requested
     - remainders: (N,) the exact times less ``times``; None where the exact times are doubles
-
-    Series of the system veselova:
-
-    - q, q_dot: (N, n)
-    - frame: (N, n, n) columns e_i, along the body axes of the problem
-    - omega: (N, n, n) q∧q̇, equation (44.3)
-    - spheroconic: (N, n−1), increasing
-    - tau1: (N,) Neumann time, zero at t = 0
     """
 
     problem: Problem

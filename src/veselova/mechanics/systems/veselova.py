@@ -63,6 +63,14 @@ class Veselova(TorusProblem):
     its sign (``given_frame``). Every number may be a string ("0.7", "7/10") and is then taken
     exactly. Smaller defects are projected away. Raises InvalidInput, which names the field, what
     was required and what was given.
+
+    Outputs:
+
+    - q, q_dot: (N, n)
+    - frame: (N, n, n) columns e_i, along the body axes of the problem
+    - omega: (N, n, n) q∧q̇, equation (44.3)
+    - spheroconic: (N, n−1), increasing
+    - tau1: (N,) Neumann time, zero at t = 0
     """
 
     A: Array
