@@ -8,25 +8,28 @@ curve.riemann_matrix
 
 from __future__ import annotations
 
-import cmath
 import itertools
 import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from veselova.analytic.curve.abel_images import Halves, image_of
+from veselova.analytic.curve.nodal_forms import difference_product
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.theta.characteristic import Characteristic
+from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
+    curve_outputs,
     exact_points,
     points_with_sheets,
+    torus_points,
 )
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
@@ -36,7 +39,16 @@ from veselova.mechanics.core.decimals import (
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.results.curve import CurveData
+from veselova.mechanics.results.curve import (
+    CURVE_MATRICES,
+    QUASI_PERIODS,
+    CurveData,
+    QuasiPeriods,
+    ThomaeConstant,
+)
+
+if TYPE_CHECKING:
+    from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
 
 __all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
 
@@ -46,6 +58,10 @@ Complex = NDArray[np.complex128]
 #: Rounding of an entry of T in ε, for each unit by which its periods cancel; largest seen over
 #: random curves: 6.
 _ENTRY_ROUNDING = 16 * float(np.finfo(float).eps)
+
+
+#: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
+_MOST_SUBSETS = 400_000
 
 
 @dataclass(frozen=True)
@@ -58,25 +74,14 @@ class CurvePeriods:
     b: Complex
 
 
-@dataclass(frozen=True)
-class ThomaeConstant:
-    """Thomae's formula for one partition: |θ[ε;δ](0)|⁴ of a characteristic is ``fourth_power``;
-    ``subset`` numbers the b's.
-    """
-
-    subset: tuple[int, ...]
-    characteristic: tuple[tuple[float, ...], tuple[float, ...]]
-    fourth_power: float
-
-
 class RealHyperelliptic:
     """The curve w² = sign·Π(λ−b_j) with 2g+1 or 2g+2 distinct real branch points.
 
     branch_points   numbers or text ("0.7", "7/10"), taken exactly, in any order; near-coincident
         ones keep their digits
     sign            −1 or 1
-    digits, certified   more digits than a double has (15 … 1000), or proven errors, of the Riemann
-        matrix: ``decimals``
+    digits, certified   more digits than a double has (15 … 1000), or proven errors: ``decimals``,
+        ``abel_decimals``, ``invert_decimals``
 
     Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once.
     Raises InvalidInput for repeated, complex or too few branch points. Accuracy:
@@ -129,13 +134,23 @@ class RealHyperelliptic:
         """Return the intervals between them that b_1 … b_g are made of, (g, 2)."""
         return self._intervals(0)
 
-    def data(self, points: Any = None, w: Any = None) -> CurveData:
-        """Return the curve as data, with the images of points (λ, w) where they are given."""
+    def data(
+        self, points: Any = None, w: Any = None, z: Any = None, outputs: Sequence[str] = ()
+    ) -> CurveData:
+        """Return the curve as data.
+
+        points, w: those whose images are given · z: points of the real torus whose places on the
+        cuts are given · outputs: further ones, ``quasi_periods`` and ``thomae``. Raises
+        InvalidInput for bad ones, and what the properties raise.
+        """
+        outputs = curve_outputs(outputs)
         periods: CurvePeriods | None = None
         differentials: Array | None = None
         with suppress(Unsolved):
             periods = self.periods
             differentials = self.normalized_differentials
+        inverse = (None, None) if z is None else tuple(map(np.atleast_2d, self.invert(z)))
+        omegas = self.quasi_periods if "quasi_periods" in outputs else None
         return CurveData(
             genus=self.genus,
             sign=self.sign,
@@ -149,7 +164,27 @@ class RealHyperelliptic:
             riemann_matrix_error=self.riemann_matrix_error,
             characteristics=np.array(self.characteristics),
             abel=None if points is None else self.abel(points, w),
+            points=inverse[0],
+            signs=inverse[1],
+            quasi_periods=None if omegas is None else QuasiPeriods(*map(_without_i, omegas)),
+            thomae=self.thomae() if "thomae" in outputs else None,
+            decimals=self._decimals_of_data(points, w, z, outputs),
         )
+
+    def _decimals_of_data(
+        self, points: Any, w: Any, z: Any, outputs: Sequence[str]
+    ) -> Decimals | None:
+        if self.decimals is None:
+            return None
+        names = [*CURVE_MATRICES]
+        for output in outputs:
+            names += QUASI_PERIODS if output == "quasi_periods" else [output]
+        parts = [self.decimals.choose(names)]
+        if points is not None and (images := self.abel_decimals(points, w)):
+            parts.append(images)
+        if z is not None and (places := self.invert_decimals(z)):
+            parts.append(places.choose(["points"]))
+        return self.decimals.join(parts)
 
     def _intervals(self, first: int) -> Array:
         order = self._curve.order
@@ -201,17 +236,34 @@ class RealHyperelliptic:
 
     @cached_property
     def decimals(self) -> Decimals | None:
-        """Return T of τ = iT as ``midpoints["riemann_matrix"]`` with so many digits after the
-        point, and its ``radii``, proven where ``certified``; None in double precision.
+        """Return the numbers of the curve to so many digits, ``midpoints`` and ``radii`` by name,
+        proven where ``certified``; None in double precision.
 
-        Raises Unsolved where a gap is too narrow for the digits.
+        ``riemann_matrix`` T of τ = iT · ``a_periods``, ``b_periods`` (without i) ·
+        ``normalized_differentials`` · ``omega``, ``eta`` (without i), ``omega_prime``,
+        ``eta_prime`` of ``quasi_periods``, all (g, g) · ``thomae`` (S,), in the order of
+        ``thomae()``. Each is computed when it is first asked for. A radius is below 10^−digits: of
+        T absolutely, or of its largest entry where that is above 1; of periods by the largest of
+        their row, of coefficients by that of their column, of Thomae's values by themselves.
+        Raises Unsolved where a gap is too narrow for the digits (``narrow-gap``).
         """
+        known = self._in_digits
+        return None if known is None else known.of_curve(lambda: self._subsets)
+
+    @cached_property
+    def _in_digits(self) -> CurveDecimals | None:
         if not beyond_double(self._digits, self._certified):
             return None
         # loads python-flint
-        from veselova.analytic.curve.real_hyperelliptic_balls import riemann_matrix_decimals
+        from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
 
-        return riemann_matrix_decimals(self._curve, self._digits, self._certified)
+        return CurveDecimals(self._curve, self._digits, self._certified, self._halves)
+
+    @cached_property
+    def _halves(self) -> list[Halves]:
+        """Return [ε, δ] of each β, entries 0 and ½."""
+        found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
+        return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
 
     @property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
@@ -255,42 +307,22 @@ class RealHyperelliptic:
         passes too near a branch point. Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
         """
         places, sheets = points_with_sheets(points, w)
-        return np.array(
-            [
-                self._image(point, sheet)
-                for point, sheet in zip(places, sheets.tolist(), strict=True)
-            ]
-        )
-
-    def _image(self, point: Fraction | complex, w: complex) -> Complex:
         curve = self._curve
-        T = self._curve.periods.riemann_matrix
-        if isinstance(point, Fraction):
-            if curve.is_even and point == curve.points[-1]:
-                return np.zeros(self.genus, dtype=complex)
-            mu = curve.to_mu(point)
-            number = curve.place(mu)
-            if 0 <= number < 2 * self.genus:
-                part = curve.from_left_end(number, [mu])[0]
-                on_cut = number % 2 == 1
-                sheet = -1 if (w.real if on_cut else w.imag) < 0 else 1
-                return np.asarray(
-                    self._at_end(number, T) + sheet * (part if on_cut else -1j * part)
-                )
-            target: complex = complex(float(mu))
-        else:
-            target = complex(curve.to_mu(point))
-        j, part, v = curve.from_nearest_end(target)
-        # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity: phases say which.
-        angle = cmath.phase(w)
-        if curve.is_even:
-            angle -= (self.genus + 1) * cmath.phase(complex(curve.points[-1] - point))
-        sign = 1 if math.cos(angle - cmath.phase(v)) >= 0 else -1
-        return np.asarray((0 if j is None else self._at_end(j, T)) + sign * part)
+        images = [
+            image_of(curve, curve, self._halves, *place)
+            for place in iterate(list(zip(places, sheets.tolist(), strict=True)))
+        ]
+        return np.array(images, dtype=complex).reshape(-1, self.genus)
 
-    def _at_end(self, j: int, T: Array) -> Complex:
-        epsilon, delta = _halves(Characteristic.of_branch_point(j, self.genus))
-        return np.asarray(1j * (T @ np.array(epsilon)) + np.array(delta))
+    def abel_decimals(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals | None:
+        """Return ``abel``, (N, g, 2): real and imaginary parts of ``abel(points, w)`` with radii
+        below 10^−digits of the largest of an image, or of 1; None in double precision.
+
+        Complex points are the doubles that they are stored as. Raises what ``abel`` does.
+        """
+        places, sheets = points_with_sheets(points, w)
+        known = self._in_digits
+        return None if known is None else known.abel(places, sheets.tolist())
 
     def invert(self, z: ArrayLike) -> tuple[Array, Array]:
         """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the
@@ -300,16 +332,8 @@ class RealHyperelliptic:
         lower number in order of
         ``cuts``: ``torus`` is the way back. Raises InvalidInput for bad points. Accuracy: 1e-13.
         """
-        phases = np.array(z, dtype=float)
-        if (
-            phases.ndim not in (1, 2)
-            or phases.shape[-1] != self.genus
-            or not np.all(np.isfinite(phases))
-        ):
-            raise InvalidInput(
-                ("z",), f"a vector of {self.genus} finite real numbers, or rows of them", show(z)
-            )
-        rows = np.atleast_2d(phases)
+        exact, single = torus_points(z, self.genus)
+        rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
         curve = self._curve
         psi = curve.inversion.invert(rows - np.floor(rows))
         below, above = curve.periods.roots_on_cuts(psi)
@@ -322,7 +346,18 @@ class RealHyperelliptic:
         turns = np.arange(self.genus, 0, -1) - 1
         signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
         points = curve.to_lambda(nu)
-        return (points[0], signs[0]) if phases.ndim == 1 else (points, signs)
+        return (points[0], signs[0]) if single else (points, signs)
+
+    def invert_decimals(self, z: ArrayLike | Sequence[Any]) -> Decimals | None:
+        """Return ``points`` and ``signs`` of ``invert(z)``, (N, g), with radii of the points below
+        10^−digits of the largest branch point; None in double precision.
+
+        z: numbers or text, taken exactly. Raises InvalidInput for bad points, Unsolved
+        (``not-enclosed``, ``narrow-gap``) where the digits do not suffice.
+        """
+        exact, _ = torus_points(z, self.genus)
+        known = self._in_digits
+        return None if known is None else known.invert(exact)
 
     def torus(self, points: Any, signs: ArrayLike) -> Array:
         """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
@@ -338,13 +373,11 @@ class RealHyperelliptic:
                 ("points",), f"rows of {self.genus} points with as many signs", show(points)
             )
         curve = self._curve
-        exact = [[curve.to_mu(point) for point in row] for row in rows]
-        for i, row in enumerate(exact):
-            for s, mu in enumerate(row):
-                if (
-                    isinstance(mu, complex)
-                    or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]
-                ):
+        both = [[curve.to_mu(point) for point in row] for row in rows]
+        exact = [[real for real, _ in row] for row in both]
+        for i, row in enumerate(both):
+            for s, (mu, imaginary) in enumerate(row):
+                if imaginary or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]:
                     low, high = self.cuts[s]
                     raise InvalidInput(
                         ("points", i, s),
@@ -360,34 +393,40 @@ class RealHyperelliptic:
         2g+2 the last is left out.
 
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
+        Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 4: 1e-11.
         """
         curve = self._curve
-        betas = [float(b) for b in curve.betas]
-        differences = np.abs(curve.periods.curve.differences)
-        sizes = [
+        sizes = np.abs(curve.periods.curve.differences).tolist()
+        over_cuts = [
             2 * curve.monomial_integrals(2 * s - 1, self.genus - 1)
             for s in range(1, self.genus + 1)
         ]
-        determinant = abs(float(np.linalg.det(np.stack(sizes, axis=1)))) / (2 * np.pi) ** self.genus
-        numbers = range(len(betas))
-        odd = [Characteristic.of_branch_point(j, self.genus) for j in numbers]
-        shift = [c for j, c in enumerate(odd) if j % 2 == 1]
+        periods = np.stack(over_cuts, axis=1) / (2 * np.pi)
+        determinant = float(np.linalg.det(periods))
+        eta = np.array(self._halves)
+        shift = np.sum(eta[1::2], axis=0)
         found = []
-        for subset in itertools.combinations(numbers, self.genus + 1):
-            rest = [j for j in numbers if j not in subset]
-            logs = [
-                np.log(differences[i, j])
-                for group in (subset, rest)
-                for i, j in itertools.combinations(group, 2)
-            ]
-            total = Characteristic.zero(self.genus)
-            for characteristic in [odd[j] for j in subset] + shift:
-                total = total + characteristic
+        for subset in iterate(self._subsets):
+            epsilon, delta = (np.sum(eta[list(subset)], axis=0) + shift) % 1
+            characteristic = tuple(epsilon.tolist()), tuple(delta.tolist())
             named = tuple(sorted(curve.order[j] for j in subset))
-            found.append(
-                ThomaeConstant(named, _halves(total), determinant**2 * float(np.exp(np.sum(logs))))
-            )
+            value = determinant**2 * difference_product(sizes, subset)
+            found.append(ThomaeConstant(named, characteristic, value))
         return tuple(found)
+
+    @cached_property
+    def _subsets(self) -> list[tuple[int, ...]]:
+        """Return the sets of g+1 among the β's; raises Unsolved where they are too many."""
+        count = math.comb(2 * self.genus + 1, self.genus + 1)
+        if count > _MOST_SUBSETS:
+            reason = f"genus {self.genus} has {count} partitions, {_MOST_SUBSETS} are served"
+            raise Unsolved("too-many-terms", reason)
+        return list(itertools.combinations(range(2 * self.genus + 1), self.genus + 1))
+
+
+def _without_i(values: Complex) -> Array:
+    """Return matrices that are real, or imaginary without their factor i."""
+    return values.imag if np.any(values.imag) else values.real
 
 
 def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -113,6 +113,53 @@ def test_a_value_beyond_a_double_has_an_exponent(server: Server) -> None:
     assert pairs(found["values"])[1] == pytest.approx(1.086434811213308)
 
 
+def test_a_curve_to_many_digits_comes_through_every_door(server: Server) -> None:
+    points = ["0", "1", "1.7", "3", "4.5"]
+    given: dict[str, Any] = {
+        "points": ["1.2", 0.25 + 0.5j, 2],
+        "w": [1, 1, 1j],
+        "z": [["0.3", "1/3"]],
+        "outputs": ["quasi_periods", "thomae"],
+    }
+    options: dict[str, Any] = {"digits": 30, "certified": True}
+    expected = curves.RealHyperelliptic(points, **options).data(**given)
+    body = {
+        "branch_points": points,
+        **given,
+        **options,
+        "points": ["1.2", [0.25, 0.5], 2],
+        "w": [1, 1, [0, 1]],
+        "budget_s": BUDGET_S,
+    }
+    found = post(server, "/v1/curves", body).json()
+    assert found == json.loads(json.dumps(expected.as_dict()))
+    assert len(found["riemann_matrix"][0][0]) > 30
+    assert found["radii"]["abel"][0][0][0].endswith(tuple(f"E-{k}" for k in range(30, 50)))
+    schema = server.get("/v1/schemas/Curve").json()
+    jsonschema_rs.validator_for(schema).validate(found)
+    with vs.Client(server.url) as client:
+        data = client.curve(points, **given, **options, budget_s=BUDGET_S)
+    assert data.decimals is not None
+    assert expected.decimals is not None
+    for name, midpoints in expected.decimals.midpoints.items():
+        assert np.array_equal(data.decimals.midpoints[name], midpoints), name
+        assert np.array_equal(data.decimals.radii[name], expected.decimals.radii[name]), name
+    assert data.thomae is not None
+    assert data.thomae[0].subset == expected.thomae[0].subset  # type: ignore[index]
+    assert data.quasi_periods is not None
+    assert np.allclose(data.points, expected.points, rtol=1e-14, atol=0)
+    assert np.allclose(data.abel, expected.abel, rtol=1e-13, atol=1e-14)
+
+
+def test_points_of_a_curve_to_many_digits_are_bounded_before_the_work(server: Server) -> None:
+    body = {"branch_points": [0, 1, 2], "points": [0.5] * 50_000, "w": [1] * 50_000}
+    document = is_problem(
+        post(server, "/v1/curves", {**body, "digits": 1000, "budget_s": 1}), 422, "invalid-input"
+    )
+    assert document["errors"][0]["pointer"] in ("/points", "/digits")
+    assert "digits" in document["detail"]
+
+
 FAULTS: list[tuple[str, dict[str, Any], list[str], str]] = [
     (
         "curves",
@@ -133,6 +180,13 @@ FAULTS: list[tuple[str, dict[str, Any], list[str], str]] = [
     ("curves", {**CURVE, "w": None}, ["/w"], "together"),
     ("curves", {**CURVE, "points": ["x", 2]}, ["/points/0"], ""),
     ("curves", {}, ["/branch_points"], "this field"),
+    ("curves", {**CURVE, "digits": 14, "certified": 1}, ["/digits", "/certified"], ""),
+    ("curves", {**CURVE, "digits": 30.5}, ["/digits"], ""),
+    ("curves", {**CURVE, "z": [[0.5]]}, ["/z/0"], "2 numbers"),
+    ("curves", {**CURVE, "z": "x"}, ["/z"], ""),
+    ("curves", {**CURVE, "z": [[None, 1], [1, "y"]]}, ["/z/0/0", "/z/1/1"], ""),
+    ("curves", {**CURVE, "outputs": ["zeta", {}]}, ["/outputs/0", "/outputs/1"], "thomae"),
+    ("curves", {**CURVE, "outputs": "thomae"}, ["/outputs"], "list"),
     ("theta", {**THETA, "tau": [[[0, 1], 1], [0, [0, 1]]]}, ["/tau"], "symmetric"),
     (
         "theta",

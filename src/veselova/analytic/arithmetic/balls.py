@@ -125,6 +125,37 @@ class Balls(Arithmetic):
             return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
+    #: i, exactly.
+    imaginary_unit: ClassVar[Any] = flint.acb(0, 1)
+
+    def complex_number(self, real: Fraction, imaginary: Fraction) -> Any:
+        """Return a complex ball that holds a number with rational parts."""
+        return flint.acb(self.number(real), self.number(imaginary))
+
+    @staticmethod
+    def complex_array(real: Values, imaginary: Values) -> Values:
+        """Return complex balls of real and imaginary parts."""
+        return np.asarray(_complex(real, imaginary), dtype=object)
+
+    @staticmethod
+    def parts(values: Values) -> tuple[Values, Values]:
+        """Return the real and imaginary parts of complex balls."""
+        return np.asarray(_real(values)), np.asarray(_imaginary(values))
+
+    @staticmethod
+    def integral(integrand: Callable[[Any, bool], Any], end: Any) -> Any:
+        """Return ∫ from 0 straight to a complex ball, enclosed.
+
+        The integrand takes (point, analytic); where the second is true it is not finite unless it
+        is analytic on the ball.
+        """
+
+        def checked(point: Any, analytic: bool) -> Any:
+            checkpoint()
+            return integrand(point, analytic)
+
+        return flint.acb.integral(checked, flint.acb(0), end)
+
     def polynomial_roots(
         self, coefficients: Sequence[Fraction]
     ) -> list[tuple[Fraction, Fraction, int]]:
@@ -304,6 +335,7 @@ class _Series:
         return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 
+_complex = np.frompyfunc(flint.acb, 2, 1)
 _lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
 _contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
 _upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)

@@ -208,6 +208,9 @@ class AbelJacobi(Generic[P]):
         map has but one.
         """
         xp: Any = self.arithmetic
+        # series are kept with the digits in which they are first formed: all of them, not the few
+        # of an early step
+        _ = self._sines, self._cosines, self.periods.series_truncation
         centre = xp.midpoints(z)
         nearest = coarse.invert(DOUBLE.array(centre))
         psi = xp.array(nearest)

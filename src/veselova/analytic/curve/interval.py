@@ -128,22 +128,27 @@ class Interval:
         On that circle |λ−x| lies between its values on the real axis.
         """
         left, right = self.ends_of_strip
-        d = self.curve.differences
         j = cast("int", self.left)
         zeros = self.curve.midpoints
-        last = 2 * self.curve.genus
-        outside = [d[i, j] - left for i in range(j - 1)] + [
-            d[j + 1, i] - right for i in range(j + 3, last + 1)
-        ]
         factors = [
             max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l]))
             for l in range(zeros.shape[1])
         ]
-        common = self.points.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
+        common = self.bound_density_in_strip()
         return np.array(
             [common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)],
             dtype=object,
         )
+
+    def bound_density_in_strip(self) -> Any:
+        """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""
+        left, right = self.ends_of_strip
+        d = self.curve.differences
+        j = cast("int", self.left)
+        outside = [d[i, j] - left for i in range(j - 1)] + [
+            d[j + 1, i] - right for i in range(j + 3, 2 * self.curve.genus + 1)
+        ]
+        return self.points.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
         """Return λ−ζ_l, l = 1…g−1, shape (..., g−1, N), with ζ_l the midpoint of gap l."""

@@ -148,11 +148,8 @@ class Periods(AngleSeries):
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
 
-    def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
-        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an
-        interval's series.
-        """
-        checkpoint()
+    def require_few_nodes(self, interval: Interval) -> int:
+        """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""
         count = self.node_count(interval)
         if self.arithmetic.has_radii and count > _MOST_NODES:
             wanted = (
@@ -160,6 +157,14 @@ class Periods(AngleSeries):
                 f"relative gap of {self.narrowest_gap:.2g}"
             )
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
+        return count
+
+    def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
+        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an
+        interval's series.
+        """
+        checkpoint()
+        count = self.require_few_nodes(interval)
         below, above = interval.distances(self.arithmetic.nodes(count))
         return below, interval.forms(below, above)
 
@@ -193,6 +198,20 @@ class Periods(AngleSeries):
             coefficients[:, 0] = self._mean(interval, forms)
         return coefficients
 
+    def series(self, interval: Interval) -> Values:
+        """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
+        (..., g, N).
+        """
+        return self._series(interval, self._forms_at_nodes(interval)[1])
+
+    def truncation(self, interval: Interval, series: Values) -> Values:
+        """Return what such a series leaves out of the forms at any real ψ, (g,): a bound where the
+        arithmetic is certified, otherwise a multiple of the last terms.
+        """
+        if self.arithmetic.certified:
+            return self._bound(interval, 1)
+        return self.arithmetic.estimate_tail(series)
+
     def _mean(self, interval: Interval, forms: Values) -> Values:
         """Return h_0, shape (..., g)."""
         mean = np.sum(forms, axis=-1) / forms.shape[-1]
@@ -221,14 +240,10 @@ class Periods(AngleSeries):
 
         A bound where the arithmetic is certified; otherwise a multiple of the last terms.
         """
-        if self.arithmetic.certified:
-            return np.asarray(
-                sum(np.abs(self.inverse_cycles) @ self._bound(cut, 1) for cut in self.cuts)
-            )
         return np.asarray(
             sum(
-                np.abs(self.inverse_cycles) @ self.arithmetic.estimate_tail(series)
-                for series in self.cut_series
+                np.abs(self.inverse_cycles) @ self.truncation(cut, series)
+                for cut, series in zip(self.cuts, self.cut_series, strict=True)
             )
         )
 

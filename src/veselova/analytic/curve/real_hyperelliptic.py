@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +82,7 @@ class RealCurve:
         return (self.sign > 0) != self.is_even
 
     @cached_property
-    def _nus(self) -> tuple[Fraction, ...]:
+    def nus(self) -> tuple[Fraction, ...]:
         """Return the finite branch points in ν, increasing, exact."""
         *finite, last = self.points if self.is_even else (*self.points, Fraction(0))
         values = [1 / (last - b) for b in finite] if self.is_even else finite
@@ -92,19 +91,19 @@ class RealCurve:
     @cached_property
     def centre(self) -> Fraction:
         """Return c of μ = (ν−c)/s."""
-        return (self._nus[0] + self._nus[-1]) / 2
+        return (self.nus[0] + self.nus[-1]) / 2
 
     @cached_property
     def root_of_unit(self) -> Fraction:
         """Return √s, the power of 2 for which half the span is between ½s and 4s."""
-        half = (self._nus[-1] - self._nus[0]) / 2
+        half = (self.nus[-1] - self.nus[0]) / 2
         exponent = half.numerator.bit_length() - half.denominator.bit_length()
         return Fraction(2) ** (exponent // 2)
 
     @cached_property
     def betas(self) -> tuple[Fraction, ...]:
         """Return β_0 < … < β_{2g}, exact."""
-        return tuple((nu - self.centre) / self.root_of_unit**2 for nu in self._nus)
+        return tuple((nu - self.centre) / self.root_of_unit**2 for nu in self.nus)
 
     @cached_property
     def order(self) -> tuple[int, ...]:
@@ -135,19 +134,25 @@ class RealCurve:
         """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}|ν|^{g−1}) dμ/v, without |ν|^{g−1} where
         ν = ±λ.
         """
+        root = _square_root(self.square_of_scale)
+        return -root if self.reverses else root
+
+    @cached_property
+    def square_of_scale(self) -> Fraction:
+        """Return c², exact."""
         square = self.root_of_unit ** (2 - 4 * self.genus)
         if self.is_even:
             *finite, last = self.points
             square /= math.prod((last - b for b in finite), start=Fraction(1))
-        return -_square_root(square) if self.reverses else _square_root(square)
+        return square
 
     def nu(self, number: int, below: Array, above: Array) -> Array:
         """Return ν at distances in μ from both ends of the interval [β_number, β_{number+1}], from
         the nearer end.
         """
         unit = float(self.root_of_unit**2)
-        left = float(self._nus[number]) + unit * below
-        right = float(self._nus[number + 1]) - unit * above
+        left = float(self.nus[number]) + unit * below
+        right = float(self.nus[number + 1]) - unit * above
         return np.where(below <= above, left, right)
 
     def to_lambda(self, nu: Array) -> Array:
@@ -202,7 +207,7 @@ class RealCurve:
         of the second kind.
         """
         g = self.genus
-        m = 4 * np.poly(np.array([float(b) for b in (self._nus if in_nu else self.betas)]))[::-1]
+        m = 4 * np.poly(np.array([float(b) for b in (self.nus if in_nu else self.betas)]))[::-1]
         kinds = np.zeros((2 * g, 2 * g))
         kinds[:g, :g] = np.eye(g)
         for k in range(1, g + 1):
@@ -246,12 +251,30 @@ class RealCurve:
                 found[i, s] = interval.points.angle(*distances, bool(increasing[i, s]))
         return found
 
-    def to_mu(self, point: Any) -> Any:
-        """Return μ at λ, exact for rationals."""
+    def to_mu(self, point: Fraction | complex) -> tuple[Fraction, Fraction]:
+        """Return the real and the imaginary part of μ at λ, exact."""
+        real, imaginary = (
+            (point, Fraction(0))
+            if isinstance(point, Fraction)
+            else (Fraction(point.real), Fraction(point.imag))
+        )
         if self.is_even:
-            point = 1 / (self.points[-1] - point)
-        nu = -point if self.reverses else point
-        return (nu - self.centre) / self.root_of_unit**2
+            real = self.points[-1] - real
+            square = real * real + imaginary * imaginary
+            real, imaginary = real / square, imaginary / square
+        if self.reverses:
+            real, imaginary = -real, -imaginary
+        unit = self.root_of_unit**2
+        return (real - self.centre) / unit, imaginary / unit
+
+    def real_matrix(self) -> Array:
+        """Return T of the Riemann matrix iT."""
+        return self.periods.riemann_matrix
+
+    @staticmethod
+    def complex_array(real: Array, imaginary: Array) -> Complex:
+        """Return complex numbers of real and imaginary parts."""
+        return np.asarray(real + 1j * imaginary)
 
     def place(self, mu: Fraction) -> int:
         """Return the number of the interval [β_j, β_{j+1}] that holds μ, −1 below β_0 and 2g above
@@ -277,20 +300,23 @@ class RealCurve:
         )
         return np.asarray(integrals @ self.periods.inverse_cycles.T)
 
-    def from_nearest_end(self, mu: complex) -> tuple[int | None, Complex, complex]:
+    def from_nearest_end(
+        self, mu: tuple[Fraction, Fraction]
+    ) -> tuple[int | None, Complex, complex]:
         """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a
         complex μ; the integral is (g,).
 
         The sheet is that of the returned v.
         """
+        target = complex(*map(float, mu))
         betas = self.periods.curve.branch_points
         zeros = (betas[2:-1:2] + betas[3::2]) / 2
         centre = (betas[0] + betas[-1]) / 2
         radius = (betas[-1] - betas[0]) / 2
-        if abs(mu - centre) > 2 * radius:
+        if abs(target - centre) > 2 * radius:
             # t = (μ−c)^{−1/2}: v = i t^{−2g−1} Π√(1+(c−β)t²), and each root stays away from its
             # branch line.
-            end = 1 / np.sqrt(complex(mu - centre))
+            end = 1 / np.sqrt(complex(target - centre))
             powers = np.full(self.genus, 2)
             powers[-1] = 0
 
@@ -306,14 +332,14 @@ class RealCurve:
 
             v = 1j * end ** (-2 * self.genus - 1) * np.prod(np.sqrt(1 + end**2 * (centre - betas)))
             return None, self.periods.inverse_cycles @ _integral(over_t, end), complex(v)
-        j = int(np.argmin(np.abs(mu - betas)))
+        j = int(np.argmin(np.abs(target - betas)))
         start = betas[j]
         below = betas[:j]
         above = betas[j + 1 :]
         # x = √(μ−β_j): v² = −x² Π_{<}(μ−β) Π_{>}(μ−β), and each root below stays away from its
         # branch line.
         unit = 1j if len(above) % 2 == 0 else 1.0
-        end = np.sqrt(complex(mu - start))
+        end = np.sqrt(complex(target - start))
 
         def roots(x: Complex) -> Complex:
             at = (start + x * x)[:, None]

@@ -12,12 +12,36 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.complex_input import complex_array, complex_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number
+from veselova.mechanics.core.exact_input import exact_number, exact_vector
 
-__all__ = ["LARGEST_GENUS", "curve_arguments", "exact_points", "points_with_sheets"]
+__all__ = [
+    "CURVE_OUTPUTS",
+    "LARGEST_GENUS",
+    "curve_arguments",
+    "curve_outputs",
+    "exact_points",
+    "points_with_sheets",
+    "torus_points",
+]
 
 #: Genera that are served; higher ones are right too, but were not tested.
 LARGEST_GENUS = 16
+
+
+#: What a curve's data have when it is asked for.
+CURVE_OUTPUTS = ("quasi_periods", "thomae")
+
+
+def curve_outputs(given: Any) -> tuple[str, ...]:
+    """Return the names of further outputs of a curve's data; raises InvalidInput for others."""
+    required = f"a list of {' and '.join(CURVE_OUTPUTS)}"
+    names = _items(given, ("outputs",), required)
+    faults = Faults()
+    for i, name in enumerate(names):
+        if name not in CURVE_OUTPUTS:
+            faults.add(("outputs", i), " or ".join(CURVE_OUTPUTS), show(name))
+    faults.require_none()
+    return tuple(dict.fromkeys(names))
 
 
 def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...], int]:
@@ -114,3 +138,23 @@ def points_with_sheets(
     assert found is not None
     assert sheets is not None
     return found, sheets
+
+
+def torus_points(z: Any, genus: int) -> tuple[list[tuple[Fraction, ...]], bool]:
+    """Return points of R^g/Z^g, exact, and whether one alone was given; raises InvalidInput, with
+    all faults.
+    """
+    required = f"a vector of {genus} finite real numbers, or rows of them"
+    rows = _items(z, ("z",), required)
+    single = not any(
+        isinstance(row, (Sequence, np.ndarray)) and not isinstance(row, str) for row in rows
+    )
+    faults = Faults()
+    found = []
+    for i, row in enumerate([rows] if single else rows):
+        path: tuple[str | int, ...] = ("z",) if single else ("z", i)
+        point = faults.attempt(exact_vector, row, path, genus)
+        if point is not None:
+            found.append(point)
+    faults.require_none()
+    return found, single

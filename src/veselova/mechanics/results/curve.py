@@ -3,16 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CurveData"]
+from veselova.mechanics.core.decimals import Decimals, decimals_of
+
+__all__ = ["CURVE_MATRICES", "QUASI_PERIODS", "CurveData", "QuasiPeriods", "ThomaeConstant"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+#: Matrices that a document always has; periods and coefficients are None beyond floats.
+CURVE_MATRICES = ("riemann_matrix", "a_periods", "b_periods", "normalized_differentials")
+
+#: The names of quasi-periods.
+QUASI_PERIODS = ("omega", "omega_prime", "eta", "eta_prime")
+
+#: Real arrays of a document, as they are.
+_PLAIN = ("branch_points", "cuts", "gaps", "characteristics")
+
+
+@dataclass(frozen=True)
+class ThomaeConstant:
+    """Thomae's formula for one partition: |θ[ε;δ](0)|⁴ of a characteristic is ``fourth_power``;
+    ``subset`` numbers the b's.
+    """
+
+    subset: tuple[int, ...]
+    characteristic: tuple[tuple[float, ...], tuple[float, ...]]
+    fourth_power: float
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiPeriods:
+    """ω, ω', η, η' (g, g), half the periods of the first and second kind over a_s and b_s, without
+    the factor i that ω and η have.
+    """
+
+    omega: Array
+    omega_prime: Array
+    eta: Array
+    eta_prime: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +59,12 @@ class CurveData:
     normalized_differentials (g, g), None likewise · riemann_matrix (g, g) τ = iT, off by at most
     riemann_matrix_error · characteristics (B, 2, g), [ε, δ] of each branch point
     abel (N, g) images of the points that were given, None without
+    points, signs (M, g): λ on each cut and the signs of w at the points z of the real torus that
+    were given, None without
+    quasi_periods, thomae: where they were asked for, None elsewhere
+    decimals: the same numbers to the digits asked for, with radii, by the names of their fields
+    (``b_periods`` and ``abel`` as in the JSON; those of ``quasi_periods`` by themselves); None in
+    double precision
     """
 
     genus: int
@@ -39,33 +79,102 @@ class CurveData:
     riemann_matrix_error: float
     characteristics: Array
     abel: Complex | None = None
+    points: Array | None = None
+    signs: Array | None = None
+    quasi_periods: QuasiPeriods | None = None
+    thomae: tuple[ThomaeConstant, ...] | None = None
+    decimals: Decimals | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields JSON-ready: T of τ = iT, b-periods without their factor i, and images
         as pairs [real, imaginary].
+
+        With decimals these numbers are strings, and ``radii`` has those of their radii.
         """
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        values["riemann_matrix"] = self.riemann_matrix.imag
-        values["b_periods"] = None if self.b_periods is None else self.b_periods.imag
-        if self.abel is None:
-            del values["abel"]
-        else:
-            values["abel"] = np.stack([self.abel.real, self.abel.imag], axis=-1)
-        return {
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in values.items()
+        found: dict[str, Any] = {
+            "genus": self.genus,
+            "sign": self.sign,
+            "riemann_matrix_error": self.riemann_matrix_error,
+            **{name: getattr(self, name).tolist() for name in _PLAIN},
+            **{name: self._texts(name) for name in CURVE_MATRICES},
         }
+        for name in ("abel", "points"):
+            if getattr(self, name) is not None:
+                found[name] = self._texts(name)
+        if self.signs is not None:
+            found["signs"] = self.signs.tolist()
+        if self.quasi_periods is not None:
+            names = vars(self.quasi_periods)
+            found["quasi_periods"] = {name: self._texts(name) for name in names}
+        if self.thomae is not None:
+            powers = self._texts("thomae")
+            found["thomae"] = [
+                {"subset": c.subset, "characteristic": c.characteristic, "fourth_power": power}
+                for c, power in zip(self.thomae, powers, strict=True)
+            ]
+        if self.decimals is not None:
+            radii = {name: self.decimals.strings(name, True) for name in self.decimals.radii}
+            found |= {"digits": self.decimals.digits, "certified": self.decimals.certified}
+            found["radii"] = radii
+        return found
+
+    def _texts(self, name: str) -> Any:
+        """Return numbers as nested lists: strings where there are decimals."""
+        if self.decimals is not None:
+            return self.decimals.strings(name)
+        return None if (value := self._real(name)) is None else value.tolist()
+
+    def _real(self, name: str) -> Array | None:
+        """Return an array as the JSON has it: real."""
+        if self.quasi_periods is not None and name in vars(self.quasi_periods):
+            return np.asarray(getattr(self.quasi_periods, name))
+        if name == "thomae":
+            assert self.thomae is not None
+            return np.array([constant.fourth_power for constant in self.thomae])
+        value: Any = getattr(self, name)
+        if name == "abel":
+            return np.stack([value.real, value.imag], axis=-1)
+        if value is not None and name in ("riemann_matrix", "b_periods"):
+            return np.asarray(value.imag)
+        return None if value is None else np.asarray(value)
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> CurveData:
         """Return the curve of a document that ``as_dict`` made."""
-        values: dict[str, Any] = {
-            name: np.array(value, dtype=np.float64) if isinstance(value, list) else value
-            for name, value in document.items()
-        }
-        values["riemann_matrix"] = 1j * values["riemann_matrix"]
-        if values["b_periods"] is not None:
-            values["b_periods"] = 1j * values["b_periods"]
-        if "abel" in values:
+        values: dict[str, Any] = {name: document[name] for name in ("genus", "sign")}
+        values["riemann_matrix_error"] = document["riemann_matrix_error"]
+        for name in (*_PLAIN, *CURVE_MATRICES, "abel", "points", "signs"):
+            values[name] = _array(document.get(name))
+        for name in ("riemann_matrix", "b_periods"):
+            values[name] = None if values[name] is None else 1j * values[name]
+        if values["abel"] is not None:
             values["abel"] = values["abel"][..., 0] + 1j * values["abel"][..., 1]
+        texts = {name: document.get(name) for name in (*CURVE_MATRICES, "abel", "points")}
+        if "quasi_periods" in document:
+            found = document["quasi_periods"]
+            arrays = {name: np.array(found[name], dtype=np.float64) for name in found}
+            values["quasi_periods"] = QuasiPeriods(**arrays)
+            texts |= found
+        if "thomae" in document:
+            values["thomae"] = tuple(map(_thomae_of, document["thomae"]))
+            texts["thomae"] = [constant["fourth_power"] for constant in document["thomae"]]
+        if "radii" in document:
+            radii = {name: decimals_of(value) for name, value in document["radii"].items()}
+            middles = {name: decimals_of(texts[name]) for name in radii}
+            head = document["digits"], document["certified"]
+            values["decimals"] = Decimals(*head, middles, radii, ("riemann_matrix",))
         return cls(**values)
+
+
+def _array(value: Any) -> Array | None:
+    """Return numbers or texts as an array; None where there are none, or beyond floats."""
+    if value is None:
+        return None
+    array = np.array(value, dtype=np.float64)
+    return array if np.all(np.isfinite(array)) else None
+
+
+def _thomae_of(document: Mapping[str, Any]) -> ThomaeConstant:
+    epsilon, delta = document["characteristic"]
+    power = float(document["fourth_power"])
+    return ThomaeConstant(tuple(document["subset"]), (tuple(epsilon), tuple(delta)), power)

@@ -14,8 +14,8 @@ from veselova.service.api.request_models import (
     TorusRequest,
 )
 from veselova.service.api.settings import Settings
-from veselova.service.api.toolkit_requests import ToolkitRequest
-from veselova.service.workers.cost_floor import require_hope
+from veselova.service.api.toolkit_requests import CurveRequest, ToolkitRequest
+from veselova.service.workers.cost_floor import require_hope, require_hope_on_curve
 
 __all__ = ["admit", "require_acceptable", "require_modest"]
 
@@ -68,15 +68,19 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
     elif count * n * n > settings.max_values:
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
         faults.add(("times",), required, str(count * n * n))
-    digits = getattr(request, "digits", FEWEST_DIGITS)
-    if digits > settings.max_digits:
-        faults.add(("digits",), f"at most {settings.max_digits} on this server", str(digits))
+    _admit_digits(request, settings, faults)
     if isinstance(request, ComparisonRequest) and not faults.found:
         faults.attempt(require_hope, request, settings)
 
 
+def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
+    digits = getattr(request, "digits", FEWEST_DIGITS)
+    if digits > settings.max_digits:
+        faults.add(("digits",), f"at most {settings.max_digits} on this server", str(digits))
+
+
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
-    path = (request.points_field,)
+    path = (request.point_fields[0],)
     count = request.point_count()
     values = request.value_count()
     if count > settings.max_times:
@@ -84,3 +88,6 @@ def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -
     elif values > settings.max_values:
         required = f"at most {settings.max_values} numbers in one answer on this server"
         faults.add(path, required, str(values))
+    _admit_digits(request, settings, faults)
+    if isinstance(request, CurveRequest) and not faults.found:
+        faults.attempt(require_hope_on_curve, request, settings)

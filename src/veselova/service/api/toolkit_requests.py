@@ -8,8 +8,14 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.mechanics.core.curve_arguments import curve_arguments, points_with_sheets
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.curve_arguments import (
+    CURVE_OUTPUTS,
+    curve_arguments,
+    curve_outputs,
+    points_with_sheets,
+    torus_points,
+)
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.results.closed_form import MOST_CLOSED_FORM_DIGITS, require_accuracy
@@ -33,6 +39,9 @@ def _list_of(items: dict[str, Any], least: int = 1) -> dict[str, Any]:
 def _or_null(schema: dict[str, Any]) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [schema, {"type": "null"}]})
 
+
+#: Lists longer than branch points may be are refused before anything is counted.
+_MANY = 100
 
 _ROWS = _list_of(_list_of(_COMPLEX))
 _ROW_PAIR = {"type": "array", "items": _list_of(NUMBER), "minItems": 2, "maxItems": 2}
@@ -75,13 +84,13 @@ class ClosedFormRequest(TorusRequest):
 class ToolkitRequest(BudgetedRequest):
     """What is asked of a curve, or of theta functions, at points."""
 
-    #: The field that has the points.
-    points_field: ClassVar[str]
+    #: The fields that have points; faults of their number are those of the first.
+    point_fields: ClassVar[tuple[str, ...]]
 
     def point_count(self) -> int:
         """Return how many points there are, before anything is validated."""
-        points = getattr(self, self.points_field)
-        return len(points) if isinstance(points, list) else 0
+        given = (getattr(self, name, None) for name in self.point_fields)
+        return sum(len(points) for points in given if isinstance(points, list))
 
     def value_count(self) -> int:
         """Return how many complex numbers an answer has at the points, before anything is
@@ -96,7 +105,7 @@ class CurveRequest(ToolkitRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [CURVE]})
-    points_field: ClassVar[str] = "points"
+    point_fields: ClassVar[tuple[str, ...]] = ("points", "z")
 
     branch_points: Annotated[
         Any,
@@ -112,26 +121,59 @@ class CurveRequest(ToolkitRequest):
         _or_null(_list_of(_COMPLEX)),
         Field(description="a number for each of the points that names its sheet"),
     ] = None
+    z: Annotated[
+        Any,
+        _or_null(_list_of(_list_of(NUMBER))),
+        Field(description="points of the real torus, g numbers each, whose places are given"),
+    ] = None
+    outputs: Annotated[
+        Any,
+        _or_null({"type": "array", "items": {"type": "string", "enum": list(CURVE_OUTPUTS)}}),
+        Field(description="further outputs"),
+    ] = None
+    digits: Annotated[
+        int,
+        Field(
+            ge=FEWEST_DIGITS,
+            le=MOST_DIGITS,
+            description=f"beyond {FEWEST_DIGITS}, numbers are decimal strings with radii",
+        ),
+    ] = FEWEST_DIGITS
+    certified: Annotated[
+        bool, Field(description="radii are proven; numbers are decimal strings")
+    ] = False
 
     @property
     def subject(self) -> str:
         """Return the name of what is asked about."""
         return "curve"
 
-    def value_count(self) -> int:
-        """Return how many complex numbers the images of the points are."""
+    @property
+    def genus(self) -> int:
+        """Return g as the number of branch points says, before they are validated."""
         known = self.branch_points if isinstance(self.branch_points, list) else ()
-        return self.point_count() * ((len(known) - 1) // 2)
+        return max(0, (len(known) - 1) // 2)
+
+    def value_count(self) -> int:
+        """Return how many numbers the answer has for points and for Thomae's formula."""
+        genus = self.genus
+        named = isinstance(self.outputs, list) and "thomae" in self.outputs
+        partitions = math.comb(2 * genus + 1, genus + 1) if named and genus < _MANY else 0
+        return self.point_count() * genus + partitions * (3 * genus + 2)
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        faults.attempt(curve_arguments, self.branch_points, self.sign)
+        known = faults.attempt(curve_arguments, self.branch_points, self.sign)
         if (self.points is None) != (self.w is None):
             missing = "points" if self.points is None else "w"
             faults.add((missing,), "points and w together, or neither", "one of them")
         elif self.points is not None:
             faults.attempt(points_with_sheets, *self.places)
+        if self.z is not None and known is not None:
+            faults.attempt(torus_points, self.z, (len(known[0]) - 1) // 2)
+        if self.outputs is not None:
+            faults.attempt(curve_outputs, self.outputs)
         return faults.found
 
     @property
@@ -146,7 +188,7 @@ class ThetaRequest(ToolkitRequest):
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [THETA]})
-    points_field: ClassVar[str] = "z"
+    point_fields: ClassVar[tuple[str, ...]] = ("z",)
 
     z: Annotated[
         Any, WithJsonSchema(_list_of(_list_of(_COMPLEX))), Field(description="points of g numbers")

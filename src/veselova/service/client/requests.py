@@ -9,7 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from veselova.mechanics.core.curve_arguments import curve_arguments, points_with_sheets
+from veselova.mechanics.core.curve_arguments import (
+    curve_arguments,
+    curve_outputs,
+    points_with_sheets,
+    torus_points,
+)
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import plain
@@ -179,17 +184,39 @@ def closed_form_call(
 
 
 def curve_call(
-    branch_points: Any, sign: int = -1, points: Any = None, w: Any = None, *, budget_s: float = 10.0
+    branch_points: Any,
+    sign: int = -1,
+    points: Any = None,
+    w: Any = None,
+    *,
+    z: Any = None,
+    outputs: Sequence[str] = (),
+    digits: int = FEWEST_DIGITS,
+    certified: bool = False,
+    budget_s: float = 10.0,
 ) -> Call[CurveData]:
-    """Return the data of a hyperelliptic curve with real branch points, with the images of points
-    (λ, w) where they are given (see ``veselova.curves.RealHyperelliptic``).
+    """Return the data of a hyperelliptic curve with real branch points (see
+    ``veselova.curves.RealHyperelliptic``), with the images of points (λ, w), and the places of
+    points z of the real torus, where they are given.
+
+    outputs: ``quasi_periods``, ``thomae`` · digits, certified: ``decimals`` of the answer has the
+    numbers with radii.
     """
     exact, sign = curve_arguments(branch_points, sign)
-    body = {"branch_points": plain(exact), "sign": sign, "budget_s": budget_s}
+    body = {
+        "branch_points": plain(exact),
+        "sign": sign,
+        "outputs": list(curve_outputs(outputs)),
+        "digits": digits,
+        "certified": certified,
+        "budget_s": budget_s,
+    }
     if points is not None or w is not None:
         places, sheets = points_with_sheets(points, w)
         body["points"] = [_in_json(place) for place in places]
         body["w"] = to_pairs(sheets).tolist()
+    if z is not None:
+        body["z"] = plain(torus_points(z, (len(exact) - 1) // 2)[0])
     return Call("/v1/curves", body, budget_s, CurveData.from_dict)
 
 

@@ -44,7 +44,10 @@ _DECIMAL = {"type": "string", "pattern": r"^-?\d", "description": "a decimal"}
 _NUMBER_OR_DECIMAL = {"anyOf": [{"type": "number"}, _DECIMAL]}
 _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 _NUMBER_OR_NUMBERS = {"anyOf": [{"type": "number"}, _NUMBERS]}
-_MATRIX_OR_NULL = {"anyOf": [_MATRIX, {"type": "null"}]}
+_DECIMALS = {"type": "array", "items": _DECIMAL}
+_MATRIX_OR_DECIMALS = {"anyOf": [_MATRIX, {"type": "array", "items": _DECIMALS}]}
+_MATRIX_OR_NULL = {"anyOf": [*_MATRIX_OR_DECIMALS["anyOf"], {"type": "null"}]}
+_PAIR_OR_DECIMALS = {"anyOf": [_PAIR, {**_DECIMALS, "minItems": 2, "maxItems": 2}]}
 _NESTED = {"type": "array", "items": {}, "description": "nested arrays of pairs"}
 _BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 
@@ -185,8 +188,15 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                 **_MATRIX_OR_NULL,
                 "description": "c: v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js",
             },
-            "riemann_matrix": {**_MATRIX, "description": "T; the Riemann matrix is iT"},
-            "riemann_matrix_error": {"type": "number"},
+            "riemann_matrix": {
+                **_MATRIX_OR_DECIMALS,
+                "description": "T; the Riemann matrix is iT. Decimals, here and below, where more "
+                f"than {FEWEST_DIGITS} digits, or certified errors, were asked for",
+            },
+            "riemann_matrix_error": {
+                "type": "number",
+                "description": "the error of T in double precision",
+            },
             "characteristics": {
                 "type": "array",
                 "items": _MATRIX,
@@ -194,9 +204,39 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             },
             "abel": {
                 "type": "array",
-                "items": {"type": "array", "items": _PAIR},
+                "items": {"type": "array", "items": _PAIR_OR_DECIMALS},
                 "description": "images of the points from the last branch point, as pairs "
                 "[real, imaginary]; left out without points",
+            },
+            "points": {
+                **_MATRIX_OR_DECIMALS,
+                "description": "λ on each cut at the points z; left out without z",
+            },
+            "signs": {**_MATRIX, "description": "the signs of w there"},
+            "quasi_periods": {
+                **_object(
+                    dict.fromkeys(("omega", "omega_prime", "eta", "eta_prime"), _MATRIX_OR_DECIMALS)
+                ),
+                "description": "half the periods of the first and second kind over a_s and b_s, "
+                "omega and eta without the factor i; where outputs names them",
+            },
+            "thomae": {
+                "type": "array",
+                "items": _object(
+                    {
+                        "subset": {"type": "array", "items": {"type": "integer"}},
+                        "characteristic": _MATRIX,
+                        "fourth_power": _NUMBER_OR_DECIMAL,
+                    }
+                ),
+                "description": "|θ[ε;δ](0)|⁴ of each partition; where outputs names it",
+            },
+            "digits": {"type": "integer"},
+            "certified": {"type": "boolean"},
+            "radii": {
+                "type": "object",
+                "additionalProperties": {"type": "array"},
+                "description": "the error of every decimal, by the name of its field",
             },
         },
         required=["genus", "riemann_matrix", "riemann_matrix_error", "characteristics"],

@@ -13,10 +13,15 @@ from typing import NamedTuple
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest
+from veselova.service.api.request_models import (
+    BudgetedRequest,
+    ComparisonRequest,
+    TrajectoryRequest,
+)
 from veselova.service.api.settings import MEGABYTE, Settings
+from veselova.service.api.toolkit_requests import CurveRequest
 
-__all__ = ["Cost", "cost", "require_hope"]
+__all__ = ["Cost", "cost", "require_hope", "require_hope_on_curve"]
 
 #: Seconds for each time and n², by engine, in double precision.
 _SECONDS = {"analytic": 7e-7, "numeric": 9e-8}
@@ -31,6 +36,9 @@ _SET_UP_POWER = 1.5
 #: an object of its own.
 _BYTES = 32
 _BYTES_DECIMAL = 400
+
+#: Seconds for each number of a point of a curve beyond double precision.
+_SECONDS_ON_CURVE = 4e-5
 
 
 class Cost(NamedTuple):
@@ -59,12 +67,7 @@ def require_hope(request: ComparisonRequest, settings: Settings) -> None:
     settings, or beyond the memory.
     """
     seconds, megabytes = cost(request)
-    if settings.estimate_slack and seconds > settings.estimate_slack * request.budget_s:
-        required = (
-            f"fewer times or digits, or more than budget_s = {request.budget_s:g} (at most "
-            f"{settings.max_budget_s:g})"
-        )
-        raise InvalidInput(("times",), required, f"work for {seconds:.3g} s or more, as estimated")
+    _require_affordable(seconds, "times", request, settings)
     if megabytes > settings.worker_memory_mb:
         required = (
             f"what {settings.worker_memory_mb} MB, the memory of a worker on this server, can hold"
@@ -72,3 +75,24 @@ def require_hope(request: ComparisonRequest, settings: Settings) -> None:
         raise InvalidInput(
             ("times",), required, f"work for {megabytes:.3g} MB or more, as estimated"
         )
+
+
+def require_hope_on_curve(request: CurveRequest, settings: Settings) -> None:
+    """Raise InvalidInput where points of a curve to many digits take longer than the budget by the
+    slack of the settings, at the least.
+    """
+    if beyond_double(request.digits, request.certified):
+        length = max(request.digits, FEWEST_DIGITS) / FEWEST_DIGITS
+        seconds = request.point_count() * request.genus * length * _SECONDS_ON_CURVE
+        _require_affordable(seconds, "points", request, settings)
+
+
+def _require_affordable(
+    seconds: float, field: str, request: BudgetedRequest, settings: Settings
+) -> None:
+    if settings.estimate_slack and seconds > settings.estimate_slack * request.budget_s:
+        required = (
+            f"fewer {field} or digits, or more than budget_s = {request.budget_s:g} (at most "
+            f"{settings.max_budget_s:g})"
+        )
+        raise InvalidInput((field,), required, f"work for {seconds:.3g} s or more, as estimated")

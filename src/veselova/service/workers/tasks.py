@@ -99,8 +99,10 @@ def _closed_form(request: Any) -> dict[str, Any]:
 def _curve(request: CurveRequest) -> dict[str, Any]:
     from veselova.curves import RealHyperelliptic
 
-    curve = RealHyperelliptic(request.branch_points, request.sign)
-    return curve.data(*request.places).as_dict()
+    curve = RealHyperelliptic(
+        request.branch_points, request.sign, digits=request.digits, certified=request.certified
+    )
+    return curve.data(*request.places, request.z, request.outputs or ()).as_dict()
 
 
 def _theta(request: ThetaRequest) -> dict[str, Any]:

@@ -1,0 +1,230 @@
+"""Curves with real branch points to many digits: radii hold, and every number is that of doubles,
+of more digits, and of mpmath.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from decimal import Context, Decimal, localcontext
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from veselova import InvalidInput, Unsolved, curves
+from veselova.mechanics.core.budget import limits
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.core.errors import OverBudget
+
+CASES = [(count, sign) for count in range(3, 8) for sign in (-1, 1)]
+MATRICES = ("riemann_matrix", "a_periods", "b_periods", "normalized_differentials")
+HALF_PERIODS = ("omega", "omega_prime", "eta", "eta_prime")
+
+
+@pytest.fixture(autouse=True)
+def _digits() -> Iterator[None]:
+    """Give the decimals of a test digits to be compared with."""
+    with localcontext(Context(prec=120)):
+        yield
+
+
+def branch_points(count: int) -> list[str]:
+    random = np.random.default_rng([11, count])
+    return [str(round(float(b), 6)) for b in np.cumsum(random.uniform(0.1, 2, count)) - 3]
+
+
+def places(points: list[str]) -> list[Any]:
+    """Return points on every cut and gap, at ends, beyond them, and complex ones."""
+    exact = sorted(map(Fraction, points))
+    between = [str((2 * a + b) / 3) for a, b in pairwise(exact)]
+    beyond = [str(exact[0] - 1), str(exact[-1] + 1), str(exact[0] - 100), "5e7"]
+    return [*between, *beyond, points[0], points[-1], points[1], 0.3 + 0.7j, -50 + 3j, 2 - 1j]
+
+
+def enclosed(coarse: Decimals | None, fine: Decimals | None, name: str) -> Any:
+    """Return the midpoints, after a look at the radii."""
+    assert coarse is not None
+    assert fine is not None
+    middle, radius = coarse.midpoints[name], coarse.radii[name]
+    assert (np.abs(middle - fine.midpoints[name]) <= radius + fine.radii[name]).all(), name
+    return middle.astype(float)
+
+
+@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_every_number_of_a_curve_has_the_digits_asked_for(
+    count: int, sign: int, certified: bool
+) -> None:
+    points = branch_points(count)
+    plain = curves.RealHyperelliptic(points, sign)
+    coarse = curves.RealHyperelliptic(points, sign, digits=25, certified=certified)
+    fine = curves.RealHyperelliptic(points, sign, digits=60)
+    quasi = plain.quasi_periods
+    expected = {
+        "riemann_matrix": plain.riemann_matrix.imag,
+        "a_periods": plain.periods.a,
+        "b_periods": plain.periods.b.imag,
+        "normalized_differentials": plain.normalized_differentials,
+        "omega": quasi[0].imag,
+        "omega_prime": quasi[1].real,
+        "eta": quasi[2].imag,
+        "eta_prime": quasi[3].real,
+        "thomae": np.array([constant.fourth_power for constant in plain.thomae()]),
+    }
+    for name, values in expected.items():
+        found = enclosed(coarse.decimals, fine.decimals, name)
+        assert np.max(np.abs(found - values)) <= 1e-12 * np.max(np.abs(values)), name
+    assert coarse.decimals is not None
+    periods, radii = coarse.decimals.midpoints["a_periods"], coarse.decimals.radii["a_periods"]
+    sizes = np.max(np.abs(periods), axis=1, keepdims=True)
+    assert (radii <= sizes * Decimal("1e-25")).all()
+
+
+@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize(("count", "sign"), CASES)
+def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
+    count: int, sign: int, certified: bool
+) -> None:
+    points = branch_points(count)
+    plain = curves.RealHyperelliptic(points, sign)
+    coarse = curves.RealHyperelliptic(points, sign, digits=25, certified=certified)
+    fine = curves.RealHyperelliptic(points, sign, digits=60)
+    given = places(points)
+    sheets = [1 + 1j] * len(given)
+    found = enclosed(coarse.abel_decimals(given, sheets), fine.abel_decimals(given, sheets), "abel")
+    images = plain.abel(given, sheets)
+    assert np.max(np.abs(found[..., 0] + 1j * found[..., 1] - images)) < 1e-12
+    z = [row[: plain.genus] for row in (["0.3", "0.1", "0.77"], ["1/3", "-2/7", "5/9"])]
+    inverse = coarse.invert_decimals(z)
+    found = enclosed(inverse, fine.invert_decimals(z), "points")
+    where, signs = plain.invert([[float(Fraction(x)) for x in row] for row in z])
+    assert np.max(np.abs(found - where)) < 1e-12
+    assert inverse is not None
+    assert np.array_equal(inverse.midpoints["signs"].astype(float), signs)
+    # a branch point itself is a point of the torus: its radius is not that of a square root
+    ends = coarse.invert_decimals([["0.5", "0", "0.5"][: plain.genus]])
+    assert ends is not None
+    cuts = plain.cuts
+    assert np.min(np.abs(ends.midpoints["points"].astype(float).T - cuts), axis=1).max() < 1e-14
+    assert ends.radii["points"].max() < Decimal("1e-20")
+
+
+@pytest.mark.parametrize("count", [5, 6])
+def test_the_map_undoes_the_inversion_to_forty_digits(count: int) -> None:
+    points = branch_points(count)
+    curve = curves.RealHyperelliptic(points, digits=40, certified=True)
+    places = curve.invert_decimals([["0.3", "0.8"]])
+    assert places is not None
+    (found,), (signs,) = places.midpoints["points"], places.midpoints["signs"]
+    image = curve.abel_decimals([str(x) for x in found], signs.astype(float))
+    reverses = curve._curve.reverses
+    ends = [next(p for p in points if float(p) == float(cut[int(reverses)])) for cut in curve.cuts]
+    base = curve.abel_decimals(ends, [1, 1])
+    assert image is not None
+    assert base is not None
+    rest = image.midpoints["abel"].sum(axis=0) - base.midpoints["abel"].sum(axis=0)
+    assert curve.decimals is not None
+    for j, wanted in enumerate((Decimal("0.3"), Decimal("0.8"))):
+        off = (rest[j, 0] - wanted) % 1
+        assert min(abs(off), abs(1 - abs(off))) < Decimal("1e-38")
+    # over cuts the imaginary part is a combination of columns of T with whole numbers
+    turns = np.linalg.solve(curve.riemann_matrix.imag, rest[:, 1].astype(float))
+    whole = np.array([Decimal(round(x)) for x in turns])
+    assert max(abs(rest[:, 1] - curve.decimals.midpoints["riemann_matrix"] @ whole)) < Decimal(
+        "1e-37"
+    )
+
+
+def test_periods_to_fifty_digits_are_those_of_quadrature() -> None:
+    points = ["0", "1", "1.7", "3", "4.5"]
+    decimals = curves.RealHyperelliptic(points, digits=50, certified=True).decimals
+    assert decimals is not None
+    with mpmath.workdps(70):
+        exact = [mpmath.mpf(Fraction(p).numerator) / Fraction(p).denominator for p in points]
+        for s, (low, high) in enumerate([(1, 2), (3, 4)]):
+            others = [b for j, b in enumerate(exact) if j not in (low, high)]
+            middle, half = (exact[low] + exact[high]) / 2, (exact[high] - exact[low]) / 2
+            for k in (0, 1):
+
+                def density(angle: Any, k: int = k, others: Any = others, m: Any = (middle, half)):  # type: ignore[no-untyped-def]
+                    x = m[0] - m[1] * mpmath.cos(angle)
+                    return x**k / mpmath.sqrt(abs(mpmath.fprod(x - b for b in others)))
+
+                wanted = 2 * mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 9))
+                found = mpmath.mpf(str(abs(decimals.midpoints["a_periods"][k, s])))
+                assert abs(found - wanted) <= mpmath.mpf(str(decimals.radii["a_periods"][k, s]))
+
+
+def test_legendres_relation_holds_to_forty_digits() -> None:
+    """ωη'ᵀ − ω'ηᵀ = ±½πi, with ω and η without their i."""
+    for points in (branch_points(5), branch_points(6), branch_points(7)):
+        decimals = curves.RealHyperelliptic(points, digits=40, certified=True).decimals
+        assert decimals is not None
+        omega, omega_prime, eta, eta_prime = (decimals.midpoints[name] for name in HALF_PERIODS)
+        with mpmath.workdps(50):
+            half_pi = Decimal(mpmath.nstr(mpmath.pi / 2, 48))
+            found = (omega @ eta_prime.T - omega_prime @ eta.T) / half_pi
+        size = max(1, *np.abs(omega @ eta_prime.T).astype(float).ravel())
+        rest = np.abs(found) - np.eye(len(omega), dtype=int)
+        assert np.max(np.abs(rest)) < Decimal("1e-36") * int(size)
+
+
+@pytest.mark.parametrize("gap", ["1e-12", "1e-40"])
+def test_narrow_gaps_keep_all_their_digits(gap: str) -> None:
+    points = ["0", "1", str(1 + Fraction(gap)), "2", "3"]
+    coarse = curves.RealHyperelliptic(points, digits=30, certified=True)
+    fine = curves.RealHyperelliptic(points, digits=70, certified=True)
+    for name in (*MATRICES, *HALF_PERIODS, "thomae"):
+        enclosed(coarse.decimals, fine.decimals, name)
+    given = ["1.5", "0.5", "2.5", "-1", 1.5 + 1j]
+    enclosed(coarse.abel_decimals(given, [1] * 5), fine.abel_decimals(given, [1] * 5), "abel")
+
+
+def test_periods_beyond_doubles_have_decimals() -> None:
+    points = ["1e250", "2e250", "4e250", "5e250", "7e250"]
+    data = curves.RealHyperelliptic(points, digits=20).data()
+    assert data.a_periods is None
+    assert data.decimals is not None
+    near = curves.RealHyperelliptic(["1", "2", "4", "5", "7"], digits=20).decimals
+    assert near is not None
+    # ∫dλ/w has the unit λ^{−3/2}
+    ratio = data.decimals.midpoints["a_periods"][0, 0] / near.midpoints["a_periods"][0, 0]
+    assert abs(ratio * Decimal("1e375") - 1) < Decimal("1e-19")
+
+
+def test_faults_of_points_are_named_with_digits_too() -> None:
+    curve = curves.RealHyperelliptic([0, 1, 2, 3, 4], digits=20)
+    for call, field in (
+        (lambda: curve.invert_decimals([0.5]), "z"),
+        (lambda: curve.invert_decimals(["x", 0.5]), "z[0]"),
+        (lambda: curve.invert([[0.5, 0.5], [0.5]]), "z[1]"),
+        (lambda: curve.invert("ab"), "z"),
+        (lambda: curve.abel_decimals([1.5, 2], [1]), "w"),
+        (lambda: curve.data(outputs=["zeta"]), "outputs[0]"),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            call()
+        assert caught.value.faults[0].field == field
+    plain = curves.RealHyperelliptic([0, 1, 2])
+    assert plain.abel_decimals([1], [1]) is None
+    assert plain.invert_decimals([0.5]) is None
+
+
+def test_thomaes_values_are_bounded_in_number() -> None:
+    curve = curves.RealHyperelliptic(list(range(31)), digits=20)
+    with pytest.raises(Unsolved, match="too-many-terms"):
+        curve.thomae()
+    assert curve.decimals is not None
+    with pytest.raises(Unsolved, match="too-many-terms"):
+        _ = curve.decimals.midpoints["thomae"]
+
+
+def test_digits_of_a_curve_end_with_the_budget() -> None:
+    curve = curves.RealHyperelliptic(branch_points(9), digits=900, certified=True)
+    decimals = curve.decimals
+    assert decimals is not None
+    with pytest.raises(OverBudget), limits(0.2):
+        _ = decimals.midpoints["omega"]
