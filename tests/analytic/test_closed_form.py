@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from problems import near_separatrix
+from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
@@ -305,3 +307,23 @@ def test_a_ball_with_a_path_has_the_digits_of_a_double() -> None:
     )
     with pytest.raises(vs.InvalidInput, match="digits: required 15"):
         vs.closed_form(ball, digits=20)
+
+
+def test_a_document_of_many_digits_reports_its_progress_and_looks_at_no_mode_twice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A cutoff that is lowered takes over the coefficients that are known."""
+    seen: list[tuple[float, float]] = []
+    looked_at: list[bytes] = []
+    find = FourierTimeMapInBalls._find_coefficients
+
+    def count(self: FourierTimeMapInBalls, modes: Any) -> Any:
+        looked_at.extend(mode.tobytes() for mode in modes)
+        return find(self, modes)
+
+    monkeypatch.setattr(FourierTimeMapInBalls, "_find_coefficients", count)
+    problem = near_separatrix(1e-3).problem
+    vs.closed_form(problem, digits=30, progress=lambda done, total: seen.append((done, total)))
+    assert seen
+    assert all(0 <= done <= total for done, total in seen)
+    assert len(set(looked_at)) == len(looked_at) > 1000

@@ -52,6 +52,71 @@ def test_values_are_those_of_ball_arithmetic(genus: int) -> None:
         assert (np.abs(ours - exact) <= found.error * np.exp(found.exponent)).all()
 
 
+def exact_mantissas(z: Any, tau: Any, exponents: Any) -> Any:
+    """Return θ of all half-integer characteristics over e^exponents, in balls."""
+    ctx.prec = 600
+    columns = acb_mat([[acb(x.real, x.imag)] for x in np.asarray(z, dtype=complex).tolist()])
+    values = acb_mat([[acb(x.real, x.imag) for x in row] for row in tau.tolist()]).theta(columns)
+    return [values[0, i] / acb(float(exponent)).exp() for i, exponent in enumerate(exponents)]
+
+
+@pytest.mark.parametrize("genus", [1, 2, 3, pytest.param(4, marks=pytest.mark.slow)])
+def test_the_error_is_never_below_the_true_one_and_not_far_above_it(genus: int) -> None:
+    random = np.random.default_rng([11, genus])
+    ratios = []
+    for _ in range(20 if genus < 4 else 4):
+        tau = random_tau(random, genus)
+        z = random.normal(size=genus) + 0.3j * random.normal(size=genus)
+        found = theta.scaled_riemann_theta(z, tau, all_halves(genus))
+        exact = exact_mantissas(z, tau, found.exponent)
+        for wanted, mantissa, error in zip(exact, found.mantissa, found.error, strict=True):
+            off = abs(wanted - acb(mantissa.real, mantissa.imag))
+            if float(off.rad()) < 1e-3 * float(off.mid()):  # the sum in balls may have no digits
+                assert float(off.mid()) <= error
+                ratios.append(error / float(off.mid()))
+    assert len(ratios) > 4**genus
+    assert np.median(ratios) <= 100
+
+
+@pytest.mark.parametrize("genus", [1, 2])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_error_bounds_derivatives_with_any_characteristic(genus: int, order: int) -> None:
+    """Against the sum itself in balls, term by term."""
+    random = np.random.default_rng([12, genus, order])
+    ctx.prec = 200
+    i, pi = acb(0, 1), acb.pi()
+    ratios = []
+    for _ in range(12):
+        X, M = random.normal(size=(genus, genus)) * 3, random.normal(size=(genus, genus))
+        tau = X + X.T + 1j * (M @ M.T + 0.3 * np.eye(genus))
+        epsilon, delta = random.choice([0, 0.5, 1 / 3, -0.7, 1.5], (2, genus))
+        z = random.normal(size=genus) + 0.3j * random.normal(size=genus)
+        found = theta.scaled_riemann_theta(z, tau, [epsilon, delta], order)
+        T = [[acb(x.real, x.imag) for x in row] for row in tau.tolist()]
+        u = [acb(x.real, x.imag) + acb(d) for x, d in zip(z.tolist(), delta.tolist(), strict=True)]
+        middle = np.rint(-np.linalg.solve(tau.imag, z.imag) - epsilon).tolist()
+        sums = [acb(0)] * genus**order
+        for k in itertools.product(range(-10, 11), repeat=genus):
+            m = [acb(a + b) + acb(e) for a, b, e in zip(k, middle, epsilon.tolist(), strict=True)]
+            form = sum((m[r] * T[r][s] * m[s] for r, s in np.ndindex(genus, genus)), acb(0))
+            term = (
+                i * pi * (form + 2 * sum((a * b for a, b in zip(m, u, strict=True)), acb(0)))
+            ).exp()
+            for place, axes in enumerate(itertools.product(range(genus), repeat=order)):
+                factor = acb(1)
+                for axis in axes:
+                    factor *= 2 * pi * i * m[axis]
+                sums[place] += factor * term
+        scale = acb(float(found.exponent)).exp()
+        off = max(
+            float(abs(wanted / scale - acb(x.real, x.imag)).mid())
+            for wanted, x in zip(sums, np.ravel(found.mantissa).tolist(), strict=True)
+        )
+        assert off <= found.error
+        ratios.append(float(found.error) / off)
+    assert np.median(ratios) <= 200
+
+
 @pytest.mark.parametrize("genus", [1, 2, 3])
 def test_derivatives_are_those_of_a_contour(genus: int) -> None:
     """Cauchy's integral over a small circle in each coordinate."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.motion.time_map_balls import require_few_modes
+from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
@@ -168,11 +168,14 @@ class _Numbers:
         sensitivity = float(coarse.sensitivity.along_flow)
         fastest = float(np.max(np.abs(coarse.in_tau1.rates)))
         cutoff = accuracy * fastest * mean / (_FEWER_MODES * max(1.0, sensitivity))
-        time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff)
+        expected = estimate_modes(coarse, -math.log10(accuracy), coarse.curve.genus)
+        time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff, expected=expected)
         # what is below the cutoff may move τ₁ by its part of the accuracy
         while (left := float(time_map.tail(np.inf)) * sensitivity / mean) > accuracy / 4:
             cutoff *= accuracy / (8 * left)
-            time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff)
+            time_map = FourierTimeMapInBalls(
+                self._fine.orbit, cutoff, expected=expected, coarser=time_map
+            )
         modes = time_map.modes
         pace = np.abs(modes @ self._fine.orbit.frequencies).astype(float)
         reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity

@@ -22,7 +22,7 @@ from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapI
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "require_few_modes"]
+__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes", "require_few_modes"]
 
 
 class UniformTimeMap:
@@ -48,7 +48,7 @@ class UniformTimeMap:
 TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
-def _estimate_modes(coarse: Solution, digits: int, genus: int) -> float:
+def estimate_modes(coarse: Solution, digits: float, genus: int) -> float:
     """Return about how many modes count to so many digits."""
     count: float = coarse.modes * (digits / DOUBLE.digits) ** genus
     return count
@@ -62,7 +62,7 @@ def require_few_modes(coarse: Solution, digits: int, working: int) -> None:
         return
     nodes = max(coarse.rate.needed_nodes)
     costs = CostsInBalls(coarse.curve.genus, working, nodes, by_theta=True)
-    modes = _estimate_modes(coarse, digits, costs.genus)
+    modes = estimate_modes(coarse, digits, costs.genus)
     if modes > MOST_MODES:
         reason = f"with {digits} digits the time map has about {modes:.0f} modes; take fewer digits"
         raise Unsolved("too-many-modes", reason)
@@ -89,7 +89,7 @@ def choose_time_map(
         costs.require_affordable(further)
         return UniformTimeMap(orbit)
     xp: Any = orbit.rate.inversion.arithmetic
-    modes = _estimate_modes(coarse, xp.digits, costs.genus)
+    modes = estimate_modes(coarse, xp.digits, costs.genus)
     by_modes = math.inf
     # Of a direction that doubles do not see they say nothing.
     known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE

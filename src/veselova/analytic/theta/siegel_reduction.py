@@ -17,6 +17,7 @@ and none has a root whose branch is in doubt:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class SiegelReduction:
     - linear: L (g, g) ·
     - quadratic: Q (g, g)
     - symplectic: (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
-    - rounding: about the error of the entries of τ'
+    - rounding: (g, g), bounds of the error of the entries of τ'
 
     Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
     bits more where the processor has them. Integers are chosen in doubles.
@@ -84,9 +85,9 @@ class SiegelReduction:
     linear: Wide = field(init=False)
     quadratic: Wide = field(init=False)
     symplectic: Integers = field(init=False)
-    rounding: float = field(default=0.0, init=False)
     _steps: list[tuple[str, Array]] = field(default_factory=list, init=False)
-    _log_root: complex = field(default=0j, init=False)
+    _log_root: Any = field(default=np.clongdouble(0), init=False)
+    _changes: list[tuple[Complex, Array]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         g = len(self.tau)
@@ -105,10 +106,10 @@ class SiegelReduction:
 
     def _change_basis(self) -> None:
         U = reduce_lattice(self.tau.imag.astype(float))
+        if not np.array_equal(U, np.eye(len(U))):
+            self._round(U, np.abs(U) @ np.abs(self.tau).astype(float) @ np.abs(U).T)
         self.tau = U @ self.tau @ U.T
         self.tau = (self.tau + self.tau.T) / 2
-        if not np.array_equal(U, np.eye(len(U))):
-            self._round(U)
         self.linear = U @ self.linear
         self._compose(U, 0 * U, 0 * U, np.rint(np.linalg.inv(U)).T.astype(np.int64))
         self._steps.append(("basis", U.astype(float)))
@@ -134,29 +135,44 @@ class SiegelReduction:
         tau = self.tau.copy()
         tau[0, 0], tau[0, 1:], tau[1:, 0] = -1 / a, -b / a, -b / a
         tau[1:, 1:] -= np.outer(b, b) / a
+        sizes = np.abs(tau).astype(float)
+        sizes[1:, 1:] += np.abs(np.outer(b, b) / a).astype(float)
+        self._round(change, sizes)
         self.tau = tau
-        self._round(change)
-        self._log_root -= complex(np.log(-1j * a)) / 2  # Re(−ia) = Im a > 0: the principal branch
+        self._log_root = (
+            self._log_root - np.log(-1j * a) / 2
+        )  # Re(−ia) = Im a > 0: the principal branch
         one = np.eye(len(tau), dtype=np.int64)
         first = np.zeros_like(one)
         first[0, 0] = 1
         self._compose(one - first, first, -first, one - first)
         self._steps.append(("inversion", np.empty(0)))
 
-    def _round(self, change: Any) -> None:
-        """Note the rounding of a step that takes dτ to M dτ Mᵀ; translations have none."""
-        largest = float(np.max(np.abs(self.tau)))
-        size = float(np.linalg.norm(change, 2))
-        self.rounding = (
-            self.rounding * size * size + 2 * float(np.finfo(np.longdouble).eps) * largest
-        )
+    def _round(self, change: Any, sizes: Array) -> None:
+        """Note a step that takes dτ to M dτ Mᵀ, and the sizes of what it adds; translations round
+        nothing.
+        """
+        own = 3 * float(np.finfo(np.longdouble).eps) * sizes
+        self._changes.append((np.asarray(change, dtype=complex), own))
+
+    @cached_property
+    def rounding(self) -> Array:
+        """Return the bounds: the rounding of each step by the product of those after it, whose
+        factors may be large and cancel.
+        """
+        after = np.eye(len(self.tau), dtype=complex)
+        bound = np.zeros(self.tau.shape)
+        for change, own in reversed(self._changes):
+            bound += np.abs(after) @ own @ np.abs(after).T
+            after = after @ change
+        return bound
 
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
         self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
 
     def characteristic(
         self, given_epsilon: Array, given_delta: Array
-    ) -> tuple[WideReal, WideReal, Any, complex]:
+    ) -> tuple[WideReal, WideReal, Any, Any]:
         """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}."""
         epsilon: Any = given_epsilon.astype(np.longdouble)
         delta: Any = given_delta.astype(np.longdouble)

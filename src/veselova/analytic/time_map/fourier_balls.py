@@ -43,18 +43,30 @@ class FourierTimeMapInBalls:
     left out is estimated.
 
     ``cutoff``: the least |F_m| of modes (M, g) that are kept, with their ``coefficients`` (M,); the
-    precision where none is given. ``expected``: about how many modes there are.
+    precision where none is given. ``expected``: about how many modes there are. ``coarser``: the
+    map of the same orbit with a higher cutoff, whose coefficients are taken over.
     """
 
     name = "fourier"
 
-    def __init__(self, orbit: Orbit, cutoff: float | None = None, *, expected: float = 0.0) -> None:
+    def __init__(
+        self,
+        orbit: Orbit,
+        cutoff: float | None = None,
+        *,
+        expected: float = 0.0,
+        coarser: FourierTimeMapInBalls | None = None,
+    ) -> None:
         self._orbit = orbit
         self._cutoff = cutoff
         self._expected = expected
         xp: Any = orbit.rate.inversion.arithmetic
         self._xp = xp
         self._mean = orbit.rate.mean
+        self._columns: ColumnsForModes[SumsOverPoints] = (
+            self._make_columns() if coarser is None else coarser._columns
+        )
+        self._known: dict[bytes, Any] = {} if coarser is None else coarser._known
         self.modes, coefficients, edge = self._select_modes()
         self.coefficients = coefficients
         rates = self.modes @ orbit.frequencies
@@ -84,24 +96,35 @@ class FourierTimeMapInBalls:
 
     def _select_modes(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
-        rate = self._orbit.rate
-        xp = self._xp
-        columns = ColumnsForModes(
-            rate, lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp)
-        )
+        keep = self._cutoff is not None
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
-            stacks = [column.cosines(modes) for column in columns(modes)]
-            values = np.array(
-                [xp.determinant(np.stack(rows, axis=1)) for rows in zip(*stacks, strict=True)],
-                dtype=object,
-            )
-            values = rate.scale * values
+            keys = [mode.tobytes() for mode in modes]
+            fresh = [i for i, key in enumerate(keys) if key not in self._known]
+            values = np.array([self._known.get(key) for key in keys], dtype=object)
+            if fresh:
+                values[fresh] = self._find_coefficients(modes[fresh])
+            if keep:
+                self._known.update(zip(keys, values.tolist(), strict=True))
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
         # those at the edge are looked at too
-        genus = rate.inversion.periods.genus
+        genus = self._orbit.rate.inversion.periods.genus
         return find_significant_modes(genus, determinants, 2 * MOST_MODES, expected=self._expected)
+
+    def _make_columns(self) -> ColumnsForModes[SumsOverPoints]:
+        xp = self._xp
+        return ColumnsForModes(
+            self._orbit.rate,
+            lambda weights, G, largest: SumsOverPoints(xp.turns(G), weights, largest, xp),
+        )
+
+    def _find_coefficients(self, modes: NDArray[np.int64]) -> Values:
+        """Return F_m of modes (M, g)."""
+        stacks = [column.cosines(modes) for column in self._columns(modes)]
+        rows = zip(*stacks, strict=True)
+        values = [self._xp.determinant(np.stack(row, axis=1)) for row in rows]
+        return np.asarray(self._orbit.rate.scale * np.array(values, dtype=object))
 
     def tau1(self, times: Values, _approximate: NDArray[np.float64]) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ +
