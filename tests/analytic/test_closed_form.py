@@ -322,7 +322,7 @@ def test_a_document_of_many_digits_reports_its_progress_and_looks_at_no_mode_twi
         return find(self, modes)
 
     monkeypatch.setattr(FourierTimeMapInBalls, "_find_coefficients", count)
-    problem = near_separatrix(1e-3).problem
+    problem = near_separatrix(1e-3).problem()
     vs.closed_form(problem, digits=30, progress=lambda done, total: seen.append((done, total)))
     assert seen
     assert all(0 <= done <= total for done, total in seen)
