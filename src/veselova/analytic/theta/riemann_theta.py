@@ -17,10 +17,9 @@ everything a lattice sum of Gaussians. Coordinates are those in which the sum is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +35,12 @@ from veselova.analytic.theta.lattice import (
     points_near_cell,
     schur,
 )
-from veselova.analytic.theta.theta_tables import SIGNS, Blocks, Family, Group, in_blocks
+from veselova.analytic.theta.theta_tables import SIGNS, Family, Group
 from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
-
-K = TypeVar("K")
 
 #: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred
 #: times slower.
@@ -57,10 +54,6 @@ _BLOCK = 100_000
 
 #: Classes ε_F that are few enough for all of them to be found when the first is asked for.
 _FEW_CLASSES = 8
-
-#: Products of few points with the tables of all functions at once, which save the calls of one
-#: group after the other.
-_FEW = 150_000
 
 
 @dataclass(frozen=True)
@@ -149,9 +142,6 @@ class Theta:
         """
         wanted = tuple(characteristics)
         y = (z - 2 * np.rint(z / 2)) @ self._to_coordinates
-        if 0 < len(z) * len(wanted) * self._size_in_blocks <= _FEW:
-            blocks = self._blocks(wanted)
-            return blocks.values(*self._gaussian_factors(y, blocks.shifts))
         result = np.empty((len(characteristics), z.shape[0]))
         groups = self._groups(wanted)
         block = max(
@@ -203,43 +193,11 @@ class Theta:
         exponents[exponents <= _VANISHING] = -np.inf
         return np.exp(exponents, out=exponents), angles, nearest
 
-    @cached_property
-    def _size_in_blocks(self) -> int:
-        """Return about how many entries the tables of all characteristics at once have for each."""
-        return int(2 * self.size * 2 ** len(self._split[1]))
-
-    def _blocks(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
-        """Return the tables of all characteristics at once."""
-        return _keep_tables(self._blocked, characteristics, self._side_by_side, Blocks.of)
-
-    @cached_property
-    def _blocked(self) -> dict[tuple[Characteristic, ...], Blocks]:
-        return {}
-
-    def _side_by_side(self, characteristics: tuple[Characteristic, ...]) -> Blocks:
-        local, signs = zip(*self.coordinates.characteristics(characteristics), strict=True)
-        deltas = [tuple(c.delta[i] for i in self._split[1]) for c in local]
-        shifts, (of, doubled, rotated) = (
-            list(dict.fromkeys(deltas)),
-            self._characteristic_phases(local),
-        )
-        blocks = np.array([shifts.index(delta) for delta in deltas])
-        return Blocks(
-            np.array(shifts, dtype=float) / 2,
-            in_blocks(doubled, blocks[of], len(shifts)),
-            in_blocks(
-                np.concatenate([rotated.real, -rotated.imag], axis=1).T,
-                np.tile(blocks[of], 2),
-                len(shifts),
-            ),
-            np.flatnonzero(np.diff(of, prepend=-1)),
-            in_blocks(self._parities(local).T, blocks, len(shifts)),
-            self._parts[3] * np.array(signs)[:, None],
-        )
-
     def _groups(self, characteristics: tuple[Characteristic, ...]) -> list[Group]:
         """Return the families by δ_G."""
-        return _keep_tables(self._grouped, characteristics, self._by_shift, _part)
+        if (found := self._grouped.get(characteristics)) is None:
+            found = self._grouped[characteristics] = self._by_shift(characteristics)
+        return found
 
     @cached_property
     def _grouped(self) -> dict[tuple[Characteristic, ...], list[Group]]:
@@ -368,34 +326,3 @@ class Theta:
         self,
     ) -> dict[frozenset[int], tuple[NDArray[np.int64], dict[int, range], NDArray[np.complex128]]]:
         return {}
-
-
-def _keep_tables(
-    tables: dict[tuple[Characteristic, ...], K],
-    wanted: tuple[Characteristic, ...],
-    made: Callable[[tuple[Characteristic, ...]], K],
-    part: Callable[[K, list[int]], K],
-) -> K:
-    """Return the tables of characteristics: those that are kept, a part of those of more of them,
-    or those that are made.
-    """
-    if (found := tables.get(wanted)) is None:
-        # a copy: another thread may add to them
-        each = set(wanted)
-        known = list(tables)
-        more = (
-            next((selected for selected in known if each <= set(selected)), None)
-            if len(each) == len(wanted)
-            else None
-        )
-        found = (
-            made(wanted) if more is None else part(tables[more], [more.index(c) for c in wanted])
-        )
-        tables[wanted] = found
-    return found
-
-
-def _part(groups: list[Group], members: list[int]) -> list[Group]:
-    """Return the groups of the characteristics at some places, in this order."""
-    places = {member: place for place, member in enumerate(members)}
-    return [part for group in groups if (part := group.of(places)) is not None]
