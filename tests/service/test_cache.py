@@ -15,7 +15,7 @@ import pytest
 from hostile import GOOD
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.answers.cache import Cache
-from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry, unpack
+from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry
 from veselova.service.answers.rendering import Representation, render_kept, render_solution
 from veselova.service.answers.spool import Spool
 from veselova.service.api.problem_details import Refused
@@ -113,7 +113,7 @@ def test_an_answer_outlives_a_disk_too_full_to_keep_it(tmp_path: Path, full_disk
         Entry(str(tmp_path / "entry"), full_disk, 10**6),
     )
     assert delivery.not_stored == "No space left on device"
-    assert (delivery.stored, delivery.entry) == (0, None)
+    assert delivery.stored == 0
     assert answer.read_bytes()
     assert list(tmp_path.iterdir()) == [answer]
 
@@ -144,15 +144,13 @@ def test_what_was_kept_is_restored_with_the_seconds_of_its_computation(
         Representation(form, "identity"),
     )
     made = render_solution(pickle.dumps({**GOOD, **changes}), wanted, entry)
-    assert made.entry
-    assert entry.write_packed(made.entry) == (tmp_path / "kept").stat().st_size
+    assert made.stored == (tmp_path / "kept").stat().st_size
     for again in (
-        render_kept(made.entry, wanted),
         render_kept(entry.path, wanted),
         render_solution(pickle.dumps({**GOOD, **changes}), wanted, entry),
     ):
         assert (again.body, again.provenance, again.cached) == (made.body, made.provenance, True)
-        assert (again.stored, again.entry) == (0, None)
+        assert again.stored == 0
     with pytest.raises(FileNotFoundError):
         render_kept(str(tmp_path / "none"), IN_MEMORY)
 
@@ -167,8 +165,7 @@ def test_what_is_no_entry_is_said_to_be_damaged(tmp_path: Path, content: bytes) 
     entry = Entry(str(tmp_path / "other"), str(tmp_path / "part"), 10**6)
     made = render_solution(pickle.dumps(GOOD), IN_MEMORY, entry)
     assert (made.cached, made.damaged) == (False, True)
-    assert made.entry
-    assert entry.write_packed(made.entry)
+    assert made.stored
     assert render_kept(str(tmp_path / "other"), IN_MEMORY).body == made.body
 
 
@@ -178,37 +175,18 @@ def test_what_follows_from_the_rest_is_the_same_when_it_is_restored(tmp_path: Pa
     """
     for method in ("theta", "angles"):
         request = {**GOOD, "method": method}
-        made = render_solution(
-            pickle.dumps({**request, "outputs": ["q"]}),
-            IN_MEMORY,
-            Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6),
-        )
-        assert made.entry
-        kept, expected = (
-            unpack(made.entry)[1],
-            solve_request(read_request(TrajectoryRequest, request)),
-        )
+        entry = Entry(str(tmp_path / method), str(tmp_path / "part"), 10**6)
+        render_solution(pickle.dumps({**request, "outputs": ["q"]}), IN_MEMORY, entry)
+        _, kept = read_entry(entry.path)
+        expected = solve_request(read_request(TrajectoryRequest, request))
         for name in expected.problem.outputs:
             assert np.array_equal(kept.series(name), expected.series(name)), name
 
 
-def test_an_entry_beyond_what_is_sent_is_written_by_the_worker(
-    tmp_path: Path, monkeypatch: Any
-) -> None:
-    monkeypatch.setattr("veselova.service.answers.rendering._MOST_SENT", 100)
-    entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
-    made = render_solution(pickle.dumps(GOOD), IN_MEMORY, entry)
-    assert made.entry is None
-    assert made.stored == (tmp_path / "kept").stat().st_size
-    assert (
-        render_solution(
-            pickle.dumps(GOOD),
-            IN_MEMORY,
-            Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200),
-        ).stored
-        == 0
-    )
-    assert list(tmp_path.iterdir()) == [tmp_path / "kept"]
+def test_an_answer_too_large_for_the_cache_leaves_no_file(tmp_path: Path) -> None:
+    entry = Entry(str(tmp_path / "none"), str(tmp_path / "part"), 200)
+    assert render_solution(pickle.dumps(GOOD), IN_MEMORY, entry).stored == 0
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 import veselova as vs
 from conftest import Server
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.answers.cache_entry import pack, unpack
+from veselova.service.answers.cache_entry import Entry, read_entry
 from veselova.service.api.json_documents import trajectory_document, trajectory_of
 from veselova.service.api.request_models import TrajectoryRequest, read_request
 from veselova.service.cli.main import main
@@ -65,12 +66,12 @@ def test_a_document_has_it_beside_the_error(motion: Trajectory) -> None:
     assert "conditioning" not in trajectory_document(motion)
 
 
-def test_an_entry_of_the_cache_keeps_it() -> None:
+def test_an_entry_of_the_cache_keeps_it(tmp_path: Path) -> None:
     asked = read_request(TrajectoryRequest, REQUEST)
     solved = solve_request(asked)
-    content = pack(REQUEST, solved, 10**6)
-    assert content is not None
-    _, kept = unpack(content)
+    entry = Entry(str(tmp_path / "kept"), str(tmp_path / "part"), 10**6)
+    assert entry.write(REQUEST, solved)
+    _, kept = read_entry(entry.path)
     assert np.array_equal(vars(kept)["conditioning"], solved.conditioning)
 
 

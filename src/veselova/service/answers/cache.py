@@ -8,7 +8,6 @@ import logging
 import os
 import time
 import uuid
-from collections.abc import Mapping
 from pathlib import Path
 
 from veselova.service.answers.cache_entry import Entry
@@ -68,19 +67,6 @@ class Cache:
             f"{self._folder}/.{uuid.uuid4().hex}{_PART}",
             self._size,
         )
-
-    def write(self, contents: Mapping[str, bytes]) -> dict[str, int]:
-        """Write entries until one fails, and return the bytes of those that are
-        written, by name.
-        """
-        written: dict[str, int] = {}
-        try:
-            for name, content in contents.items():
-                if entry := self.entry(name):
-                    written[name] = entry.write_packed(content)
-        except OSError as error:
-            self._report(error)
-        return written
 
     def is_full(self, size: int) -> bool:
         """Count an entry of so many bytes, which was written; return whether room has

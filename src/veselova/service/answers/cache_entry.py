@@ -9,7 +9,7 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.request_models import TrajectoryRequest
 
-__all__ = ["DamagedEntry", "Entry", "pack", "read_entry", "unpack"]
+__all__ = ["DamagedEntry", "Entry", "read_entry"]
 
 Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 
@@ -56,15 +56,8 @@ class Entry:
         large; raises OSError.
         """
         arrays = _arrays(trajectory)
-        if _bytes(arrays) > self.most:
+        if sum(array.nbytes for array in arrays.values()) > self.most:
             return 0
-        return self._place(lambda stream: _write(stream, request, trajectory, arrays))
-
-    def write_packed(self, content: bytes) -> int:
-        """Keep what ``packed`` gave; returns and raises the same."""
-        return self._place(lambda stream: stream.write(content))
-
-    def _place(self, write: Callable[[BinaryIO], object]) -> int:
         part = Path(self.part)
         try:
             try:
@@ -73,7 +66,7 @@ class Entry:
                 part.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 stream = part.open("wb")
             with stream:
-                write(stream)
+                _write(stream, request, trajectory, arrays)
                 size = stream.tell()
             if size <= self.most:
                 part.replace(self.path)
@@ -84,20 +77,6 @@ class Entry:
             raise
         part.unlink(missing_ok=True)
         return 0
-
-
-def pack(request: Mapping[str, Any], trajectory: Trajectory, most: int) -> bytes | None:
-    """Return the content of the entry of a trajectory, None where it has more bytes than that."""
-    arrays = _arrays(trajectory)
-    if _bytes(arrays) > most:
-        return None
-    content = b"".join(_parts(request, trajectory, arrays))
-    content += _CHECKSUM.pack(zlib.crc32(content))
-    return content if len(content) <= most else None
-
-
-def _bytes(arrays: Arrays) -> int:
-    return sum(array.nbytes for array in arrays.values())
 
 
 def _arrays(trajectory: Trajectory) -> Arrays:
@@ -161,12 +140,12 @@ def read_entry(path: str) -> tuple[TrajectoryRequest, Trajectory]:
     """
     os.utime(path)
     try:
-        return unpack(Path(path).read_bytes())
+        return _unpack(Path(path).read_bytes())
     except (ValueError, KeyError, TypeError, VeselovaError) as error:
         raise DamagedEntry(f"{path}: {type(error).__name__}") from None
 
 
-def unpack(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
+def _unpack(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
     """Return what the content of an entry holds; raises ValueError, KeyError, TypeError or
     VeselovaError where it is damaged.
     """

@@ -27,7 +27,6 @@ from veselova.service.answers.rendering import (
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.answers.spool import Spool, SpooledResponse
-from veselova.service.answers.write_behind import WriteBehind
 from veselova.service.api.caller import caller_of
 from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS, Format, format_of
@@ -63,16 +62,14 @@ class Answers:
         self._reader = reader
         self._metrics = metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
-        self._write_behind = WriteBehind(self._cache)
         self._spool = Spool(settings.data_dir / "spool")
 
     @asynccontextmanager
     async def serving(self) -> AsyncIterator[None]:
-        """Keep the spool open, and write what is to be kept, for the life of the server."""
+        """Keep the spool open for the life of the server."""
         await to_thread.run_sync(self._spool.open)
         try:
-            async with self._write_behind.writing():
-                yield
+            yield
         finally:
             self._spool.close()
 
@@ -107,18 +104,17 @@ class Answers:
         await self._require_news(request, kept_as, entity_tag(name, form.name))
         wanted = Representation(form.name, _coding(request), self._place(asked.large))
         entry = self._cache.entry(kept_as)
-        content = self._write_behind.find(kept_as)
-        task = (
-            (render_kept, content, wanted)
-            if content
-            else (render_solution, asked.content, wanted, entry)
-        )
 
         async def work() -> Response:
             with self._metrics.work("trajectory", asked.system, asked.engine) as ending:
                 try:
                     rendering = await self._workers.run(
-                        *task, budget_s=asked.budget_s, caller=caller_of(request).name
+                        render_solution,
+                        asked.content,
+                        wanted,
+                        entry,
+                        budget_s=asked.budget_s,
+                        caller=caller_of(request).name,
                     )
                     ending.cached = rendering.cached
                 finally:
@@ -147,11 +143,9 @@ class Answers:
                 f"If-None-Match: required another entity than {tag}, which this request has.",
             )
 
-    async def _find(self, name: str) -> bytes | str | None:
-        """Return an entry that is kept: the content of one that is not written yet, the file of
-        another.
-        """
-        return self._write_behind.find(name) or await to_thread.run_sync(self._cache.find, name)
+    async def _find(self, name: str) -> str | None:
+        """Return the file of an entry that is kept."""
+        return await to_thread.run_sync(self._cache.find, name)
 
     async def _keep(self, name: str, rendering: Rendering) -> bool:
         """See to what the cache has to do with an answer, and return whether it can
@@ -163,8 +157,6 @@ class Answers:
             self._cache.report(rendering.not_stored)
         if rendering.stored and self._cache.is_full(rendering.stored):
             await to_thread.run_sync(self._cache.make_room)
-        if rendering.entry is not None:
-            return await self._write_behind.keep(name, rendering.entry)
         return rendering.cached or rendering.stored > 0
 
     async def get_kept(self, name: str, request: Request) -> Response:
@@ -196,7 +188,7 @@ class Answers:
         return await self._run_while_connected(request, work, wanted.place)
 
     async def _restore(
-        self, name: str, cached: bytes | str, wanted: Representation, caller: str
+        self, name: str, cached: str, wanted: Representation, caller: str
     ) -> Rendering | None:
         """Return a kept answer, or None where it is damaged or has just been removed."""
         try:
@@ -263,9 +255,9 @@ def _coding(request: Request) -> str:
     return negotiate_coding(_header(request, "accept-encoding"))
 
 
-def _bytes(cached: bytes | str) -> int:
+def _bytes(cached: str) -> int:
     try:
-        return len(cached) if isinstance(cached, bytes) else Path(cached).stat().st_size
+        return Path(cached).stat().st_size
     except OSError:
         return 0
 

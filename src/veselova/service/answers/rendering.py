@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.answers.cache_entry import DamagedEntry, Entry, pack, read_entry, unpack
+from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry
 from veselova.service.api.json_documents import write_document
 from veselova.service.api.media_types import FORMATS, Format, encode_stream
 from veselova.service.api.problem_details import Refused
@@ -25,9 +25,6 @@ __all__ = ["Rendering", "Representation", "render_answer", "render_kept", "rende
 
 #: Answers below this are not worth a content coding.
 _SMALL = 1000
-
-#: The largest entry that is sent to the server.
-_MOST_SENT = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -46,9 +43,8 @@ class Rendering:
     """An answer: its bytes, or None where they are in the file wanted; its coding and its
     provenance.
 
-    Of the cache: whether the answer came from it, the bytes of the entry that was written, or the
-    content of one that is yet to be, whether one was damaged, and why none could be read or
-    written.
+    Of the cache: whether the answer came from it, the bytes of the entry that was written, whether
+    one was damaged, and why none could be read or written.
     """
 
     body: bytes | None
@@ -56,7 +52,6 @@ class Rendering:
     provenance: str | None = None
     cached: bool = False
     stored: int = 0
-    entry: bytes | None = None
     damaged: bool = False
     not_stored: str | None = None
 
@@ -73,9 +68,6 @@ def render_answer(kind: str, request: bytes, wanted: Representation) -> Renderin
 def render_solution(request: bytes, wanted: Representation, entry: Entry | None) -> Rendering:
     """Return a trajectory: the one that is kept as an entry of the cache, or one that is computed,
     and kept if that can be.
-
-    A small entry is not written: it goes to the server, which does that when the answer has been
-    sent.
     """
     damaged = False
     failure = None
@@ -94,25 +86,19 @@ def render_solution(request: bytes, wanted: Representation, entry: Entry | None)
     trajectory = solve_request(asked)
     cached: dict[str, Any] = {"damaged": damaged, "not_stored": failure}
     if entry is not None and failure is None:
-        content = (
-            pack(stated, trajectory, min(entry.most, _MOST_SENT)) if wanted.place is None else None
-        )
         try:
-            cached |= {"entry": content} if content else {"stored": entry.write(stated, trajectory)}
+            cached["stored"] = entry.write(stated, trajectory)
         except OSError as error:
             cached["not_stored"] = error.strerror or str(error)
     return _write(asked, trajectory, wanted, **cached)
 
 
-def render_kept(cached: str | bytes, wanted: Representation) -> Rendering:
-    """Return a trajectory that was kept, in a file or as the content of one that is yet to be
-    written.
+def render_kept(path: str, wanted: Representation) -> Rendering:
+    """Return a trajectory that is kept in a file.
 
     Raises DamagedEntry where the file is not whole, OSError where it cannot be read.
     """
-    return _write(
-        *(read_entry(cached) if isinstance(cached, str) else unpack(cached)), wanted, cached=True
-    )
+    return _write(*read_entry(path), wanted, cached=True)
 
 
 def _write(

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from anyio import to_thread
+from filelock import FileLock
 from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
@@ -44,7 +45,7 @@ class Spool:
     def __init__(self, parent: Path) -> None:
         self._parent = parent
         self._folder: Path | None = None
-        self._lock: int | None = None
+        self._lock: FileLock | None = None
 
     def open(self) -> None:
         """Make the folder below its parent, or below the system's temporary folder where that
@@ -71,7 +72,7 @@ class Spool:
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
         if self._lock is not None:
-            os.close(self._lock)
+            self._lock.release()
 
     def place(self) -> str | None:
         """Return the path of a file to be, or None where no folder could be made."""
@@ -89,25 +90,18 @@ def _remove_orphans(parent: Path) -> None:
                 hasattr(os, "geteuid") and state.st_uid != os.geteuid()
             ):
                 continue
-            if time.time() - state.st_mtime > _NEW_S and (lock := _lock(folder)) is not None:
+            if time.time() - state.st_mtime > _NEW_S:
+                lock = _lock(folder)
                 shutil.rmtree(folder, ignore_errors=True)
-                os.close(lock)
+                lock.release()
 
 
-def _lock(folder: Path) -> int | None:
-    """Return a lock on a folder, which ends with this process; raises OSError where another has it.
-    None without locks.
+def _lock(folder: Path) -> FileLock:
+    """Return the lock of a folder, which ends with this process; raises Timeout, an OSError, where
+    another process has it.
     """
-    try:
-        import fcntl
-    except ImportError:  # not a POSIX system
-        return None
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(lock)
-        raise
+    lock = FileLock(folder / "lock", timeout=0, thread_local=False)
+    lock.acquire()
     return lock
 
 
