@@ -371,7 +371,7 @@ PRIVATE = """
 """
 
 #: Names that a contract fixes: a field of closed-form documents; an alias of ``time_map``.
-CONTRACTS = {"closed_form_schema.py": {"waves"}, "solve.py": {"clock"}}
+CONTRACTS = {"closed_form_checks.py": {"waves"}, "solve.py": {"clock"}}
 
 
 def test_no_name_is_a_private_word() -> None:
