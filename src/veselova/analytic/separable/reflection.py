@@ -96,6 +96,19 @@ class ReflectedAbelJacobi(AbelJacobi[ReflectedPeriods]):
             for series, integral in zip(periods.cut_series, periods.half_integrals, strict=True)
         )
 
+    @cached_property
+    def rounding(self) -> Array:
+        """Return the rounding of each phase over ε, (g,): that of its largest swing, while one
+        coordinate turns.
+        """
+        return np.maximum(1.0, self.swings)
+
+    @cached_property
+    def swings(self) -> Array:
+        """Return by how many cycles each phase may swing while a coordinate turns, (g,)."""
+        sizes = sum(np.sum(np.abs(series[:, 1:]), axis=1) for series in self.periods.cut_series)
+        return np.asarray(np.abs(self.periods.inverse_cycles) @ sizes)
+
     def map(self, psi: Array) -> Array:
         """Return z for angles θ of shape (N, g); θ_s + 2π adds one to z_s."""
         result = np.zeros_like(psi)
