@@ -59,7 +59,8 @@ def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, 
     attracted = exact_attraction(problem)
     if attracted is not None:
         vectors = problem.frame[:, 1:] if isinstance(problem, vs.VeselovaSO3) else None
-        q, carried = true_motion_in_potential(*attracted, times, vectors, STEPS)
+        A, start, velocity, potential = attracted
+        q, carried = true_motion_in_potential(A, start, velocity, potential, times, vectors, STEPS)
         if vectors is None:
             return np.max(np.abs(found.q - q), axis=1), found.error
         frame = np.concatenate([q[:, :, None], carried], axis=2)

@@ -16,7 +16,6 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.separable.open_interval import OpenInterval
 from veselova.analytic.separable.orbit_stations import OrbitStations
-from veselova.analytic.separable.reflection import ReflectedAbelJacobi
 from veselova.mechanics.core.errors import InternalContradiction
 
 __all__ = ["Arrival", "CollisionOrbit"]
@@ -55,12 +54,11 @@ class CollisionOrbit:
 
     def __init__(self, motion: SeparableMotion) -> None:
         self.motion = motion
-        assert isinstance(motion.inversion, ReflectedAbelJacobi)
         self.inversion = motion.inversion
         self.rate = SeparatedRate(motion.inversion)
         self.origin = self.inversion.map(motion.angles[None, :])[0]
         self.rates = np.asarray(motion.periods.frequencies)
-        self._stations = self._lead() if np.max(self.inversion.swings) > _WIDE_SWING else None
+        self._stations = self._lead() if np.max(self.inversion.rounding) > _WIDE_SWING else None
         found = self._arrive(-1), self._arrive(1)
         before, after = (tau for tau, _, _ in found)
         self._half = (after - before) / 2

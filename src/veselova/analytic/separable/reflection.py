@@ -98,16 +98,11 @@ class ReflectedAbelJacobi(AbelJacobi[ReflectedPeriods]):
 
     @cached_property
     def rounding(self) -> Array:
-        """Return the rounding of each phase over ε, (g,): that of its largest swing, while one
-        coordinate turns.
+        """Return the rounding of each phase over ε, (g,): as many cycles as it may swing by while
+        one coordinate turns, or one.
         """
-        return np.maximum(1.0, self.swings)
-
-    @cached_property
-    def swings(self) -> Array:
-        """Return by how many cycles each phase may swing while a coordinate turns, (g,)."""
         sizes = sum(np.sum(np.abs(series[:, 1:]), axis=1) for series in self.periods.cut_series)
-        return np.asarray(np.abs(self.periods.inverse_cycles) @ sizes)
+        return np.asarray(np.maximum(1.0, np.abs(self.periods.inverse_cycles) @ sizes))
 
     def map(self, psi: Array) -> Array:
         """Return z for angles θ of shape (N, g); θ_s + 2π adds one to z_s."""
