@@ -238,7 +238,7 @@ class RealCurve:
         gaps = np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1)
         return a, np.cumsum(gaps, axis=1)
 
-    def angles(self, points: Sequence[Sequence[Fraction]], increasing: Array) -> Array:
+    def angles(self, points: Sequence[Sequence[Fraction]], increasing: NDArray[np.bool_]) -> Array:
         """Return the elliptic angles of points μ (N, g), one on each cut, negative on
         the way back.
         """
