@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -44,12 +45,15 @@ _BLOCK = 32
 
 #: Fields of a problem that are data, and the names of those in which a whole number is no
 #: measurement.
-_DATA = ("A", "q", "q_dot", "q_prime", "X", "X_dot", "inertia", "gamma", "Omega")
+_DATA = (
+    *("A", "q", "q_dot", "q_prime", "X", "X_dot", "inertia", "gamma", "Omega"),
+    *("mass", "radius", "position"),
+)
 
 
 def conditioning(trajectory: Trajectory) -> Array:
     """Return how far a bounded component may have moved by each time (N,) when all data move by
-    one rounding.
+    one rounding, masses and radii of balls among them.
 
     One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller. Where a
     text or a Decimal has more digits than a double, it is one unit of the last digit given. Whole
@@ -227,15 +231,23 @@ def _relative_roundings(given: Mapping[str, Any]) -> Iterator[Fraction]:
 
 
 def _flat(values: Any) -> list[Any]:
-    """Return the entries of a vector, or those of a symmetric matrix on and above its diagonal."""
+    """Return the entries of a vector, those of a symmetric matrix on and above its diagonal, or
+    the one of a number; none where there is no such datum.
+    """
+    if values is None:
+        return []
+    if isinstance(values, (str, Number, Decimal)):
+        return [values]
     rows = list(values)
     if rows and isinstance(rows[0], (list, tuple)):
         return [x for i, row in enumerate(rows) for x in row[i:]]
     return rows
 
 
-def _with_steps(values: Any, numbers: list[Fraction]) -> list[Any]:
-    """Return the vector, or the symmetric matrix, whose ``_flat`` entries these are."""
+def _with_steps(values: Any, numbers: list[Fraction]) -> Any:
+    """Return the vector, the symmetric matrix, or the number whose ``_flat`` entries these are."""
+    if not isinstance(values, (list, tuple)):
+        return numbers[0] if numbers else values
     size = len(values)
     entries = iter(numbers)
     if not isinstance(values[0], (list, tuple)):

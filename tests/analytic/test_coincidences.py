@@ -214,3 +214,17 @@ def test_next_to_a_separatrix_the_rounding_of_the_periods_is_in_the_error() -> N
     times = np.array([-3.0, 0.0, 0.1, 2.0])
     found, truth = vs.solve(problem, times), vs.solve(problem, times, digits=20)
     assert np.all(np.max(np.abs(found.frame - truth.frame), axis=(1, 2)) <= found.error)
+
+
+def test_natural_frames_are_exact_beside_a_constant_of_many_directions() -> None:
+    """Four and three equal A's: two constants coincide, and the other normals keep their digits."""
+    data = [
+        ["124/125", "123/125", "124/125", "123/125", "123/125", "123/125", "124/125"],
+        ["-527/1000", "-41/500", "-77/1000", "53/125", "-111/1000", "979/1000", "67/1000"],
+        ["-277/500", "-209/250", "-13/100", "-459/1000", "331/1000", "671/1000", "-149/250"],
+    ]
+    problem = vs.Veselova(*data, normalize=True)
+    exact = vs.solve(problem, [0.0], digits=30)
+    assert np.max(np.abs(problem.frame - exact.frame[0])) < 1e-15
+    found = vs.solve(problem, [0.0])
+    assert np.max(np.abs(found.frame - exact.frame)) <= found.error[0]

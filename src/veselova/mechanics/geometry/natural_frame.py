@@ -87,9 +87,9 @@ def refine(
 
     Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS
     bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
-    which squares the turn. A frame whose constants nearly coincide is returned as it is, and so is
-    one at rest or of high dimension. ``rate_squared`` is (dτ₁/d(time))² for the time of
-    ``tangent``, that of a Veselova problem where it is left out.
+    which squares the turn. Normals whose constants nearly coincide are not turned into each
+    other. A frame at rest or of high dimension is returned as it is. ``rate_squared`` is
+    (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem where it is left out.
     """
     if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
@@ -109,9 +109,10 @@ def refine(
         N = _product(N, 3 * one - _product(N.T, N)) >> 1
         H = _product(N.T, _product(M, N))
         distance = np.diag(H)[None, :] - np.diag(H)[:, None] + one
-        if np.min(np.abs(distance)) < 1 << (_BITS - _NEAREST):
-            return frame
-        turn = np.where(one != 0, 0, (H << _BITS) // distance)
+        close = np.abs(distance) < 1 << (_BITS - _NEAREST)
+        turn = np.where(
+            (one != 0) | close, 0, (H << _BITS) // np.where(close, 1 << _BITS, distance)
+        )
         largest_turn = np.max(np.abs(turn))
         if largest_turn > int(_LARGEST_TURN * 2**_BITS):
             return frame
