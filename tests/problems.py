@@ -13,13 +13,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from veselova import Veselova
+from veselova import ChaplyginBall, RubberBall, Veselova, VeselovaSO3
 
 REFERENCE = Path(__file__).parent / "reference" / "rank1.json"
 
@@ -272,6 +273,96 @@ TABLE: tuple[Case, ...] = (
         horizon=8,
     ),
     Case("at-rest", [3, 2, 1], [0.3, 0.5, 0.8], [0, 0, 0], _tags("at-rest")),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyCase:
+    """A row of the bodies with an area constant, as ``rubber-ball``, as ``chaplygin-ball``, and as
+    ``veselova-so3`` with I + ma², which turns as the first does.
+    """
+
+    name: str
+    inertia: Any
+    gamma: Sequence[Any]
+    Omega: Sequence[Any]
+    tags: frozenset[str] = _tags("generic")
+    horizon: float = 20.0
+    mass: Any = "0.7"
+    radius: Any = "0.8"
+
+    def problem(self, system: str) -> Any:
+        """Return the problem of a system, normalised."""
+        data = {"gamma": self.gamma, "Omega": self.Omega, "normalize": True}
+        if system != "veselova-so3":
+            kind = RubberBall if system == "rubber-ball" else ChaplyginBall
+            rest = {"mass": self.mass, "radius": self.radius, "position": ("1/2", -2)}
+            return kind(self.inertia, **rest, **data, strict=False)
+        added = Fraction(self.mass) * Fraction(self.radius) ** 2
+        rows = self.inertia
+        if isinstance(rows[0], list):
+            moved = [
+                [Fraction(x) + added * (i == j) for j, x in enumerate(row)]
+                for i, row in enumerate(rows)
+            ]
+        else:
+            moved = [Fraction(x) + added for x in rows]
+        return VeselovaSO3(moved, **data)
+
+    def times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return times up to the horizon."""
+        return self.horizon * np.array([0, 0.01, 0.1, 0.3, 1])
+
+
+#: 0.7·0.8² = 0.448 is ma². Where K is along γ, Ω is J⁻¹γ.
+_GENERIC = ["1", "1.4", "2"]
+_GAMMA = ["2/7", "3/7", "6/7"]
+_ALONG = [
+    str(Fraction(g) / (Fraction(x) + Fraction("0.448")))
+    for g, x in zip(_GAMMA, _GENERIC, strict=True)
+]
+
+BODIES: tuple[BodyCase, ...] = (
+    BodyCase("generic", _GENERIC, _GAMMA, ["0.3", "-0.7", "0.9"]),
+    BodyCase("other-side", _GENERIC, _GAMMA, ["1.3", "0.2", "-0.1"]),
+    BodyCase("fast", _GENERIC, _GAMMA, ["3e8", "-7e8", "9e8"], horizon=2e-8),
+    BodyCase("hardly-twists", _GENERIC, [0.6, 0, 0.8], ["0.8", 1, "-0.5999999"]),
+    BodyCase(
+        "matrix",
+        [[2, 0.3, 0], [0.3, 1.5, 0.1], [0, 0.1, 1.7]],
+        [0.6, 0, 0.8],
+        [1, 2, 0.5],
+        _tags("matrix"),
+    ),
+    BodyCase("symmetric", [1, 1, 1.5], _GAMMA, ["0.3", "-0.7", "0.9"], _tags("closed-cut")),
+    BodyCase("symmetric-two", [1, 1.5, 1.5], _GAMMA, ["0.3", "-0.7", "0.9"], _tags("closed-cut")),
+    BodyCase("isotropic", [1, 1, 1], _GAMMA, ["0.3", "-0.7", "0.9"], _tags("closed-cut")),
+    BodyCase("about-an-axis", _GENERIC, _GAMMA, [1, 0, 0], _tags("closed-cut")),
+    BodyCase("nearly-about-an-axis", _GENERIC, _GAMMA, [1, "1e-30", 0], _tags("near-degenerate")),
+    BodyCase("upright", _GENERIC, [0, 0, 1], ["0.3", "-0.7", "0.9"]),
+    BodyCase("steady", _GENERIC, [1, 0, 0], [1, 0, 0], _tags("closed-cut", "euler")),
+    BodyCase("momentum-upright", _GENERIC, _GAMMA, _ALONG, _tags("euler")),
+    BodyCase(
+        "symmetric-upright",
+        [1, 1, "1.5"],
+        _GAMMA,
+        [
+            str(Fraction(g) / x)
+            for g, x in zip(_GAMMA, map(Fraction, ("1.448", "1.448", "1.948")), strict=True)
+        ],
+        _tags("euler"),
+    ),
+    *(
+        BodyCase(
+            f"nearly-upright-{off}",
+            _GENERIC,
+            _GAMMA,
+            [str(Fraction(_ALONG[0]) + Fraction(off)), *_ALONG[1:]],
+            _tags("near-degenerate"),
+        )
+        for off in ("1e-3", "1e-9", "1e-25", "1e-40")
+    ),
+    BodyCase("at-rest", _GENERIC, _GAMMA, [0, 0, 0], _tags("at-rest")),
 )
 
 

@@ -17,9 +17,12 @@ _UP = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class RolledBall:
-    """frame (N, 3, 3) columns e_i in the body · position, velocity, force (N, 2)."""
+    """frame (N, 3, 3) columns e_i in the body · Omega (N, 3) there · position, velocity, force
+    (N, 2).
+    """
 
     frame: Any
+    Omega: Any
     position: Any
     velocity: Any
     force: Any
@@ -62,7 +65,8 @@ def roll(ball: Any, times: Sequence[float], twists: bool = False) -> RolledBall:
     ).y.T
     force = np.array([accelerations(y)[6:9] for y in found])
     frames = np.swapaxes(found[:, :9].reshape(-1, 3, 3), 1, 2)
-    return RolledBall(frames, found[:, 15:17], found[:, 13:15], force[:, 1:])
+    Omega = np.einsum("nij,nj->ni", frames, found[:, 9:12])
+    return RolledBall(frames, Omega, found[:, 15:17], found[:, 13:15], force[:, 1:])
 
 
 def _cross_matrix(u: Any) -> Any:

@@ -293,24 +293,6 @@ def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
     }
 
 
-def test_the_toolkit_loads_neither_the_service_nor_what_draws() -> None:
-    loaded = _loaded_by("from veselova import curves, theta")
-    assert {"veselova.curves", "veselova.theta"} <= loaded
-    assert not {name for name in loaded if name.startswith("veselova.service")}
-    assert not {name for name in loaded if name.startswith("veselova.numeric")}
-    assert not loaded & {
-        "fastapi",
-        "flint",
-        "httpx2",
-        "matplotlib",
-        "pydantic",
-        "sqlalchemy",
-        "starlette",
-        "typer",
-        "veselova.engines",
-    }
-
-
 @pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])
 def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
     statement = (
@@ -371,7 +353,7 @@ PRIVATE = """
 """
 
 #: Names that a contract fixes: a field of closed-form documents; an alias of ``time_map``.
-CONTRACTS = {"closed_form_checks.py": {"waves"}, "solve.py": {"clock"}}
+CONTRACTS = {"closed_form_schema.py": {"waves"}, "solve.py": {"clock"}}
 
 
 def test_no_name_is_a_private_word() -> None:

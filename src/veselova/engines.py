@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.results.closed_form import ClosedForm
     from veselova.mechanics.results.drift import Drift
     from veselova.mechanics.results.torus import Torus
+    from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
     from veselova.mechanics.systems.rubber_ball import RubberBall
     from veselova.mechanics.systems.veselova import Veselova
 
@@ -134,9 +135,9 @@ class Prepared:
 
     @cached_property
     def _solution(self) -> Solution:
-        from veselova.analytic.motion.torus_solution import Solution
+        from veselova.analytic.motion.area_solution import solution_of
 
-        return Solution(on_torus(self.problem))
+        return solution_of(on_torus(self.problem))
 
     @property
     def has_torus(self) -> bool:
@@ -278,7 +279,7 @@ def closed_form(
         return closed_form_of(problem, accuracy, digits)
 
 
-def drift(problem: RubberBall) -> Drift:
+def drift(problem: RubberBall | ChaplyginBall) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
     from veselova.analytic.motion.mean_drift import drift as drift_of
 

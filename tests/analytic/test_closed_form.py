@@ -198,52 +198,12 @@ def broken(**changes: Any) -> str:
         (broken(reduction={"basis": [[1, 0], [1, 0]], "waves": [0, 1]}), "document.reduction"),
         (broken(riemann_matrix=[[-1, 0], [0, 1]]), "document.riemann_matrix"),
         (broken(axes=[[1]]), "document.axes"),
-        (broken(digits=10**30), "document.digits"),
-        (broken(genus=-2), "document.genus"),
-        (broken(time="tau"), "document.time"),
-        (broken(time=None), "document.time"),
-        (broken(version=3), "document.version"),
-        (broken(mean_rate=0), "document.mean_rate"),
-        (broken(mean_rate="1e-400"), "document.mean_rate"),
-        (broken(riemann_matrix=[[1e300, 0], [0, 1]]), "document.riemann_matrix"),
-        (broken(riemann_matrix=[[1, 3], [-3, 1]]), "document.riemann_matrix"),
-        (broken(riemann_matrix=[[1e-9, 0], [0, 1e-9]]), "document.riemann_matrix"),
-        (broken(frequencies=[0, 0]), "m·frequencies"),
-        (broken(modes=[[1e300, 0]], coefficients=[1]), "document.modes[0]"),
-        (broken(modes=[["1", 0]], coefficients=[1]), "document.modes[0]"),
-        (broken(modes=[[True, 0]], coefficients=[1]), "document.modes[0]"),
-        (broken(modes=[[0, 0]], coefficients=[1]), "document.modes[0]"),
-        (broken(q=[[True, 1.0]] * 3), "document.q[0]"),
-        (broken(rate={"characteristic": 0, "constant": 0, "power": 1}), "document.rate.constant"),
-        (broken(rate={"characteristic": 0, "constant": 1, "power": "1"}), "document.rate.power"),
-        (broken(rate={"characteristic": 0, "constant": 1, "power": 10**9}), "document.rate.power"),
-        (broken(error={"at_start": -1, "per_unit_time": 0}), "document.error.at_start"),
-        (broken(reduction={"basis": [[1, 1e300], [0, 1]], "waves": []}), "document.reduction"),
-        (broken(reduction={"basis": [[1, 0], [0, 1]], "waves": [True]}), "document.reduction"),
-        (broken(A=[3, -2, 1]), "document.A[1]"),
     ],
 )
 def test_what_is_no_document_is_refused_in_one_sentence(text: str, named: str) -> None:
     with pytest.raises(vs.InvalidInput) as caught:
         vs.ClosedForm.from_json(text)
     assert named in str(caught.value)
-
-
-def test_a_document_is_text_or_bytes() -> None:
-    text = vs.closed_form(BODY3).to_json()
-    assert vs.ClosedForm.from_json(text.encode()).genus == 2
-    for given in (None, 3, {"format": "veselova.closed-form/1"}):
-        with pytest.raises(vs.InvalidInput, match="JSON text"):
-            vs.ClosedForm.from_json(given)  # type: ignore[arg-type]
-
-
-def test_a_sum_of_too_many_points_is_refused_before_it_is_formed() -> None:
-    document = json.loads(broken(riemann_matrix=[[2e-6, 0], [0, 2e-6]]))
-    with pytest.raises(vs.InvalidInput, match="points at most"):
-        vs.ClosedForm(document).at([1])
-    large = json.loads(broken(q=[[1, 1e308], [2, 1e308], [3, 1e308]]))
-    with pytest.raises(vs.InvalidInput, match="range of a double"):
-        vs.ClosedForm({**large, "directions": [[1e10] * 3] * 3}).at([1])
 
 
 def test_what_has_no_closed_form_is_refused_by_name() -> None:

@@ -24,6 +24,7 @@ DOUBLES = ([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6])
 DOCUMENT = {"system": "veselova-so3", "inertia": TEXTS[0], "gamma": TEXTS[1], "Omega": TEXTS[2]}
 
 #: Nothing to add to it, (3.5) with (Ω,γ) = 0; and what has no closed form.
+CLEBSCH = {"clebsch": 0.3}
 SERVED: list[dict[str, Any]] = [{}, {"clebsch": 0.3}, {"family": [0.1, 0.2, 0, 0, 0]}]
 USERS = {"polynomial": [{"coefficient": 0.1, "powers": [1, 0, 0]}]}
 
@@ -39,7 +40,7 @@ def test_the_closed_form_is_the_default_where_there_is_one(potential: dict[str, 
 
 @pytest.mark.parametrize(
     ("Omega", "potential", "reason"),
-    [([0.8, 1, -0.5], None, r"\(Ω,γ\) = 0, here 0.08"), (DOUBLES[2], USERS, "3.5")],
+    [([0.8, 1, -0.5], CLEBSCH, r"\(Ω,γ\) = 0, here 0.08"), (DOUBLES[2], USERS, "3.5")],
 )
 def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_name(
     Omega: Any, potential: Any, reason: str
@@ -195,7 +196,7 @@ def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
     assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
     torus = server.ask("POST", "/v1/tori", json={"problem": DOCUMENT}).json()
     assert torus["frequencies_t"] == vs.torus(VeselovaSO3(*TEXTS)).frequencies_t.tolist()
-    off = {**ask, "problem": {**DOCUMENT, "Omega": [0.8, 1, -0.5]}}
+    off = {**ask, "problem": {**DOCUMENT, "Omega": [0.8, 1, -0.5], "potential": CLEBSCH}}
     assert server.ask("POST", "/v1/trajectories", json=off).json()["engine"] == "numeric"
     refused = server.ask("POST", "/v1/trajectories", json={**off, "engine": "analytic"})
     assert (refused.status_code, "(Ω,γ) = 0" in refused.text) == (422, True)

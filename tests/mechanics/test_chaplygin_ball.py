@@ -35,7 +35,7 @@ def test_it_rolls_as_the_ball_itself_does(formulation: str, inertia: Any, seed: 
     gamma, Omega = np.random.default_rng(seed).normal(size=(2, 3))
     problem = ChaplyginBall(inertia, 0.7, 0.6, gamma, Omega, position=(1, -2), normalize=True)
     true = roll(problem, TIMES, twists=True)
-    found = vs.solve(problem, TIMES, formulation=formulation)
+    found = vs.solve(problem, TIMES, "numeric", formulation=formulation)
     assert found.provenance.engine == "numeric"
     for name in ("frame", "position", "velocity", "force"):
         assert np.max(np.abs(found.series(name) - getattr(true, name))) < 1e-10, name
@@ -43,6 +43,11 @@ def test_it_rolls_as_the_ball_itself_does(formulation: str, inertia: Any, seed: 
         off = np.abs(found.series(name) - getattr(true, name)).reshape(len(TIMES), -1)
         assert np.all(np.max(off, axis=1) <= found.error + 1e-11)
     assert max(found.drift.values()) < 1e-12
+
+
+def test_engine_analytic_has_its_motion_by_default() -> None:
+    found = vs.solve(ChaplyginBall(**DATA), [1.0])
+    assert (found.provenance.engine, found.provenance.method) == ("analytic", "theta")
 
 
 def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> None:
@@ -72,7 +77,11 @@ def test_the_service_answers_and_refuses_by_name(server: Server) -> None:
         bad = {**ask, "problem": {**document, **changes}}
         refused = server.ask("POST", "/v1/trajectories", json=bad)
         assert (refused.status_code, field in refused.text) == (422, True)
-    assert server.ask("POST", "/v1/tori", json={"problem": document}).status_code == 422
+    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
+    assert torus["frequencies_t"] == vs.torus(ChaplyginBall(**DATA)).frequencies_t.tolist()
+    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
+    digits = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30})
+    assert (digits.status_code, "chaplygin-ball" in digits.text) == (422, True)
 
 
 def test_a_ball_at_rest_stays() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.motion.area_motion import AreaBody, motion_with_area
+from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
 from veselova.analytic.motion.rank_one_so3 import motion_of_body
@@ -22,7 +25,9 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show, unknown_name
 from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -42,7 +47,7 @@ _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 
 
 def solve(
-    problem: TorusProblem | VeselovaSO3 | SeparableVeselova,
+    problem: TorusProblem | AreaBody | SeparableVeselova,
     times: Any,
     *,
     method: str | None = None,
@@ -68,6 +73,7 @@ def solve(
     ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about
     1e-14 at t of order 10².
     """
+    began = time.perf_counter()
     grid = TimeGrid.of(times, beyond_double(digits, certified))
     time_map = time_map or clock
     for field, value, names in (
@@ -76,6 +82,15 @@ def solve(
     ):
         if value is not None and value not in names:
             raise unknown_name((field,), value, names)
+    if isinstance(problem, ChaplyginBall) or (
+        isinstance(problem, VeselovaSO3) and problem.has_area_constant
+    ):
+        _require_doubles(problem, digits, certified)
+        if problem.moves:
+            on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+            return motion_with_area(problem, on_torus.evaluate(grid))
+        provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
+        return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
     if isinstance(problem, VeselovaSO3) and problem.has_torus:
         _require_exact_axes(problem, digits, certified)
         options: Any = {
@@ -104,6 +119,15 @@ def solve(
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
     return MotionInBalls(problem, digits, certified, method)(grid)
+
+
+def _require_doubles(problem: AreaBody, digits: int, certified: bool) -> None:
+    """Raise InvalidInput where more than doubles are asked for with an area constant."""
+    if beyond_double(digits, certified):
+        field, given = ("digits", str(digits)) if digits > FEWEST_DIGITS else ("certified", "true")
+        required = f"{FEWEST_DIGITS}, not certified, for system {problem.system}"
+        required += "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
+        raise InvalidInput((field,), required, given)
 
 
 def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
@@ -161,7 +185,7 @@ class _TorusMotion(Motion[TorusProblem]):
 
     @cached_property
     def _solution(self) -> Solution:
-        return self.known or Solution(self.problem)
+        return self.known or solution_of(self.problem)
 
     @cached_property
     def _rests(self) -> bool:
@@ -186,7 +210,7 @@ class _TorusMotion(Motion[TorusProblem]):
         if not self._solution.separatrices:
             return None
         neighbours = (
-            Evaluator(Solution(self.problem, sign * _DATA_ROUNDING), self._evaluator.method)
+            Evaluator(solution_of(self.problem, sign * _DATA_ROUNDING), self._evaluator.method)
             for sign in (1, -1)
         )
         evaluators = (self._evaluator, *neighbours)

@@ -27,6 +27,7 @@ from veselova.mechanics.results.closed_form import (
     ClosedForm,
     require_accuracy,
 )
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
@@ -67,6 +68,9 @@ def closed_form(
         required = f"{FEWEST_DIGITS} (the path of the contact point is in double precision)"
         raise InvalidInput(("digits",), required, str(digits))
     problem = on_torus(given)
+    if isinstance(problem, AreaVeselova):
+        reason = "a document has no area constant ((Ω,γ) ≠ 0, or a ball that twists); "
+        raise Unsolved("no-closed-form", reason + "solve at times instead")
     solution = Solution(problem)
     if solution.separatrices:
         reason = (
@@ -217,7 +221,7 @@ def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, An
             {
                 "modes": series.orders[selected].tolist(),
                 "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),
-                "turn": -0.25 if component.is_odd else 0,
+                "turn": component.turn,
             }
         )
     return {

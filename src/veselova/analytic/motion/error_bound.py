@@ -94,11 +94,16 @@ class ErrorBound:
             result = combine_bounds(result, local)
         return self._to_axes(result)
 
-    def of_path(self, plan: EvaluationPlan, samples: Samples, path: TransversePath) -> Array:
-        """Return the bound of y_2 … y_{n−1} at each time, (N,): |q'| ≤ 1 in these units."""
+    def of_path(
+        self, plan: EvaluationPlan, samples: Samples, path: TransversePath, bounds: Array
+    ) -> Array:
+        """Return the bound of the integrals of a path at each time, (N, K), from ``bounds`` (K,) of
+        what is integrated.
+        """
         rounding = _rate_rounding(plan)
         of_phases = path.error(samples.tau1, self._of_start, rounding * self._frequencies)
-        return self._moved(plan, samples).along_flow + of_phases + _EPSILON
+        along_flow = self._moved(plan, samples).along_flow
+        return np.asarray(along_flow[:, None] * bounds + of_phases + _EPSILON)
 
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.
@@ -152,7 +157,7 @@ class ErrorBound:
         # There the frame turns within a hundredth of the torus, which samples miss; on flat or
         # needle-like ellipsoids they say little of where the motion is.
         solution = self.solution
-        is_wide = solution.moving.rate_variation >= _WIDE
+        is_wide = solution.rate_variation >= _WIDE
         return solution.near_separatrix or not solution.is_even or is_wide
 
     @cached_property
@@ -204,7 +209,7 @@ def _slowness(solution: Solution, tau1: Array, in_angles: bool) -> Array | None:
     An error of t is one of τ₁ divided by the rate at that time, and time maps state theirs by the
     mean.
     """
-    if solution.moving.rate_variation < _WIDE:
+    if solution.rate_variation < _WIDE:
         return None
     rows = slice(None) if tau1.size <= _MANY else np.linspace(0, tau1.size - 1, _MANY).astype(int)
     rates = solution.rate_at(solution.in_tau1.phases(tau1[rows]), in_angles)

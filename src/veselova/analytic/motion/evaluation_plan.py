@@ -121,7 +121,7 @@ def _choose(solution: Solution, costs: Costs, inversions: int, given: str | None
     """Return ``fourier`` or ``panels``: the one given, else the cheaper one."""
     cycles = costs.cycles
     _require_known_phases(cycles)
-    if given is None and solution.moving.rate_variation > WIDEST_RATE:
+    if given is None and solution.rate_variation > WIDEST_RATE:
         given = "fourier" if cycles > PANEL_CYCLES else "panels"
     chosen = given or costs.cheaper_time_map(inversions, not solution.near_separatrix)
     if chosen == "panels" and cycles > PANEL_CYCLES:

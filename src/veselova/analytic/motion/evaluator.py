@@ -4,7 +4,6 @@ depend on times is kept.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,13 +12,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL
 from veselova.analytic.dense_output.output_array import Samples
+from veselova.analytic.motion.displacement import Displacement, displacement_of
 from veselova.analytic.motion.error_bound import ErrorBound
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.transverse_path import FourierPath, PanelPath, TransversePath
 from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
 __all__ = ["METHODS", "Evaluator"]
 
@@ -27,10 +26,6 @@ Array = NDArray[np.float64]
 
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
-
-
-#: Roundings of a displacement: of the speed, of its product with the time, and of those with ℜ.
-_ROUNDINGS = 6.0
 
 
 @dataclass(frozen=True)
@@ -80,42 +75,37 @@ class Evaluator:
 
         samples = plan.intervals.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
         error = self._bound.at(plan, samples, most_local) + samples.error
-        if path is None:
+        if path is None or self._displacement is None:
             return samples, error
-        across = self._bound.of_path(plan, samples, path) + samples.error
-        displacement = self._displacement(samples.series[-1], plan)
-        # the products with ℜ, and the speed along the momentum
-        rounding = _ROUNDINGS * np.finfo(float).eps * np.max(np.abs(displacement), axis=1)
-        error = np.maximum(error, math.sqrt(self.solution.curve.genus) * across + rounding)
-        return replace(samples, series=(*samples.series[:-1], displacement)), error
+        errors = self._bound.of_path(plan, samples, path, self._displacement.bounds)
+        errors += np.asarray(samples.error)[..., None]
+        found = self._displacement.at(plan.times, plan.remainders, samples.series[-1])
+        error = np.maximum(error, self._displacement.error(found, errors))
+        return replace(samples, series=(*samples.series[:-1], found)), error
 
     @property
     def rolls(self) -> bool:
         """Return whether the displacement of a ball stands after the other series."""
-        return isinstance(self.solution.problem, RollingVeselova)
+        return self._displacement is not None
+
+    @cached_property
+    def _displacement(self) -> Displacement | None:
+        return displacement_of(self.solution)
 
     def _path(self, time_map: str) -> TransversePath:
         """Return the path across the momentum: by Fourier series or on panels, as the time map."""
+        assert self._displacement is not None
         if time_map not in self._paths:
             self._paths[time_map] = (
-                FourierPath(self.solution)
+                FourierPath(self._displacement)
                 if time_map == "fourier"
-                else PanelPath(self.solution, self.method)
+                else PanelPath(self._displacement, self.method)
             )
         return self._paths[time_map]
 
     @cached_property
     def _paths(self) -> dict[str, TransversePath]:
         return {}
-
-    def _displacement(self, across: Array, plan: EvaluationPlan) -> Array:
-        """Return ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk, y_γ growing with the speed along the momentum."""
-        problem = self.solution.problem
-        assert isinstance(problem, RollingVeselova)
-        along = problem.speed * plan.times
-        if plan.remainders is not None:
-            along = along + problem.speed * plan.remainders
-        return np.concatenate([across, along[:, None]], axis=1) @ self.solution.rotation
 
     @cached_property
     def _bound(self) -> ErrorBound:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.curve.periods import Periods
+from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -25,7 +26,7 @@ def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
     Unsolved at rest.
     Digits: periods and T to about 1e-15 relative, tested for n = 2…8.
     """
-    solution = solution or Solution(problem)
+    solution = solution or solution_of(problem)
     curve = solution.curve
     moving = solution.moving
     root = solution.tau1_unit

@@ -1,17 +1,19 @@
-"""The mean velocity of a rolling ball: along its momentum always, across it in a resonance."""
+"""The mean velocity of a rolling ball: in one direction always, and more in a resonance."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.motion.area_motion import roll
+from veselova.analytic.motion.area_solution import AreaSolution, solution_of
+from veselova.analytic.motion.displacement import displacement_of
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier import find_modes
-from veselova.analytic.time_map.fourier_modes import Integers
-from veselova.analytic.time_map.torus_series import NormalComponent, find_series
+from veselova.analytic.time_map.fourier_modes import Integers, TorusSeries
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
 
 __all__ = ["drift"]
@@ -22,40 +24,51 @@ Array = NDArray[np.float64]
 _ROUNDINGS = 32.0
 
 
-def drift(ball: RubberBall) -> Drift:
+def drift(ball: RubberBall | ChaplyginBall) -> Drift:
     """Return the mean velocity of the contact point.
 
-    Along the momentum it is a·2h/|p|. Across it the modes with M·f = 0 move the ball, which are
-    averaged over the orbit. Raises Unsolved on a separatrix, and where (Ω,γ) ≠ 0.
+    The uniform part is a·2h/|p| along the momentum, or aμ1k_h along n with an area constant. The
+    modes with M·f = 0 of the other parts are averaged over the orbit. Raises Unsolved on a
+    separatrix.
     """
     if not ball.moves:
         return Drift(np.zeros(2))
-    if not ball.has_torus:
-        raise Unsolved("not-rank-one", ball.without_closed_form or "there is no torus")
-    problem = ball.on_torus()
-    assert isinstance(problem, RollingVeselova)
-    solution = Solution(problem)
+    solution = solution_of(ball.on_torus())
     if solution.separatrices:
         raise Unsolved("no-closed-form", "on a separatrix motions have no mean over all times")
-    f = solution.in_tau1.rates
-    start = solution.in_tau1.start
-    across = np.zeros(solution.curve.genus - 1)
-    resonance: tuple[int, ...] | None = None
-    for k in range(solution.curve.genus - 1):
-        series = find_series(NormalComponent.of(solution.frame, solution.inversion, k + 1))
-        resonant = _resonant(series.orders, f)
-        if resonant.any():
-            angles = np.pi * (series.orders[resonant] @ start + 2 * series.turns[resonant])
-            across[k] = 2 * series.coefficients[resonant] @ np.cos(angles)
-            first = series.orders[resonant][np.argmax(np.abs(series.coefficients[resonant]))]
-            resonance = tuple(int(x) for x in first)
+    displacement = displacement_of(solution)
+    assert displacement is not None
+    found = displacement.series
+    resonance = _resonance(found, solution)
+    means = np.array([_mean(series, solution) for series in found])
     rate = solution.mean_rate
     if resonance is not None:
         modes, coefficients, *_ = find_modes(solution.rate)
-        same = _resonant(modes, f)
-        rate += float(2 * coefficients[same] @ np.cos(2 * np.pi * (modes[same] @ start)))
-    y = np.append(across / rate, problem.speed)
-    return Drift(-float(ball.ball.radius) * (y @ solution.rotation), resonance)
+        same = _resonant(modes, solution.in_tau1.rates)
+        angles = 2 * np.pi * (modes[same] @ solution.in_tau1.start)
+        rate += float(2 * coefficients[same] @ np.cos(angles))
+        if isinstance(solution, AreaSolution) and solution.odd_peak:
+            rate += solution.odd_peak * _mean(solution.odd_series, solution)
+    moved = displacement.at(np.ones(1), None, means[None] / rate)
+    return Drift(roll(ball, solution.problem, moved)[0], resonance)
+
+
+def _resonance(found: list[TorusSeries], solution: Solution) -> tuple[int, ...] | None:
+    """Return the largest resonant order, doubled; None where none is resonant."""
+    resonance = None
+    for series in found:
+        same = _resonant(series.orders, solution.in_tau1.rates)
+        if same.any():
+            first = series.orders[same][np.argmax(np.abs(series.coefficients[same]))]
+            resonance = tuple(int(x) for x in first)
+    return resonance
+
+
+def _mean(series: TorusSeries, solution: Solution) -> float:
+    """Return the mean of a series along the orbit, per unit of τ₁: that of its resonant modes."""
+    same = _resonant(series.orders, solution.in_tau1.rates)
+    angles = np.pi * (series.orders[same] @ solution.in_tau1.start + 2 * series.turns[same])
+    return float(2 * series.coefficients[same] @ np.cos(angles))
 
 
 def _resonant(orders: Integers, f: Array) -> NDArray[np.bool_]:

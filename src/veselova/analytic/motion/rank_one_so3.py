@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.motion.area_motion import roll
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Decimals, Later, Pair
 from veselova.mechanics.results.trajectory import Trajectory
@@ -27,8 +28,8 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
     series = {"Omega": np.cross(point.series("q_dot"), frame[:, :, 0]), "frame": frame}
     error = point.error
     if isinstance(problem, RubberBall):
-        rolled = float(problem.ball.radius) * point.series("displacement")
-        series["position"] = problem.start["position"] - rolled
+        rolled = roll(problem, problem.on_torus(), point.series("displacement"))
+        series["position"] = problem.start["position"] + rolled
         lost = np.finfo(float).eps * np.max(np.abs(series["position"]), axis=1)
         error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)

@@ -26,7 +26,7 @@ from veselova.analytic.curve.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
-from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.cost_model import estimate_modes
 from veselova.analytic.time_map.fourier import FourierTimeMap
@@ -80,7 +80,7 @@ class Solution:
     def __init__(self, problem: TorusProblem, distance: Fraction | None = None) -> None:
         if not problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found, self.periods = resolve_periods(moving_part(problem), distance)
+        found, self.periods = resolve_periods(self._moving_part(problem, distance), distance)
         self.curve: Curve = self.periods.curve
         self.problem = problem
         self.moving = found.moving
@@ -93,6 +93,10 @@ class Solution:
         #: √(A that counts as 1): τ₁ in the problem's units is this times τ₁ here, where the largest
         #: I is 1.
         self.tau1_unit = math.sqrt(found.moving.unit)
+
+    def _moving_part(self, problem: TorusProblem, distance: Fraction | None) -> Moving:
+        """Return what moves of the problem."""
+        return moving_part(problem)
 
     @property
     def regime(self) -> str:
@@ -197,12 +201,7 @@ class Solution:
         """Return the Fourier time map, with guard digits or without; raises Unsolved
         (``beyond-floats``).
         """
-        if (variation := self.moving.rate_variation) > WIDEST_RATE:
-            raise Unsolved(
-                "beyond-floats",
-                f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier time map rounds it to 1e-16 "
-                "of its mean",
-            )
+        self.require_narrow_rate()
         if precise_flows not in self._fourier_time_maps:
             flows = (
                 self.precise_flows
@@ -211,6 +210,20 @@ class Solution:
             )
             self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows)
         return self._fourier_time_maps[precise_flows]
+
+    @cached_property
+    def rate_variation(self) -> float:
+        """Return by how much dt/dτ₁ may vary at most."""
+        return self.moving.rate_variation
+
+    def require_narrow_rate(self) -> None:
+        """Raise Unsolved (``beyond-floats``) where dt/dτ₁ varies too much for a Fourier map."""
+        if (variation := self.rate_variation) > WIDEST_RATE:
+            raise Unsolved(
+                "beyond-floats",
+                f"dt/dτ₁ may vary by {variation:.1e}, and a Fourier time map rounds it to 1e-16 "
+                "of its mean",
+            )
 
     @cached_property
     def _fourier_time_maps(self) -> dict[bool, FourierTimeMap]:

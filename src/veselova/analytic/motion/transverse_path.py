@@ -1,7 +1,5 @@
-"""The path of a rolling ball across its momentum, y_k = ∫(q',n_k)dτ₁, by Fourier series or on
+"""Integrals along one orbit that the path of a rolling ball is made of, by Fourier series or on
 panels, as its time map is.
-
-Along γ of the natural frame the motion is uniform. ``RollingVeselova`` says how both make the path.
 """
 
 from __future__ import annotations
@@ -11,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.displacement import Displacement
 from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
-from veselova.analytic.time_map.torus_series import NormalComponent, SeriesIntegral, find_series
+from veselova.analytic.time_map.torus_series import SeriesIntegral
 
 __all__ = ["FourierPath", "PanelPath", "TransversePath"]
 
@@ -25,26 +23,21 @@ _FARTHER = 1.25
 
 
 class TransversePath(Protocol):
-    """y_2 … y_{n−1} along one orbit."""
+    """The integrals y_1 … y_K of the functions of a ``Displacement`` along one orbit."""
 
     def at(self, tau1: Array, z: Array) -> Array:
-        """Return y at Neumann times (N,) with their phases (N, g), shape (N, g−1)."""
+        """Return y at Neumann times (N,) with their phases (N, g), shape (N, K)."""
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
-        """Return a bound on what the path adds to the error of the Neumann times, (N,)."""
+        """Return a bound on what the path adds to the error of the Neumann times, (N, K)."""
 
 
 class FourierPath:
-    """The path by the Fourier series of (q',n_k), at a cost that does not grow with time."""
+    """The path by Fourier series, at a cost that does not grow with time."""
 
-    def __init__(self, solution: Solution) -> None:
-        self._integrals = [
-            SeriesIntegral(
-                find_series(NormalComponent.of(solution.frame, solution.inversion, k)),
-                solution.in_tau1,
-            )
-            for k in range(1, solution.curve.genus)
-        ]
+    def __init__(self, displacement: Displacement) -> None:
+        flow = displacement.solution.in_tau1
+        self._integrals = [SeriesIntegral(series, flow) for series in displacement.series]
 
     def at(self, tau1: Array, z: Array) -> Array:
         """Return y at Neumann times with their phases."""
@@ -54,18 +47,19 @@ class FourierPath:
         return result
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> Array:
-        """Return the largest error of the series."""
-        result = np.zeros(tau1.size)
-        for integral in self._integrals:
-            np.maximum(result, integral.error(tau1, of_start, of_rates), out=result)
+        """Return the errors of the series."""
+        result = np.empty((tau1.size, len(self._integrals)))
+        for k, integral in enumerate(self._integrals):
+            result[:, k] = integral.error(tau1, of_start, of_rates)
         return result
 
 
 class PanelPath:
     """The path by Chebyshev panels along the orbit; they are extended when times ask for it."""
 
-    def __init__(self, solution: Solution, method: str) -> None:
-        self._solution = solution
+    def __init__(self, displacement: Displacement, method: str) -> None:
+        self._displacement = displacement
+        self._solution = displacement.solution
         self._method = method
         self._known: list[Panels] = []
 
@@ -79,19 +73,21 @@ class PanelPath:
             low, high = min(low, float(borders[0])), max(high, float(borders[-1]))
         self._known = [
             integrate_on_panels(
-                lambda z, k=k: self._solution.attitude(z, self._method).components[:, k],  # type: ignore[misc]
+                lambda z, k=k: self._displacement.integrands(  # type: ignore[misc]
+                    self._solution.attitude(z, self._method)
+                )[:, k],
                 self._solution.in_tau1,
                 _FARTHER * low,
                 _FARTHER * high,
                 1.0,
             )
-            for k in range(self._solution.curve.genus - 1)
+            for k in range(self._displacement.count)
         ]
         return self._known
 
     def at(self, tau1: Array, z: Array) -> Array:
         """Return y at Neumann times."""
-        result = np.empty((tau1.size, self._solution.curve.genus - 1))
+        result = np.empty((tau1.size, self._displacement.count))
         for k, panels in enumerate(self._panels(tau1)):
             result[:, k] = panels.at(tau1)
         return result
@@ -103,7 +99,7 @@ class PanelPath:
         slopes = self._solution.sensitivity.by_phase
         elapsed = np.abs(tau1)
         phases = float(of_start @ slopes) + float(of_rates @ slopes) * elapsed
-        result = np.zeros(tau1.size)
-        for panels in self._panels(tau1):
-            np.maximum(result, panels.error(tau1), out=result)
-        return np.asarray(result + phases * elapsed)
+        result = np.empty((tau1.size, self._displacement.count))
+        for k, panels in enumerate(self._panels(tau1)):
+            result[:, k] = panels.error(tau1) + phases * elapsed
+        return result

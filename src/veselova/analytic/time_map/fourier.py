@@ -24,7 +24,11 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.trigonometric_sums import waves_at
 from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor, increasing_root
-from veselova.analytic.time_map.fourier_modes import Integers, find_significant_modes
+from veselova.analytic.time_map.fourier_modes import (
+    Integers,
+    TorusSeries,
+    find_significant_modes,
+)
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TimeMap, TorusRate
 from veselova.mechanics.core.budget import checkpoint
@@ -74,23 +78,28 @@ _CONVERGED = 1e-9
 class FourierTimeMap(TimeMap):
     """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ −
     t/F_0 stays bounded.
+
+    odd: what is added to the rate, of period 2 in z and without mean; None for nothing
     """
 
     name: ClassVar[str] = "fourier"
 
     def __init__(
-        self, rate: TorusRate[Any], in_tau1: LinearFlow, in_time: LinearFlow, mean: float
+        self,
+        rate: TorusRate[Any],
+        in_tau1: LinearFlow,
+        in_time: LinearFlow,
+        mean: float,
+        odd: TorusSeries | None = None,
     ) -> None:
-        modes, coefficients, edge, self._off = find_modes(rate)
-        order = np.argsort(-np.abs(coefficients))
-        modes = modes[order]
-        coefficients = coefficients[order]
-        self._genus, self._mean, self._fastest = (
-            in_tau1.rates.size,
-            mean,
-            float(np.max(np.abs(in_tau1.rates))),
-        )
-        #: How far modes move τ₁ with each phase at the start, in a unit of time.
+        modes, coefficients, turns, edge, self._off = _all_modes(rate, mean, odd)
+        self._genus, self._mean = in_tau1.rates.size, mean
+        self._fastest = float(np.max(np.abs(in_tau1.rates)))
+        #: What phases here are multiplied with: with an odd part they are z/2, and modes doubled.
+        self._period = 1 if odd is None else 2
+        if odd is not None:
+            in_tau1, in_time = in_tau1.halved(), in_time.halved()
+        #: How far modes move τ₁ with each of these phases at the start, in a unit of time.
         self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
         at_edge = in_tau1.rates_of(edge)
         self._modes, slow = with_slow_phases(
@@ -109,7 +118,7 @@ class FourierTimeMap(TimeMap):
         amplitudes = 2 * coefficients / pace
         # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and
         # −sin(2πm·z⁰+2h) in turn, divided by k!: of sin h cos h and of sin²h.
-        offset = 2 * np.pi * (self._modes @ self._in_tau1.start)
+        offset = 2 * np.pi * (self._modes @ self._in_tau1.start + turns)
         cosine = np.cos(offset)
         sine = np.sin(offset)
         sizes = 2 * np.stack(
@@ -148,9 +157,8 @@ class FourierTimeMap(TimeMap):
     def periodic_part(self, means: Array) -> tuple[Array, Array]:
         """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
         advance = self._in_time.advance(means)
-        return np.asarray(self._sum.at(advance)[0]), (self._in_time.start + advance)[
-            :, : self._genus
-        ]
+        z = self._period * (self._in_time.start + advance)
+        return np.asarray(self._sum.at(advance)[0]), z[:, : self._genus]
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
         """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or
@@ -177,9 +185,8 @@ class FourierTimeMap(TimeMap):
         lengths = np.minimum(self._longest, elapsed)
         of_modes = self._off * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
         shifts = self._pull * lengths[: self.size, None]
-        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), np.sqrt(
-            (shifts * shifts).sum(axis=0)
-        )
+        sway = np.sqrt((shifts * shifts).sum(axis=0)) / self._period
+        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), sway
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
@@ -226,7 +233,7 @@ class FourierTimeMap(TimeMap):
         delta = increasing_root(
             excess, delta, -reach, reach, self._converged, _CONVERGED / self._fastest
         )
-        z = self._in_time.start + uniform + delta[:, None] * rates
+        z = self._period * (self._in_time.start + uniform + delta[:, None] * rates)
         return times / mean + delta, z[:, : self._genus]
 
 
@@ -277,6 +284,26 @@ class _Sum:
             np.matmul(half.reshape(2 * modes, half.shape[2]).T, self.weights, out=result[rows])
         result[:, 1:] += self.at_start
         return result.T
+
+
+def _all_modes(
+    rate: TorusRate[Any], mean: float, odd: TorusSeries | None
+) -> tuple[Integers, Array, Array, Integers, float]:
+    """Return the modes of dt/dτ₁, doubled where it has an odd part, largest first, their
+    coefficients and turns, the modes next to them, and by what part of F_0 each is off.
+    """
+    modes, coefficients, edge, off = find_modes(rate)
+    turns = np.zeros(len(modes))
+    if odd is not None:
+        modes, edge = (
+            np.concatenate([2 * even, other])
+            for even, other in ((modes, odd.orders), (edge, odd.edge))
+        )
+        coefficients = np.concatenate([coefficients, odd.coefficients])
+        turns = np.concatenate([turns, odd.turns])
+        off = max(off, odd.off / mean)
+    order = np.argsort(-np.abs(coefficients))
+    return modes[order], coefficients[order], turns[order], edge, off
 
 
 def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:

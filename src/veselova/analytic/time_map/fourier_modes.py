@@ -5,6 +5,7 @@ grown from zero.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,33 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Integers", "find_significant_modes"]
+__all__ = ["Integers", "TorusSeries", "find_significant_modes"]
 
+Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Modes looked at before giving up.
 _MOST_MODES = 1_000_000
+
+
+@dataclass(frozen=True)
+class TorusSeries:
+    """A function on the torus without mean, Σ 2c cos 2π(M·z/2 + turn) over one of each M and −M.
+
+    orders (K, g) the M · coefficients (K,) · turns (K,) in cycles, 0 or ¼ · edge: the M next to
+    those kept · off: what each coefficient is off by
+    """
+
+    orders: Integers
+    coefficients: Array
+    turns: Array
+    edge: Integers
+    off: float
+
+    def at(self, z: Array) -> Array:
+        """Return the function at phases (N, g)."""
+        angles = 2 * np.pi * (z @ self.orders.T / 2 + self.turns)
+        return np.asarray(np.cos(angles) @ (2 * self.coefficients))
 
 
 def find_significant_modes(

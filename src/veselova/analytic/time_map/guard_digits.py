@@ -4,6 +4,9 @@ than any other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +26,15 @@ _SPARE = 6
 
 
 def extended_precision_flows(
-    spectrum: Spectrum, origin: NDArray[np.float64], time: str
+    spectrum: Spectrum,
+    origin: NDArray[np.float64],
+    time: str,
+    direction: Sequence[Fraction] | None = None,
 ) -> tuple[LinearFlow, LinearFlow, float]:
     """Return z(τ₁) = z⁰ + fτ₁, the uniform part z⁰ + (f/F_0)t, and F_0, from z⁰ in double
     precision.
+
+    direction: du/dτ₁ for the nodal differentials, (g,); None for e_g
     """
     with balls(spectrum.arithmetic.digits, certified=False) as fine:
         exact = spectrum.in_arithmetic(fine)
@@ -34,8 +42,8 @@ def extended_precision_flows(
     with balls(GUARD_DIGITS + _SPARE, certified=False):
         periods = Periods(curve)
         mean = TimeRate.of(exact, AbelJacobi(periods), time).mean
-        of_tau1, of_time = (
-            LinearFlow.of(origin, rates)
-            for rates in (periods.frequencies, periods.frequencies / mean)
-        )
+        f = periods.frequencies
+        if direction is not None:
+            f = periods.inverse_cycles @ periods.arithmetic.array(list(direction))
+        of_tau1, of_time = (LinearFlow.of(origin, rates) for rates in (f, f / mean))
     return of_tau1, of_time, float(mean)

@@ -47,6 +47,10 @@ class LinearFlow:
         )
         return cls(start, leading, rests)
 
+    def halved(self) -> LinearFlow:
+        """Return the flow of z/2, to which modes that are half-integers are whole ones."""
+        return LinearFlow(self.start / 2, self.rates / 2, self.rests / 2)
+
     def with_combinations(self, orders: Integers) -> LinearFlow:
         """Return the flow of z and, after them, of the combinations m·z for integers m (K, g),
         whose rates keep all digits.

@@ -10,6 +10,7 @@ halved phases z/2.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +26,15 @@ from veselova.analytic.time_map.fourier import (
     ColumnsForModes,
     with_slow_phases,
 )
-from veselova.analytic.time_map.fourier_modes import Integers, find_significant_modes
+from veselova.analytic.time_map.fourier_modes import (
+    Integers,
+    TorusSeries,
+    find_significant_modes,
+)
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TorusRate
 
-__all__ = ["NormalComponent", "SeriesIntegral", "TorusSeries", "find_series"]
+__all__ = ["NormalComponent", "SeriesComponent", "SeriesIntegral", "find_series"]
 
 Array = NDArray[np.float64]
 
@@ -44,14 +49,48 @@ _BLOCK = 400_000
 
 
 @dataclass(frozen=True)
-class NormalComponent(TorusRate[Periods]):
-    """(q',n_k) = scale · Π_s φ_s(λ_s), φ_s = √|c_k−λ_s|, signed on the cut that c_k ends.
+class SeriesComponent(TorusRate[Periods]):
+    """A function on the torus whose Fourier coefficients are determinants, of period 2 in the phase
+    of one cut and without mean.
 
-    place  the number of the branch point c_k, at least 1
+    place  the number of the branch point, at least 1, that ends this cut
     """
 
     frame: Frame
     place: int
+
+    @property
+    def cut(self) -> int:
+        """Return the cut s = 0 … g−1 that the branch point ends."""
+        return int(self.frame.periods.curve.cut_of(self.place)) - 1
+
+    @property
+    def is_lower(self) -> bool:
+        """Return whether it is the lower end, where the signed root is odd in ψ_s."""
+        return self.place % 2 == 1
+
+    @property
+    @abstractmethod
+    def odd(self) -> NDArray[np.bool_]:
+        """Return which rows of which columns of the determinants are odd in ψ, (g, g)."""
+
+    @property
+    @abstractmethod
+    def turn(self) -> float:
+        """Return the phase of the series, in cycles."""
+
+    @property
+    def needed_nodes(self) -> tuple[int, ...]:
+        """Return those of the forms' own series: the factors are analytic in their strips."""
+        return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
+
+
+@dataclass(frozen=True)
+class NormalComponent(SeriesComponent):
+    """(q',n_k) = scale · Π_s φ_s(λ_s), φ_s = √|c_k−λ_s|, signed on the cut that c_k ends.
+
+    place  the number of the branch point c_k
+    """
 
     @classmethod
     def of(cls, frame: Frame, inversion: AbelJacobi[Periods], k: int) -> NormalComponent:
@@ -66,14 +105,15 @@ class NormalComponent(TorusRate[Periods]):
         return cls(inversion, scale, frame, found.place)
 
     @property
-    def cut(self) -> int:
-        """Return the cut s = 0 … g−1 that c_k ends."""
-        return int(self.frame.periods.curve.cut_of(self.place)) - 1
+    def odd(self) -> NDArray[np.bool_]:
+        """Return all rows of the cut that c_k ends, where that is its lower end."""
+        genus = self.inversion.periods.genus
+        return np.tile(self.is_lower & (np.arange(genus) == self.cut), (genus, 1))
 
     @property
-    def is_odd(self) -> bool:
-        """Return whether its factor on that cut is odd in ψ_s: c_k is the lower end."""
-        return self.place % 2 == 1
+    def turn(self) -> float:
+        """Return −¼ for an odd column, of −i sin: −i e^{ix} + c.c. is 2 cos(x − π/2)."""
+        return -0.25 if self.is_lower else 0.0
 
     def at(self, psi: Values) -> Values:
         """Return (q',n_k) at angles of shape (N, g)."""
@@ -86,11 +126,6 @@ class NormalComponent(TorusRate[Periods]):
         factors[self.cut] = own[self.place]
         return np.asarray(factors)
 
-    @property
-    def needed_nodes(self) -> tuple[int, ...]:
-        """Return those of the forms' own series: the factors are analytic in their strips."""
-        return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
-
     def _weight_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
@@ -99,30 +134,9 @@ class NormalComponent(TorusRate[Periods]):
         return np.asarray(sign * cut.forms(below, above) * self._factors(angles)[s])
 
 
-@dataclass(frozen=True)
-class TorusSeries:
-    """A function on the torus without mean, Σ 2c cos 2π(M·z/2 + turn) over one of each M and −M.
-
-    orders (K, g) the M · coefficients (K,) · turns (K,) in cycles, 0 or ¼ · edge: the M next to
-    those kept · off: what each coefficient is off by
-    """
-
-    orders: Integers
-    coefficients: Array
-    turns: Array
-    edge: Integers
-    off: float
-
-    def at(self, z: Array) -> Array:
-        """Return the function at phases (N, g)."""
-        angles = 2 * np.pi * (z @ self.orders.T / 2 + self.turns)
-        return np.asarray(np.cos(angles) @ (2 * self.coefficients))
-
-
-def find_series(component: NormalComponent) -> TorusSeries:
-    """Return the Fourier series of (q',n_k). Raises Unsolved where it has too many modes."""
+def find_series(component: SeriesComponent) -> TorusSeries:
+    """Return the Fourier series of a component. Raises Unsolved where it has too many modes."""
     genus = component.inversion.periods.genus
-    turn = 0.25 if component.is_odd else 0.0
 
     def made(weights: Array, G: Array, _: int) -> tuple[Array, Array, float, Array]:
         angles = np.pi * G.T  # of doubled modes
@@ -136,8 +150,12 @@ def find_series(component: NormalComponent) -> TorusSeries:
         stacks = []
         for s, (weights, angles, _, _) in enumerate(found):
             phases = orders @ angles
-            odd = component.is_odd and s == component.cut
-            stacks.append((np.sin(phases) if odd else np.cos(phases)) @ weights)
+            odd = component.odd[:, s]
+            sums = np.empty((len(orders), genus))
+            for rows, function in ((odd, np.sin), (~odd, np.cos)):
+                if rows.any():
+                    sums[:, rows] = function(phases) @ weights[:, rows]
+            stacks.append(sums)
         matrices = np.stack(stacks, axis=2)
         lengths = np.linalg.norm(matrices, axis=1)
         others = ~np.eye(len(found), dtype=bool)
@@ -146,7 +164,6 @@ def find_series(component: NormalComponent) -> TorusSeries:
             one * (1 + sizes @ wide) * lengths[:, others[s]].prod(axis=1)
             for s, (_, _, one, wide) in enumerate(found)
         )
-        # An odd column stands for −i sin, and −i e^{ix} + c.c. is 2 sin x = 2 cos(x − π/2).
         values = float(component.scale) * np.stack([np.linalg.det(matrices), off])
         return values.T, np.abs(values[0]) > np.maximum(_SMALLEST, np.abs(values[1]))
 
@@ -154,7 +171,7 @@ def find_series(component: NormalComponent) -> TorusSeries:
     origin[component.cut] = 1
     orders, values, edge = find_significant_modes(genus, determinants, origin=origin, stride=2)
     off = max(4 * _SMALLEST, float(np.max(np.abs(values[:, 1]), initial=0.0)) / 2)
-    return TorusSeries(orders, values[:, 0], np.full(len(orders), -turn), edge, off)
+    return TorusSeries(orders, values[:, 0], np.full(len(orders), component.turn), edge, off)
 
 
 class SeriesIntegral:
@@ -165,7 +182,7 @@ class SeriesIntegral:
     """
 
     def __init__(self, series: TorusSeries, in_tau1: LinearFlow) -> None:
-        halved = LinearFlow(in_tau1.start / 2, in_tau1.rates / 2, in_tau1.rests / 2)
+        halved = in_tau1.halved()
         genus = halved.rates.size
         self._start = halved.start
         self._fastest = float(np.max(np.abs(halved.rates)))

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_checks import require_document
 from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
-from veselova.mechanics.results.closed_form_schema import FORMAT, MOST_CLOSED_FORM_DIGITS
+from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
 __all__ = ["MOST_CLOSED_FORM_DIGITS", "ClosedForm", "ClosedFormStates", "require_accuracy"]
 
@@ -26,6 +25,9 @@ Array = NDArray[np.float64]
 
 #: The coarsest accuracy that may be asked for: above it nothing is left of the motion.
 _COARSEST = 1e-2
+
+#: Digits that a document may have: accuracies are doubles.
+MOST_CLOSED_FORM_DIGITS = 200
 
 
 def require_accuracy(accuracy: Any, digits: int = 15) -> float:
@@ -145,30 +147,16 @@ class ClosedForm:
         grid = TimeGrid.of(times, self.digits > FEWEST_DIGITS)
         error = self.document["error"]
         bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
-        try:
-            with np.errstate(all="ignore"):
-                series, decimals = self._evaluate(grid)
-            is_finite = all(np.all(np.isfinite(values)) for values in series.values())
-        except ArithmeticError:
-            is_finite = False
-        if not is_finite:
-            required = "numbers whose motion stays in the range of a double"
-            raise InvalidInput(("document",), required, "others")
-        return ClosedFormStates(grid.asked, bound, series, decimals)
-
-    def _evaluate(
-        self, grid: TimeGrid
-    ) -> tuple[dict[str, Array], dict[str, NDArray[np.object_]] | None]:
-        """Return the series at the times asked for, and their decimals where there are such."""
         if self.digits > FEWEST_DIGITS:
             decimals = self._evaluator.series([Fraction(time) for time in grid.exact])
             if grid.places is not None:
                 decimals = {name: values[grid.places] for name, values in decimals.items()}
-            return {name: values.astype(np.float64) for name, values in decimals.items()}, decimals
+            series = {name: values.astype(np.float64) for name, values in decimals.items()}
+            return ClosedFormStates(grid.asked, bound, series, decimals)
         series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
         if grid.places is not None:
             series = {name: values[grid.places] for name, values in series.items()}
-        return series, None
+        return ClosedFormStates(grid.asked, bound, series)
 
     @cached_property
     def _evaluator(self) -> DecimalEvaluator:
@@ -186,8 +174,6 @@ class ClosedForm:
         """Return the closed form of a JSON text; raises InvalidInput where it is none of this
         format.
         """
-        if not isinstance(text, (str, bytes, bytearray)):
-            raise InvalidInput(("document",), "JSON text", show(text))
         try:
             document = json.loads(text)
         except (ValueError, RecursionError) as fault:

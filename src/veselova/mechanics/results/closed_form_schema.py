@@ -1,16 +1,20 @@
-"""What a closed-form document must hold, as a JSON schema."""
+"""What a closed-form document must hold, as a JSON schema and as checks that say what
+is missing.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["CLOSED_FORM_FIELDS", "FORMAT", "MOST_CLOSED_FORM_DIGITS", "SCHEMA"]
+import numpy as np
+
+from veselova.mechanics.core.errors import InvalidInput, show
+
+__all__ = ["FORMAT", "SCHEMA", "require_document"]
 
 #: The name and version of the format; another number is another set of fields.
 FORMAT = "veselova.closed-form/1"
-
-#: Digits that a document may have: accuracies are doubles.
-MOST_CLOSED_FORM_DIGITS = 200
 
 _NUMBER: dict[str, Any] = {
     "oneOf": [
@@ -46,7 +50,7 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
     "time": ({"type": "string", "enum": ["t", "s", "tau1"]}, "the independent variable"),
     "digits": (
-        {"type": "integer", "minimum": 15, "maximum": MOST_CLOSED_FORM_DIGITS},
+        {"type": "integer", "minimum": 15},
         "significant digits of the numbers; above 15 they are strings",
     ),
     "genus": ({"type": "integer", "minimum": 1}, "g, the number of phases"),
@@ -154,5 +158,187 @@ SCHEMA: dict[str, Any] = {
     },
 }
 
-#: The fields that every document has.
-CLOSED_FORM_FIELDS = tuple(_FIELDS)
+
+def require_document(document: Any) -> None:
+    """Raise InvalidInput unless the value has every field of the format with numbers of the right
+    shapes.
+    """
+    if not isinstance(document, Mapping):
+        raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
+    if document.get("format") != FORMAT:
+        raise InvalidInput(("document", "format"), FORMAT, show(document.get("format")))
+    missing = [name for name in _FIELDS if name not in document]
+    if missing:
+        raise InvalidInput(
+            ("document",),
+            f"the fields {', '.join(missing)} too",
+            f"only {', '.join(map(str, document))}"[:200],
+        )
+    problem = document["problem"]
+    if not isinstance(problem, Mapping) or not isinstance(problem.get("system"), str):
+        raise InvalidInput(
+            ("document", "problem"), "an object with the field system", show(problem)
+        )
+    g = document["genus"]
+    if isinstance(g, bool) or not isinstance(g, int) or g < 1:
+        raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
+    if (
+        isinstance(document["digits"], bool)
+        or not isinstance(document["digits"], int)
+        or document["digits"] < 15
+    ):
+        raise InvalidInput(
+            ("document", "digits"), "a whole number of at least 15", show(document["digits"])
+        )
+    _require_shapes(document, g)
+
+
+def _require_shapes(document: Mapping[str, Any], g: int) -> None:
+    """Raise InvalidInput where an array has another shape than n, g and the number of modes say."""
+    n = _length(document, "A", None)
+    count = _length(document, "modes", None)
+    functions = _length(document, "characteristics", None)
+    shapes: dict[str, tuple[int, ...]] = {
+        "riemann_matrix": (g, g),
+        "phases": (g,),
+        "frequencies": (g,),
+        "rotation": (g, n - 1),
+        "directions": (n, g + 1),
+        "frozen": (n, n - 1),
+        "A": (n,),
+        "coefficients": (count,),
+        "characteristics": (functions, 2, g),
+        "modes": (count, g),
+    }
+    for name, shape in shapes.items():
+        _require_numbers((name,), document[name], shape)
+    _require_numbers(("mean_rate",), document["mean_rate"], ())
+    if document["axes"] is not None:
+        _require_numbers(("axes",), document["axes"], (n, n))
+    if "path" in document:
+        _require_path(document["path"], g, n)
+    least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
+    if not least > 0:
+        raise InvalidInput(
+            ("document", "riemann_matrix"),
+            "a positive definite matrix",
+            f"least eigenvalue {least:.3g}",
+        )
+    if document["reduction"] is not None:
+        _require_reduction(document["reduction"], g)
+    for name, length in (("q", g + 1), ("q_prime", g), ("gamma", g + 1)):
+        _require_pairs((name,), document[name], length, functions)
+    if _length(document, "normals", g - 1):
+        for k, column in enumerate(document["normals"]):
+            _require_pairs(("normals", k), column, g + 1, functions)
+    for name, keys in (
+        ("rate", ("characteristic", "constant", "power")),
+        ("error", ("at_start", "per_unit_time")),
+    ):
+        for key in keys:
+            inner = document[name]
+            _require_numbers(
+                (name, key), inner.get(key) if isinstance(inner, Mapping) else None, ()
+            )
+    place = document["rate"]["characteristic"]
+    if not isinstance(place, int) or not 0 <= place < functions:
+        raise InvalidInput(
+            ("document", "rate", "characteristic"), f"an index below {functions}", show(place)
+        )
+
+
+def _require_path(path: Any, g: int, n: int) -> None:
+    """Raise InvalidInput unless the path has numbers and g − 1 series."""
+    if not isinstance(path, Mapping) or not isinstance(path.get("transverse"), list):
+        raise InvalidInput(("document", "path"), "an object with a list of series", show(path))
+    for name in ("radius", "speed"):
+        _require_numbers(("path", name), path.get(name), ())
+    _require_numbers(("path", "position"), path.get("position"), (n - 1,))
+    if len(path["transverse"]) != g - 1:
+        required = f"a list of {g - 1} series"
+        raise InvalidInput(("document", "path", "transverse"), required, show(path["transverse"]))
+    for k, series in enumerate(path["transverse"]):
+        where = ("path", "transverse", k)
+        if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
+            raise InvalidInput(("document", *where), "an object with modes", show(series))
+        count = len(series["modes"])
+        _require_numbers((*where, "modes"), series["modes"], (count, g))
+        _require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
+        _require_numbers((*where, "turn"), series.get("turn"), ())
+
+
+def _require_reduction(reduction: Any, g: int) -> None:
+    """Raise InvalidInput unless the basis is a matrix of whole numbers of determinant ±1 and the
+    waves are some of its rows.
+    """
+    basis = reduction.get("basis") if isinstance(reduction, Mapping) else None
+    _require_numbers(("reduction", "basis"), basis, (g, g))
+    matrix = np.array(basis, dtype=float)
+    if np.any(matrix != np.rint(matrix)) or abs(abs(np.linalg.det(matrix)) - 1) > 1e-6:
+        raise InvalidInput(
+            ("document", "reduction", "basis"),
+            "whole numbers with determinant 1 or −1",
+            show(basis),
+        )
+    waves = reduction.get("waves")
+    if (
+        not isinstance(waves, list)
+        or not all(isinstance(i, int) and 0 <= i < g for i in waves)
+        or len(set(waves)) < len(waves)
+    ):
+        raise InvalidInput(
+            ("document", "reduction", "waves"),
+            f"different whole numbers from 0 to {g - 1}",
+            show(waves),
+        )
+
+
+def _length(document: Mapping[str, Any], name: str, wanted: int | None) -> int:
+    value = document[name]
+    if not isinstance(value, list) or (wanted is not None and len(value) != wanted):
+        raise InvalidInput(
+            ("document", name),
+            "a list" + (f" of length {wanted}" if wanted is not None else ""),
+            show(value),
+        )
+    return len(value)
+
+
+def _require_pairs(path: tuple[str | int, ...], value: Any, length: int, functions: int) -> None:
+    if not isinstance(value, list) or len(value) != length:
+        raise InvalidInput(
+            ("document", *path), f"a list of {length} pairs [index, constant]", show(value)
+        )
+    for i, pair in enumerate(value):
+        if (
+            not isinstance(pair, list)
+            or len(pair) != 2
+            or not isinstance(pair[0], int)
+            or not 0 <= pair[0] < functions
+        ):
+            raise InvalidInput(
+                ("document", *path, i), f"a pair [index below {functions}, constant]", show(pair)
+            )
+        _require_numbers((*path, i, 1), pair[1], ())
+
+
+def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, ...]) -> None:
+    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or
+    strings of them.
+    """
+    if shape:
+        if not isinstance(value, list) or len(value) != shape[0]:
+            raise InvalidInput(("document", *path), f"a list of length {shape[0]}", show(value))
+        for i, item in enumerate(value):
+            _require_numbers((*path, i), item, shape[1:])
+        return
+    try:
+        number = (
+            float(value)
+            if isinstance(value, (int, float, str)) and not isinstance(value, bool)
+            else float("nan")
+        )
+    except (ValueError, OverflowError):
+        number = float("nan")
+    if not abs(number) < float("inf"):
+        raise InvalidInput(("document", *path), "a finite number, or a string of one", show(value))

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ChaplyginFlow, RollingFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.systems.area_veselova import (
+    AreaData,
+    AreaVeselova,
+    RollingAreaVeselova,
+)
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["ChaplyginBall"]
 
@@ -29,14 +38,19 @@ class ChaplyginBall(RollingBall):
     ``velocity``, which is that of the centre, the horizontal ``force`` of the plane on the ball,
     and the momentum K about the contact point, which is fixed in space.
 
-    Integration alone serves it. Formulations: ``momentum``, Ω from the momentum in space, with the
-    quadrature of the contact point; ``contact-forces``, the ball with its forces as Lagrange
-    multipliers. Raises InvalidInput, which names the field.
+    Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with 15 digits.
+    Formulations: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
+    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises
+    InvalidInput, which names the field.
     """
 
     system: ClassVar[str] = "chaplygin-ball"
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
+    has_tori: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
     twists: ClassVar[bool] = True
+    #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
+    has_area_constant: ClassVar[bool] = True
     constrained: ClassVar[bool] = False
 
     @property
@@ -49,6 +63,33 @@ class ChaplyginBall(RollingBall):
     @property
     def _linear_name(self) -> str:
         return "(JΩ,γ)"
+
+    def on_torus(self) -> AreaVeselova:
+        """Return the problem on whose torus the motion runs, the same object every time. Raises
+        Unsolved (``at-rest``) for a ball at rest.
+        """
+        return self._with_area
+
+    @cached_property
+    def _with_area(self) -> AreaVeselova:
+        if not self.moves:
+            raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
+        gamma, Omega = self.to_axes()
+        inverse = tuple(1 / moment for moment in self.moments)
+        energy = float(self.integrals(self.start)["energy"][0])
+        return RollingAreaVeselova(AreaData(inverse, gamma, Omega, self.ball.added, energy))
+
+    def angular_velocity(self, frame: Array) -> Array:
+        """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
+        D(BK,γ)/(Bγ,Iγ).
+        """
+        K = frame @ (self.frame.T @ self.derive("momentum", self.start)[0])
+        gamma = frame[..., 0]
+        free = K @ self.inverse
+        across = gamma @ self.inverse
+        share = float(self.ball.added) * np.sum(free * gamma, axis=-1)
+        share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
+        return np.asarray(free + share[..., None] * across)
 
     def flow(self, formulation: str = "momentum") -> Flow:  # type: ignore[override]
         """Return the field in units of this problem."""

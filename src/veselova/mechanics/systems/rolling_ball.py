@@ -5,7 +5,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,9 @@ from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    from veselova.mechanics.results.drift import Drift
 
 __all__ = ["RollingBall"]
 
@@ -98,6 +103,15 @@ class RollingBall(RigidBody):
     def extent(self) -> float:
         """Return the length in which errors of frame and contact point together are measured."""
         return self.ball.size
+
+    @cached_property
+    def drift(self) -> Drift:
+        """Return the mean velocity of the contact point, its direction, and the resonance if there
+        is one. Raises Unsolved on a separatrix.
+        """
+        # By name, as engines are: what solves stands above systems.
+        found: Drift = import_module("veselova.engines").drift(self)
+        return found
 
     def contact_force_flow(self) -> ContactForceFlow:
         """Return the field of the ball with its contact forces, in units of this problem."""

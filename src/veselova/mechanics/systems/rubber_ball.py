@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.flows.ball_flow import RollingFlow
+from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3, multiplier
-
-if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
 
 __all__ = ["RubberBall"]
 
@@ -62,15 +58,7 @@ class RubberBall(RollingBall, VeselovaSO3):
     twists: ClassVar[bool] = False
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix, and where the motion has no closed form.
-        """
-        # By name, as engines are: what solves stands above systems.
-        found: Drift = import_module("veselova.engines").drift(self)
-        return found
+    area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
 
     def flow(self, formulation: str = "multiplier") -> Flow:  # type: ignore[override]
         """Return the field in units of this problem."""

@@ -16,7 +16,7 @@ from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.rigid_body_flow import momentum
+from veselova.mechanics.flows.rigid_body_flow import angular_velocity, momentum
 from veselova.mechanics.geometry.sphere import (
     INPUT_TOLERANCE,
     exact_cross,
@@ -24,6 +24,7 @@ from veselova.mechanics.geometry.sphere import (
     over_largest,
     unit,
 )
+from veselova.mechanics.systems.area_veselova import AreaData, AreaVeselova
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -61,9 +62,10 @@ class VeselovaSO3(RigidBody):
     ``multiplier``, (3.1) with (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after
     (4.2a).
 
-    Where (Ω,γ) = 0 engine ``analytic`` has the motion, and is the default: without a potential by
-    theta functions, that of the rank-one problem; with one of (3.5) (``clebsch``, ``family``) by
-    quadratures, method ``angles``. ``without_closed_form`` is the reason for every other problem.
+    Without a potential engine ``analytic`` has every motion, and is the default: where (Ω,γ) = 0
+    that of the rank-one problem, otherwise on the torus of ``AreaVeselova``, with 15 digits. With a
+    potential of (3.5) (``clebsch``, ``family``) and (Ω,γ) = 0 it has it by quadratures, method
+    ``angles``. ``without_closed_form`` is the reason for every other problem.
     """
 
     system: ClassVar[str] = "veselova-so3"
@@ -81,6 +83,8 @@ class VeselovaSO3(RigidBody):
     constrained: ClassVar[bool] = True
     #: What ``rank_one`` makes.
     rank_one_class: ClassVar[type[Veselova]] = Veselova
+    #: What ``on_torus`` makes where (Ω,γ) ≠ 0.
+    area_class: ClassVar[type[AreaVeselova]] = AreaVeselova
 
     def __init__(
         self,
@@ -93,15 +97,18 @@ class VeselovaSO3(RigidBody):
         normalize: bool = False,
     ) -> None:
         super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
-        if frame is None and self.has_torus:  # one start for both engines, and all digits of it
-            on_torus = self.on_torus()
-            self._set(frame=on_torus.to_body_axes(on_torus.frame[None])[0])
+        if frame is None and self.is_rank_one:  # one start for both engines, and all digits of it
+            point = self.on_torus()
+            self._set(frame=point.to_body_axes(point.frame[None])[0])
 
     @property
     def without_closed_form(self) -> str | None:
         """Return why the motion has no closed form; None where it has one."""
-        if self.linear != 0:
-            return f"the closed form has (Ω,γ) = 0, here {self.linear:.6g}; integrate numerically"
+        if self.linear != 0 and self.potential.terms:
+            return (
+                f"with a potential the closed form has (Ω,γ) = 0, here {self.linear:.6g}; "
+                "integrate numerically"
+            )
         if self.potential.terms and set(self.potential.given or ()) - {"clebsch", "family"}:
             return (
                 "the closed form has the potentials (3.5), no polynomial of a user's; integrate "
@@ -116,14 +123,40 @@ class VeselovaSO3(RigidBody):
 
     @property
     def has_torus(self) -> bool:
+        """Return whether V = 0: the motion is then on the torus of ``on_torus()``."""
+        return not self.potential.terms
+
+    @property
+    def has_area_constant(self) -> bool:
+        """Return whether V = 0 and (Ω,γ) = (𝔪,γ) ≠ 0."""
+        return self.has_torus and self.linear != 0
+
+    @property
+    def is_rank_one(self) -> bool:
         """Return whether V = 0 and (Ω,γ) = 0: the motion is then that of the rank-one problem."""
-        return not self.potential.terms and self.linear == 0
+        return self.has_torus and self.linear == 0
 
     def on_torus(self) -> Veselova:
-        """Return ``rank_one()``, the same object every time; an irrational |γ| to the digits that
-        doubles need.
+        """Return the problem on whose torus the motion runs, the same object every time:
+        ``rank_one()``, an irrational |γ| to the digits that doubles need, and where (Ω,γ) ≠ 0 the
+        ``AreaVeselova``.
         """
-        return self._near_rank_one
+        return self._near_rank_one if self.linear == 0 else self._with_area
+
+    @cached_property
+    def _with_area(self) -> AreaVeselova:
+        if self.potential.terms:
+            self._require_geodesic()
+        gamma, Omega = self.to_axes()
+        inverse = tuple(1 / moment for moment in self.moments)
+        energy = float(self.integrals(self.start)["energy"][0])
+        return self.area_class(AreaData(inverse, gamma, Omega, None, energy))
+
+    def angular_velocity(self, frame: Array) -> Array:
+        """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0."""
+        start = momentum(self.inertia, self.Omega, self.gamma, constrained=True)
+        m = frame @ (self.frame.T @ start)
+        return angular_velocity(self.inverse, m, frame[..., 0], constrained=True)
 
     @cached_property
     def _near_rank_one(self) -> Veselova:

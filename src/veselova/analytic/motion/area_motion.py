@@ -1,0 +1,68 @@
+"""The motion of a body with an area constant, from that on the torus of its rank-one problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
+
+__all__ = ["AreaBody", "motion_with_area", "roll"]
+
+Array = NDArray[np.float64]
+
+AreaBody = VeselovaSO3 | ChaplyginBall
+
+_EPSILON = float(np.finfo(float).eps)
+
+#: Roundings of the constant rotation between both frames, of its product with one, and of the
+#: principal axes.
+_ROUNDINGS = 8.0
+
+
+def motion_with_area(problem: AreaBody, point: Trajectory) -> Trajectory:
+    """Return the motion of the body whose ``AreaVeselova`` moves along a trajectory.
+
+    Its frame {v, ±u, ±n} turns as that of the body does: both differ by a constant rotation.
+    """
+    torus = point.problem
+    assert isinstance(torus, AreaVeselova)
+    axes = np.eye(3) if problem.axes is None else problem.axes
+    at_start = axes.T @ problem.frame
+    frame = axes @ point.series("frame") @ (torus.frame.T @ at_start)
+    # a row of errors times a column of unit length
+    error = np.sqrt(3) * point.error + _ROUNDINGS * _EPSILON
+    series = {"Omega": problem.angular_velocity(frame), "frame": frame}
+    if isinstance(problem, RollingBall):
+        rolled = roll(problem, torus, point.series("displacement"))
+        series["position"] = problem.start["position"] + rolled
+        lost = _ROUNDINGS * _EPSILON * np.max(np.abs(rolled), axis=1)
+        lost += _EPSILON * np.max(np.abs(series["position"]), axis=1)
+        error = problem.ball.size * error + lost
+    dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
+    return Trajectory(
+        problem, point.times, error, series, point.provenance, dense, None, point.remainders
+    )
+
+
+def roll(ball: RollingBall, torus: TorusProblem, displacement: Array) -> Array:
+    """Return x(t) − x(0) along e_2 and e_3, (N, 2), from the series of the problem on the torus."""
+    radius = float(ball.ball.radius)
+    if not isinstance(torus, AreaVeselova):
+        return -radius * displacement
+    axes = np.eye(3) if ball.axes is None else ball.axes
+    plane = np.stack([torus.normal, torus.horizontal]) @ (axes.T @ ball.frame[:, 1:])
+    return np.asarray(radius * displacement @ plane)
+
+
+def _motion_at(problem: AreaBody, dense: Callable[[Any], Trajectory], times: Any) -> Trajectory:
+    return motion_with_area(problem, dense(times))

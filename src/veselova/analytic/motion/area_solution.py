@@ -1,0 +1,219 @@
+"""The closed-form motion of a body with an area constant, on the torus of its rank-one problem.
+
+``AreaVeselova`` has the formulas. The curve, the phases at the start and the frame {v, u, n} are
+those of the rank-one problem. The direction of the flow and the time differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.attitude.sensitivity_sampling import sample_phases
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.time_map.cross_component import CrossComponent
+from veselova.analytic.time_map.fourier import FourierTimeMap
+from veselova.analytic.time_map.fourier_modes import TorusSeries
+from veselova.analytic.time_map.guard_digits import extended_precision_flows
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.torus_series import find_series
+from veselova.mechanics.core.exact_input import to_float
+from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+__all__ = ["AreaSolution", "solution_of"]
+
+Array = NDArray[np.float64]
+
+#: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, are those of extended
+#: precision.
+_CANCELLED = 8.0
+
+#: By how much more than at the sampled phases dt/dτ₁ may vary.
+_BETWEEN = 2.0
+
+
+class AreaSolution(Solution):
+    """The solution of an ``AreaVeselova`` problem: f = a⁻¹(−μ2, ς) for the forms dλ/2w, λdλ/2w,
+    dt/dτ₁ = dt'/dτ₁ (1 − tilt (u,A'v)/(v,A'v)).
+    """
+
+    problem: AreaVeselova
+
+    def __init__(self, problem: AreaVeselova, distance: Fraction | None = None) -> None:
+        super().__init__(problem, distance)
+        if not self.separatrices and self._joins(self.spectrum, problem):
+            self.separatrices = (self.moving.axes[1],)
+
+    def _moving_part(self, problem: TorusProblem, distance: Fraction | None) -> Moving:
+        """Return what moves, by ``distance`` off a separatrix that the digits of the data leave
+        open.
+        """
+        assert isinstance(problem, AreaVeselova)
+        moving = moving_part(problem)
+        if distance is None or moving.size < 3:
+            return moving
+        found = resolve_spectrum(moving, DOUBLE.digits)
+        joins = not found.separatrices and self._joins(found.spectrum, problem)
+        return moving.perturb(1, distance) if joins else moving
+
+    @staticmethod
+    def _joins(spectrum: Spectrum, problem: AreaVeselova) -> bool:
+        """Return whether c_2 is I_2, as far as the data tell."""
+        if len(spectrum.inverse) < 3:
+            return False
+        lowest, middle, highest = map(Fraction, spectrum.inverse)
+        distance = abs(Fraction(spectrum.constants[1]) - middle)
+        return distance < problem.told_apart * (highest - lowest)
+
+    @cached_property
+    def _direction(self) -> list[Fraction]:
+        """Return du/dτ₁ for the nodal differentials, exact but for the branch points.
+
+        Where one direction is frozen λ_2 stays at its I, and du = ς + μ2 I for what is left.
+        """
+        problem = self.problem
+        mu2 = problem.mu2 / self.moving.unit
+        if self.curve.genus == 1:
+            return [problem.sign + mu2 * self.moving.unit / self.moving.frozen[0]]
+        points = self.spectrum.branch_points
+        with self.spectrum.working():
+            node = Fraction((points[2][0] + points[3][0]) / 2)
+        return [-mu2, problem.sign + node * mu2]
+
+    @cached_property
+    def _flows(self) -> tuple[LinearFlow, LinearFlow]:
+        direction = to_float(self._direction)
+        inverse = self.periods.inverse_cycles
+        f = inverse @ direction
+        if np.any(np.abs(inverse) @ np.abs(direction) > _CANCELLED * np.abs(f)):
+            return self.precise_flows[:2]
+        return LinearFlow.of(self._origin, f), LinearFlow.of(self._origin, f / self.rate.mean)
+
+    @cached_property
+    def in_tau1(self) -> LinearFlow:
+        """Return z(τ₁) = z⁰ + fτ₁."""
+        return self._flows[0]
+
+    @cached_property
+    def in_time(self) -> LinearFlow:
+        """Return the uniform part z⁰ + Ωt, Ω = f/F_0."""
+        return self._flows[1]
+
+    @cached_property
+    def precise_flows(self) -> tuple[LinearFlow, LinearFlow, float]:
+        """Return both flows and F_0 with guard digits."""
+        return extended_precision_flows(
+            self.spectrum, self._origin, self.problem.time, self._direction
+        )
+
+    @cached_property
+    def side(self) -> float:
+        """Return the sign of u against n_2, 0 where no u moves."""
+        if self.curve.genus == 1:
+            return 0.0
+        n_2 = self.moving.directions @ self._sampling.start.normals[0][:, 0]
+        return float(np.sign(n_2 @ self.problem.u))
+
+    def _ratio(self, attitude: Attitude) -> Array:
+        """Return tilt (u,A'v)/(v,A'v), which is between −1 and 1."""
+        if self.curve.genus == 1:
+            return np.zeros(len(attitude.q))
+        excess = to_float([a - 1 for a in self.moving.A])
+        across = np.asarray((attitude.normals[:, :, 0] * attitude.q) @ excess)
+        along = (attitude.q * attitude.q) @ to_float(self.moving.A)
+        return np.asarray(self.side * self.problem.tilt * across / along)
+
+    def rate_at(self, z: Array, in_angles: bool) -> Array:
+        """Return dt/dτ₁ at phases z (N, g), inverted to angles or by theta functions."""
+        return self.rate_of(self.attitude(z, "angles" if in_angles else "theta"))
+
+    def rate_of(self, attitude: Attitude) -> Array:
+        """Return dt/dτ₁ at attitudes."""
+        return np.asarray((1 - self._ratio(attitude)) / self._rate_of_position(attitude.q))
+
+    def odd_rate_of(self, attitude: Attitude) -> Array:
+        """Return that part of dt/dτ₁ which changes sign with u."""
+        return np.asarray(-self._ratio(attitude) / self._rate_of_position(attitude.q))
+
+    def states(self, attitude: Attitude) -> tuple[Array, Array, Array]:
+        """Return dτ₁/dt, dq/dt and the frame along the problem's principal axes."""
+        rate, velocity, frame = super().states(attitude)
+        faster = 1 / (1 - self._ratio(attitude))
+        return rate * faster, velocity * faster[:, None], frame
+
+    @cached_property
+    def rate_variation(self) -> float:
+        """Return by how much dt/dτ₁ may vary, from its values at sampled phases."""
+        z = np.concatenate([sample_phases(self.curve.genus), self._origin[None, :]])
+        rates = self.rate_at(z, in_angles=not self.near_separatrix)
+        spread = _BETWEEN * float(np.max(rates) / np.min(rates))
+        return max(super().rate_variation, spread)
+
+    @cached_property
+    def _odd_at_half_periods(self) -> tuple[Array, Array]:
+        """Return the half periods in angles, (N, g), and the odd part of dt/dτ₁ there."""
+        psi = np.pi * np.asarray(self.frame.half_periods, dtype=np.float64)
+        return psi, self.odd_rate_of(self.frame.at(psi))
+
+    @cached_property
+    def odd_peak(self) -> float:
+        """Return the largest odd part of dt/dτ₁ at the half periods; zero where there is none."""
+        return float(np.max(np.abs(self._odd_at_half_periods[1])))
+
+    @cached_property
+    def odd_series(self) -> TorusSeries:
+        """Return the Fourier series of the odd part of dt/dτ₁ over ``odd_peak``, not zero."""
+        psi, values = self._odd_at_half_periods
+        best = int(np.argmax(np.abs(values)))
+        component = CrossComponent.of(self.frame, self.inversion)
+        scale = self._unit_of_odd_part(component) / self.odd_peak
+        series = find_series(replace(component, scale=scale))
+        if float(series.at(psi[best : best + 1] / (2 * np.pi))[0]) * values[best] < 0:
+            series = replace(series, coefficients=-series.coefficients)
+        return series
+
+    def _unit_of_odd_part(self, component: CrossComponent) -> float:
+        """Return what determinants of scaled rows are multiplied with: tilt dt'/dτ₁ over
+        √(c_2λ_1λ_2), and the sizes of the rows over det a.
+        """
+        curve = self.curve
+        psi = np.full((1, 2), np.pi / 2)
+        lower = np.array([curve.point(1), curve.point(3)], dtype=np.float64)
+        coordinates = lower + self.inversion.periods.roots_on_cuts(psi)[0][:, 0] ** 2
+        c_2 = float(curve.point(component.place))
+        unit = float(self.rate.at(psi)[0]) / np.sqrt(c_2 * np.prod(coordinates))
+        determinant = float(np.linalg.det(self.periods.cycles))
+        return float(abs(self.problem.tilt * unit * np.prod(component.row_sizes) / determinant))
+
+    def fourier_time_map(self, precise_flows: bool) -> FourierTimeMap:
+        """Return the Fourier time map, with guard digits or without."""
+        self.require_narrow_rate()
+        if precise_flows not in self._fourier_time_maps:
+            flows = (
+                self.precise_flows
+                if precise_flows
+                else (self.in_tau1, self.in_time, self.mean_rate)
+            )
+            odd = None
+            if peak := self.odd_peak:
+                series = self.odd_series
+                coefficients = peak * series.coefficients
+                odd = replace(series, coefficients=coefficients, off=peak * series.off)
+            self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows, odd)
+        return self._fourier_time_maps[precise_flows]
+
+
+def solution_of(problem: TorusProblem, distance: Fraction | None = None) -> Solution:
+    """Return the solution of a problem on a torus; ``distance`` as ``Solution`` takes it."""
+    if isinstance(problem, AreaVeselova):
+        return AreaSolution(problem, distance)
+    return Solution(problem, distance)

@@ -1,0 +1,205 @@
+"""Bodies with an area constant, (Ω,γ) = c or Chaplygin's ball: every engine, route and formulation
+through their table.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import veselova as vs
+from conftest import slow
+from problems import BODIES, BodyCase
+from rolling_truth import roll
+from veselova import InvalidInput, Unsolved
+from veselova.analytic.motion.area_solution import AreaSolution
+from veselova.analytic.solve import METHODS, solve
+
+SYSTEMS = ("veselova-so3", "rubber-ball", "chaplygin-ball")
+MOVING = [case for case in BODIES if "at-rest" not in case.tags]
+CASES = {case.name: case for case in BODIES}
+
+#: What the integration of the ball itself is off by, over lengths and radians of order 20.
+TRUTH = 1e-11
+
+
+def rows(cases: list[BodyCase], systems: tuple[str, ...] = SYSTEMS) -> list[Any]:
+    """Return the rows of a test of cases by systems."""
+    return [
+        pytest.param(case, system, id=f"{case.name}-{system}")
+        for case in cases
+        for system in systems
+    ]
+
+
+@cache
+def truth(case: BodyCase, twists: bool) -> Any:
+    """Return the motion of the ball itself, along the body axes."""
+    problem = case.problem("chaplygin-ball" if twists else "rubber-ball")
+    return roll(problem, case.times(), twists)
+
+
+def largest(values: Any) -> float:
+    return float(np.max(np.abs(values)))
+
+
+@pytest.mark.parametrize(("case", "system"), rows(MOVING))
+def test_true_errors_never_exceed_reported_ones(case: BodyCase, system: str) -> None:
+    problem = case.problem(system)
+    true = truth(case, system == "chaplygin-ball")
+    # e_2 and e_3 of the natural frame are those of its own problem
+    turn = true.frame[0].T @ problem.frame
+    found = vs.solve(problem, case.times())
+    assert found.provenance.engine == "analytic"
+    off = np.max(np.abs(found.frame - true.frame @ turn), axis=(1, 2))
+    if system != "veselova-so3":
+        off = np.maximum(off, np.max(np.abs(found.position - true.position), axis=1))
+    assert np.all(off <= found.error + TRUTH)
+    assert np.max(found.error) < 5e-10
+    assert largest(found.Omega - true.Omega) < 1e-10 * largest(problem.Omega)
+    hardly = 1e-8 if case.name == "hardly-twists" else 0.0  # relative to (Ω,γ) = 8e-8
+    assert max(found.drift.values()) < 1e-11 + 2 * hardly
+
+
+@pytest.mark.parametrize("time_map", ["fourier", "panels"])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", ["generic", "other-side", "symmetric", "matrix"])
+def test_every_route_agrees(name: str, system: str, method: str, time_map: str) -> None:
+    problem = CASES[name].problem(system)
+    times = np.concatenate([[-7.0, 0.0], np.linspace(1, 40, 300)])
+    some, other = solve(problem, times, time_map=time_map, method=method), vs.solve(problem, times)
+    for series in problem.bounded:
+        off = np.abs(some.series(series) - other.series(series)).reshape(len(times), -1)
+        assert np.all(np.max(off, axis=1) <= some.error + other.error), series
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", ["generic", "about-an-axis", "momentum-upright"])
+def test_every_formulation_integrates_the_same_motion(name: str, system: str) -> None:
+    case = CASES[name]
+    problem = case.problem(system)
+    found = vs.solve(problem, case.times())
+    for formulation in problem.formulations:
+        other = vs.solve(problem, case.times(), "numeric", formulation=formulation)
+        for series in problem.bounded:
+            off = np.abs(found.series(series) - other.series(series)).reshape(5, -1)
+            assert np.all(np.max(off, axis=1) <= found.error + other.error), formulation
+
+
+@pytest.mark.parametrize("seed", [*range(6), *map(slow, range(6, 200))])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_random_bodies_are_served_honestly(seed: int, system: str) -> None:
+    rng = np.random.default_rng([35, seed])
+    gamma, Omega = rng.normal(size=(2, 3))
+    inertia = rng.uniform(0.5, 1.5, 3).tolist()
+    case = BodyCase(
+        "random", inertia, gamma, Omega, mass=rng.uniform(0.1, 2), radius=rng.uniform(0.2, 2)
+    )
+    problem = case.problem(system)
+    times = np.sort(rng.uniform(-30, 30, 6)) / np.linalg.norm(Omega)
+    comparison = vs.compare(problem, times)
+    assert comparison.agrees
+    assert np.max(comparison.analytic.error) < 1e-10
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_far_times_cost_no_more_and_keep_their_digits(system: str) -> None:
+    problem = CASES["generic"].problem(system)
+    found = vs.solve(problem, [1e9 - 20, 1e9])
+    speed = 1.0 if system == "veselova-so3" else max(1.0, problem.drift.speed)
+    assert np.all(found.error < 100 * np.finfo(float).eps * 1e9 * speed)
+    start = {name: found.series(name)[0] for name in ("gamma", "Omega", "frame")}
+    case = CASES["generic"]
+    later = BodyCase("later", case.inertia, start["gamma"], start["Omega"]).problem(system)
+    moved = vs.solve(later, [20.0])
+    turn = later.frame.T @ start["frame"]
+    assert largest(moved.frame[0] @ turn - found.frame[1]) < 1e-6
+
+
+@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
+def test_the_mean_velocity_is_that_of_a_long_run(system: str) -> None:
+    problem = CASES["generic"].problem(system)
+    found = vs.solve(problem, [1e7])
+    run = (found.position[0] - problem.start["position"][0]) / 1e7
+    assert largest(run - problem.drift.velocity) < 1e-6
+    momentum = found.integrals["space_momentum"][0]
+    assert abs(problem.drift.velocity @ momentum[1:]) < 1e-14 * np.linalg.norm(momentum)
+
+
+@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
+def test_upright_momentum_makes_no_way(system: str) -> None:
+    problem = CASES["momentum-upright"].problem(system)
+    assert problem.drift.speed < 1e-15
+    far = vs.solve(problem, [1e6])
+    assert largest(far.position - problem.start["position"]) < 10
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_odd_part_of_the_time_has_the_series_of_its_determinants(system: str) -> None:
+    solution = AreaSolution(CASES["generic"].problem(system).on_torus())
+    z = np.random.default_rng(1).uniform(0, 2, (20, 2))
+    by_series = solution.odd_peak * solution.odd_series.at(z)
+    by_frame = solution.odd_rate_of(solution.attitude(z, "angles"))
+    assert largest(by_frame) > 1e-3 * solution.odd_peak
+    assert largest(by_series - by_frame) < 1e-13 * solution.odd_peak
+
+
+def test_on_a_separatrix_errors_grow_with_the_motion() -> None:
+    """Euler's top on the separatrix of its middle axis: γ_1 = γ_3, B_1 − B_2 = B_2 − B_3."""
+    problem = vs.VeselovaSO3(["1/5", "1/4", "1/3"], ["2/3", "1/3", "2/3"], ["10/3", "4/3", 2])
+    times = np.array([0, 0.5, 1, 2, 4, 8, 12])
+    found, other = vs.solve(problem, times), vs.solve(problem, times, "numeric")
+    assert found.provenance.details["regime"] == "separatrix"
+    off = np.max(np.abs(found.frame - other.frame), axis=(1, 2))
+    assert np.all(off <= found.error + other.error)
+    assert found.error[-1] > 10 * found.error[1]
+
+
+@pytest.mark.parametrize("kind", [vs.VeselovaSO3, vs.ChaplyginBall])
+def test_beside_a_separatrix_the_motion_is_known(kind: Any) -> None:
+    """Ω turned until c'_2 = I'_2 to 1e-15."""
+    ball = {} if kind is vs.VeselovaSO3 else {"mass": 0.7, "radius": 0.8}
+
+    def at(angle: float) -> Any:
+        c, s = np.cos(angle), np.sin(angle)
+        Omega = [c + 0.3, 0.7 * s, 0.4 * s - 0.2]
+        return kind([1, 1.4, 2], gamma=[0.6, 0.48, 0.64], Omega=Omega, **ball)
+
+    def gap(angle: float) -> float:
+        spectrum = AreaSolution(at(angle).on_torus()).spectrum
+        return float(spectrum.constants[1] - spectrum.inverse[1])
+
+    angle = brentq(gap, 1.4, 1.7, xtol=1e-16, rtol=1e-15)
+    times = np.array([0, 1, 5, 20.0])
+    for off in (0, 1e-9, 1e-5):
+        problem = at(angle + off)
+        found, other = vs.solve(problem, times), vs.solve(problem, times, "numeric")
+        for series in problem.bounded:
+            difference = np.abs(found.series(series) - other.series(series)).reshape(4, -1)
+            assert np.all(np.max(difference, axis=1) <= found.error + other.error)
+        assert np.max(found.error) < 1e-9
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_a_body_at_rest_stays(system: str) -> None:
+    problem = CASES["at-rest"].problem(system)
+    found = vs.solve(problem, [5.0, -1e9])
+    assert np.array_equal(found.frame, np.stack([problem.frame] * 2))
+    with pytest.raises(Unsolved, match="at-rest"):
+        vs.torus(problem)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_what_is_not_served_is_refused_by_name(system: str) -> None:
+    problem = CASES["generic"].problem(system)
+    with pytest.raises(InvalidInput, match=f"digits: required 15, .*{system}"):
+        vs.solve(problem, [1.0], digits=30)
+    with pytest.raises(InvalidInput, match=f"certified: required 15, .*{system}"):
+        vs.solve(problem, [1.0], certified=True)
+    with pytest.raises(Unsolved, match="no-closed-form: a document has no area constant"):
+        vs.closed_form(problem)
