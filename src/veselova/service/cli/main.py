@@ -255,6 +255,25 @@ def sweep(
 
 
 @app.command()
+def explore(
+    file: Annotated[
+        str | None,
+        typer.Argument(metavar="FILE", help="JSON body of the HTTP request whose motion is shown"),
+    ] = None,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port of loopback; 0 takes a free one")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="open the page, or print its address")
+    ] = True,
+) -> None:
+    """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
+    from veselova.service.cli.explore import explore as run
+
+    run(None if file is None else _document(file), port, browser)
+
+
+@app.command()
 def bench(json: _Json = False) -> None:
     """Measure the closed form against its peers on this machine, and print a table that can be
     pasted.

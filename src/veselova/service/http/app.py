@@ -28,6 +28,7 @@ from veselova.service.api.private_folder import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.http.connections import report_exhaustion
+from veselova.service.http.explorer import add_explorer
 from veselova.service.http.hosts import Hosts, allowed_hosts
 from veselova.service.http.job_routes import job_router
 from veselova.service.http.job_service import JobService
@@ -101,6 +102,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     for part in routers:
         app.router.routes.extend(part.routes)
     add_documentation(app)
+    add_explorer(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
         app.add_exception_handler(
             kind,

@@ -1,0 +1,89 @@
+/**
+ * The contact point of a rolling ball: x(t) = x(0) − a ℜᵀ (y_2, …, y_g, speed·t) with
+ * y_k = Σ 2c/(π M·f) [sin 2π(M·z/2 + turn) − sin 2π(M·z⁰/2 + turn)]  (docs/balls.md).
+ *
+ * Where M·f is next to nothing the ball drifts across its strip; that mode is written as
+ * 2c cos(2π(M·z⁰/2 + turn) + h) sin(h)·2/(π M·f), h = π M·f τ₁/2.
+ */
+import { matrix, number, vector } from "./document.ts";
+import type { ClosedFormDocument } from "./document.ts";
+import type { DoubleDouble } from "./double_double.ts";
+import { dot } from "./linear_algebra.ts";
+
+/** Modes with |M·f| below this part of the largest frequency count as resonant. */
+const RESONANCE = 1e-9;
+
+interface Series {
+  modes: number[][];
+  amplitudes: number[];
+  turn: number;
+  resonant: { coefficient: number; frequency: number; angle: number }[];
+}
+
+export class ContactPath {
+  readonly #radius: number;
+  readonly #start: number[];
+  readonly #speed: number;
+  readonly #rotation: number[][];
+  readonly #series: Series[];
+  readonly #offsets: number[];
+
+  constructor(document: ClosedFormDocument) {
+    const path = document.path;
+    if (!path) throw new Error("The document has no contact path.");
+    const f = vector(document.frequencies);
+    this.#radius = number(path.radius);
+    this.#start = vector(path.position);
+    this.#speed = number(path.speed);
+    this.#rotation = matrix(document.rotation);
+    const z0 = vector(document.phases);
+    const least = RESONANCE * Math.max(...f.map(Math.abs));
+    this.#series = path.transverse.map(({ modes, coefficients, turn }) => {
+      const series: Series = { modes: [], amplitudes: [], turn, resonant: [] };
+      modes.forEach((m, k) => {
+        const frequency = dot(m, f);
+        const coefficient = 2 * number(coefficients[k]);
+        if (Math.abs(frequency) < least) {
+          const angle = 2 * Math.PI * (dot(m, z0) / 2 + turn);
+          series.resonant.push({ coefficient, frequency, angle });
+        } else {
+          series.modes.push(m);
+          series.amplitudes.push(coefficient / (Math.PI * frequency));
+        }
+      });
+      return series;
+    });
+    this.#offsets = this.#integrals(z0);
+  }
+
+  /** Return the contact point at phases z (modulo 2) and a time. */
+  at(z: ArrayLike<number>, tau: number, time: DoubleDouble): [number, number] {
+    const y = this.#integrals(z).map(
+      (value, k) => value - this.#offsets[k] + drift(this.#series[k], tau),
+    );
+    y.push(this.#speed * time[0]);
+    const [first, second] = this.#start.map((entry, j) => {
+      const turned = y.reduce((sum, value, k) => sum + this.#rotation[k][j] * value, 0);
+      return entry - this.#radius * turned;
+    });
+    return [first, second];
+  }
+
+  #integrals(z: ArrayLike<number>): number[] {
+    return this.#series.map(({ modes, amplitudes, turn }) =>
+      modes.reduce((sum, m, k) => {
+        const angle = 2 * Math.PI * (dot(m, z) / 2 + turn);
+        return sum + amplitudes[k] * Math.sin(angle);
+      }, 0),
+    );
+  }
+}
+
+/** Return what the resonant modes of a series add until τ₁. */
+function drift({ resonant }: Series, tau: number): number {
+  return resonant.reduce((sum, { coefficient, frequency, angle }) => {
+    const h = (Math.PI * frequency * tau) / 2;
+    const integral = Math.abs(h) < 1e-8 ? tau : Math.sin(h) / ((Math.PI * frequency) / 2);
+    return sum + coefficient * Math.cos(angle + h) * integral;
+  }, 0);
+}

@@ -1,0 +1,157 @@
+/** A motion at any time, from its closed-form document (docs/closed-form.md, "Evaluation"). */
+import type { DoubleDouble } from "./double_double.ts";
+import { parse } from "./double_double.ts";
+import { matrix, number, vector } from "./document.ts";
+import type { ClosedFormDocument, Pair } from "./document.ts";
+import { dot, product } from "./linear_algebra.ts";
+import { ContactPath } from "./contact_path.ts";
+import { directions, spheroconic } from "./spheroconic.ts";
+import { thetaFunctions } from "./theta.ts";
+import type { ThetaFunctions } from "./theta.ts";
+import { TimeMap } from "./time_map.ts";
+
+/** What the views show at one time. */
+export interface Sample {
+  t: number;
+  /** The frame [e_1 … e_n], row by row; e_1 = q. */
+  frame: Float64Array;
+  q: Float64Array;
+  /** dq/dt. */
+  velocity: Float64Array;
+  /** q' = dq/dτ₁; empty where τ₁ is not known. */
+  prime: Float64Array;
+  /** Ω in the body where n = 3, q̇×q on the constraint; empty elsewhere. */
+  Omega: Float64Array;
+  /** Phases in cycles modulo 2; empty where the motion has no torus. */
+  z: Float64Array;
+  lambda: Float64Array;
+  /** The sign of dλ_s/dt. */
+  directions: number[];
+  /** The contact point of a ball. */
+  position: [number, number] | null;
+}
+
+export interface Motion {
+  readonly n: number;
+  readonly genus: number;
+  /** I_i = 1/A_i of the directions that move, increasing. */
+  readonly moments: number[];
+  at(t: DoubleDouble | number): Sample;
+}
+
+export class ClosedFormMotion implements Motion {
+  readonly n: number;
+  readonly genus: number;
+  readonly moments: number[];
+  readonly document: ClosedFormDocument;
+  readonly #thetas: ThetaFunctions;
+  readonly #values: Float64Array;
+  readonly #timeMap: TimeMap;
+  readonly #directions: number[][];
+  readonly #rotation: number[][];
+  readonly #frozen: number[][];
+  readonly #order: number[];
+  readonly #path: ContactPath | null;
+
+  constructor(document: ClosedFormDocument) {
+    this.document = document;
+    this.genus = document.genus;
+    this.n = document.A.length;
+    this.#thetas = thetaFunctions(
+      matrix(document.riemann_matrix),
+      document.characteristics,
+      document.reduction,
+    );
+    this.#values = new Float64Array(this.#thetas.count);
+    this.#timeMap = new TimeMap(document);
+    // Both are along the principal axes, and the results along the axes that were given.
+    const given = (rows: number[][]) =>
+      document.axes ? product(matrix(document.axes), rows) : rows;
+    this.#directions = given(matrix(document.directions));
+    this.#rotation = matrix(document.rotation);
+    this.#frozen = given(matrix(document.frozen));
+    const moments = momentsOf(document);
+    this.#order = moments.map((_, i) => i).sort((i, j) => moments[i] - moments[j]);
+    this.moments = this.#order.map((i) => moments[i]);
+    this.#path = document.path ? new ContactPath(document) : null;
+  }
+
+  at(t: DoubleDouble | number): Sample {
+    const time = typeof t === "number" ? parse(t) : t;
+    const { z, tau } = this.#timeMap.phases(time);
+    return this.#atPhases(z, tau, time);
+  }
+
+  #atPhases(z: Float64Array, tau: number, time: DoubleDouble): Sample {
+    this.#thetas.evaluate(z, this.#values);
+    const x = this.#entries(this.document.q);
+    const normals = [...this.document.normals, this.document.gamma].map((column) =>
+      this.#entries(column),
+    );
+    const prime = this.#entries(this.document.q_prime);
+    const rate = this.#rate();
+    const xPrime = x.map((_, i) => prime.reduce((sum, p, k) => sum + p * normals[k][i], 0));
+    const xDot = xPrime.map((entry) => entry / rate);
+    const sorted = this.#order.map((i) => x[i]);
+    const lambda = spheroconic(sorted, this.moments, new Float64Array(this.genus));
+    const sortedDot = this.#order.map((i) => xDot[i]);
+    const q = Float64Array.from(this.#directions, (row) => dot(row, x));
+    const velocity = Float64Array.from(this.#directions, (row) => dot(row, xDot));
+    return {
+      t: time[0] + time[1],
+      frame: this.#frame(x, normals),
+      q,
+      velocity,
+      prime: Float64Array.from(this.#directions, (row) => dot(row, xPrime)),
+      Omega: this.n === 3 ? cross(velocity, q) : new Float64Array(0),
+      z,
+      lambda,
+      directions: directions(sorted, sortedDot, this.moments, lambda),
+      position: this.#path ? this.#path.at(z, tau, time) : null,
+    };
+  }
+
+  #entries(pairs: Pair[]): number[] {
+    return pairs.map(
+      ([place, constant]) => (number(constant) * this.#values[place]) / this.#values[0],
+    );
+  }
+
+  /** d(time)/dτ₁. */
+  #rate(): number {
+    const { characteristic, constant, power } = this.document.rate;
+    const quotient = Math.abs(this.#values[characteristic] / this.#values[0]);
+    return number(constant) * quotient ** power;
+  }
+
+  #frame(x: number[], normals: number[][]): Float64Array {
+    const n = this.n;
+    const frame = new Float64Array(n * n);
+    this.#directions.forEach((row, i) => {
+      frame[i * n] = dot(row, x);
+      const along = normals.map((column) => dot(row, column));
+      for (let j = 0; j + 1 < n; j++) {
+        let sum = this.#frozen[i][j];
+        for (let k = 0; k < along.length; k++) sum += along[k] * this.#rotation[k][j];
+        frame[i * n + j + 1] = sum;
+      }
+    });
+    return frame;
+  }
+}
+
+/** Return a×b. */
+export function cross(a: ArrayLike<number>, b: ArrayLike<number>): Float64Array {
+  return Float64Array.of(
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0],
+  );
+}
+
+/** Return I_j = 1/(D_j, A D_j) of the directions that move. */
+function momentsOf(document: ClosedFormDocument): number[] {
+  const A = vector(document.A);
+  const D = matrix(document.directions);
+  return D[0].map((_, j) => 1 / D.reduce((sum, row, i) => sum + A[i] * row[j] ** 2, 0));
+}

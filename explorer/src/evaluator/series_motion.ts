@@ -1,0 +1,131 @@
+/**
+ * A motion of which the service gives series: a system without theta functions, or n ≥ 5.
+ *
+ * Time is divided into stretches of equal length. A stretch that is missing is asked for, and the
+ * nearest known time is shown until it comes.
+ */
+import type { DoubleDouble } from "./double_double.ts";
+import { cross } from "./motion.ts";
+import type { Motion, Sample } from "./motion.ts";
+import { directions, spheroconic } from "./spheroconic.ts";
+
+/** The series of one stretch, as an answer of /v1/trajectories has them. */
+export interface Stretch {
+  times: number[];
+  series: Record<string, number[] | number[][] | number[][][]>;
+}
+
+export const STRETCH_LENGTH = 20;
+export const STRETCH_COUNT = 401;
+
+/** Stretches that are kept. */
+const MOST_STRETCHES = 24;
+
+const STEP = STRETCH_LENGTH / (STRETCH_COUNT - 1);
+
+export class SeriesMotion implements Motion {
+  readonly n: number;
+  readonly genus = 0;
+  readonly moments: number[];
+  readonly #order: number[];
+  readonly #stretches = new Map<number, Stretch>();
+  readonly #ask: (index: number) => void;
+
+  /** `A` are the inertia data whose spheroconic coordinates are shown; empty where there are none. */
+  constructor(first: Stretch, A: number[], ask: (index: number) => void) {
+    this.#ask = ask;
+    const I = A.map((entry) => 1 / entry);
+    this.#order = I.map((_, i) => i).sort((i, j) => I[i] - I[j]);
+    this.moments = this.#order.map((i) => I[i]);
+    this.add(0, first);
+    this.n = rowOf(first, 0).q.length;
+  }
+
+  /** Take the stretch that begins at index·STRETCH_LENGTH. */
+  add(index: number, stretch: Stretch): void {
+    this.#stretches.set(index, stretch);
+    while (this.#stretches.size > MOST_STRETCHES) {
+      const farthest = [...this.#stretches.keys()].reduce((a, b) =>
+        Math.abs(a - index) > Math.abs(b - index) ? a : b,
+      );
+      this.#stretches.delete(farthest);
+    }
+  }
+
+  has(t: number): boolean {
+    return this.#stretches.has(Math.floor(t / STRETCH_LENGTH));
+  }
+
+  at(time: DoubleDouble | number): Sample {
+    const t = typeof time === "number" ? time : time[0];
+    let index = Math.floor(t / STRETCH_LENGTH);
+    let place = (t - index * STRETCH_LENGTH) / STEP;
+    if (!this.#stretches.has(index)) {
+      this.#ask(index);
+      const nearest = [...this.#stretches.keys()].reduce((a, b) =>
+        Math.abs(a - index) < Math.abs(b - index) ? a : b,
+      );
+      place = nearest < index ? STRETCH_COUNT - 1 : 0;
+      index = nearest;
+    } else if (place > 0.6 * STRETCH_COUNT && !this.#stretches.has(index + 1)) {
+      this.#ask(index + 1);
+    }
+    return this.#sample(this.#stretches.get(index)!, place, t);
+  }
+
+  /** Return the sample at a place of a stretch, by cubic interpolation. */
+  #sample(stretch: Stretch, place: number, t: number): Sample {
+    const base = Math.min(Math.max(Math.floor(place) - 1, 0), STRETCH_COUNT - 4);
+    const weights = lagrange(place - base);
+    const slopes = lagrange(place - base + 1e-4).map((w, i) => (w - weights[i]) / (1e-4 * STEP));
+    const rows = [0, 1, 2, 3].map((k) => rowOf(stretch, base + k));
+    const mix = (name: keyof Row, w: number[]) =>
+      Float64Array.from(rows[0][name], (_, i) =>
+        w.reduce((sum, weight, k) => sum + weight * rows[k][name][i], 0),
+      );
+    const q = mix("q", weights);
+    const velocity = mix("q", slopes);
+    const position = mix("position", weights);
+    const Omega = mix("Omega", weights);
+    const lambda = new Float64Array(Math.max(0, this.moments.length - 1));
+    const sorted = this.#order.map((i) => q[i]);
+    if (lambda.length) spheroconic(sorted, this.moments, lambda);
+    const sortedDot = this.#order.map((i) => velocity[i]);
+    return {
+      t,
+      frame: mix("frame", weights),
+      q,
+      velocity,
+      prime: new Float64Array(0),
+      Omega: Omega.length || this.n !== 3 ? Omega : cross(velocity, q),
+      z: new Float64Array(0),
+      lambda,
+      directions: directions(sorted, sortedDot, this.moments, lambda),
+      position: position.length ? [position[0], position[1]] : null,
+    };
+  }
+}
+
+interface Row {
+  frame: number[];
+  q: number[];
+  position: number[];
+  Omega: number[];
+}
+
+/** Return the vectors of one time; e_1 is q where the system has a frame. */
+function rowOf({ series }: Stretch, k: number): Row {
+  const row = (name: string): number[] => [series[name]?.[k] ?? []].flat(2) as number[];
+  const frame = row("frame");
+  const n = Math.round(Math.sqrt(frame.length));
+  const first = frame.filter((_, i) => i % n === 0);
+  const q = n ? first : (["q", "gamma", "X"].map(row).find((values) => values.length) ?? []);
+  return { frame, q, position: row("position"), Omega: row("Omega") };
+}
+
+/** Return the weights of the cubic through places 0 … 3 at x. */
+function lagrange(x: number): number[] {
+  return [0, 1, 2, 3].map((i) =>
+    [0, 1, 2, 3].reduce((value, j) => (j === i ? value : (value * (x - j)) / (i - j)), 1),
+  );
+}

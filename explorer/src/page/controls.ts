@@ -1,0 +1,163 @@
+/** The data of the problem, by slider and by exact text, with the refusals of the server. */
+import { element } from "../views/view.ts";
+import type { Fault } from "./service.ts";
+import {
+  ANY_DIMENSION,
+  entriesOf,
+  isEditable,
+  keepHorizontal,
+  numberOf,
+  SYSTEMS,
+  withDimension,
+  withEntry,
+} from "./systems.ts";
+import type { Field, Problem } from "./systems.ts";
+
+export class Controls {
+  readonly #host: HTMLElement;
+  readonly #change: (problem: Problem) => void;
+  #problem: Problem = { system: "veselova" };
+  #shape = "";
+
+  constructor(host: HTMLElement, change: (problem: Problem) => void) {
+    this.#host = host;
+    this.#change = change;
+  }
+
+  /** Show a problem; inputs that stay keep the focus. */
+  show(problem: Problem): void {
+    this.#problem = problem;
+    const system = SYSTEMS[problem.system];
+    const fields = (system?.fields ?? []).filter((field) => isEditable(problem, field));
+    const counts = fields.map((field) => `${field.name}${entriesOf(problem, field).length}`);
+    const shape = `${problem.system} ${counts.join()}`;
+    if (shape !== this.#shape) {
+      this.#shape = shape;
+      this.#host.replaceChildren(...fields.map((field) => this.#fieldset(field)));
+      if (ANY_DIMENSION.has(problem.system)) this.#host.append(this.#dimension());
+      this.#host.append(this.#source());
+    }
+    for (const field of fields) {
+      entriesOf(problem, field).forEach((text, i) => this.#fill(field, i, text));
+    }
+    const area = this.#host.querySelector("textarea");
+    if (area && document.activeElement !== area) area.value = JSON.stringify(problem, null, 1);
+  }
+
+  #fieldset(field: Field): HTMLElement {
+    const set = element("fieldset");
+    const legend = element("legend", { title: field.text }, field.symbol);
+    set.append(legend, element("p", { class: "about" }, field.text));
+    entriesOf(this.#problem, field).forEach((_, i) => set.append(this.#entry(field, i)));
+    return set;
+  }
+
+  #entry(field: Field, i: number): HTMLElement {
+    const id = `${field.name}-${i}`;
+    const name = field.scalar ? field.symbol : `${field.symbol}${"₁₂₃₄₅₆₇₈₉"[i] ?? i + 1}`;
+    const row = element("div", { class: "entry" });
+    const slider = element("input", {
+      type: "range",
+      id: `slider-${id}`,
+      min: String(field.low),
+      max: String(field.high),
+      step: "0.01",
+      "aria-label": `${name}, slider`,
+    });
+    const text = element("input", {
+      type: "text",
+      id: `text-${id}`,
+      inputmode: "decimal",
+      autocomplete: "off",
+      spellcheck: "false",
+      "aria-label": `${name}, exact`,
+      "aria-describedby": `fault-${id}`,
+    });
+    slider.addEventListener("input", () => {
+      text.value = String(Number(slider.value));
+      this.#edit(field, i, text.value);
+    });
+    text.addEventListener("change", () => this.#edit(field, i, text.value.trim()));
+    const label = element("label", { for: `text-${id}` }, name);
+    row.append(label, slider, text, element("p", { class: "fault", id: `fault-${id}` }));
+    return row;
+  }
+
+  #edit(field: Field, i: number, text: string): void {
+    const edited = withEntry(this.#problem, field, i, text);
+    this.#change(keepHorizontal(this.#problem, edited, field, i));
+  }
+
+  #fill(field: Field, i: number, value: string): void {
+    const text = this.#host.querySelector<HTMLInputElement>(`#text-${field.name}-${i}`);
+    const slider = this.#host.querySelector<HTMLInputElement>(`#slider-${field.name}-${i}`);
+    if (text && document.activeElement !== text) text.value = value;
+    const number = numberOf(value);
+    if (slider && Number.isFinite(number)) {
+      if (number > Number(slider.max)) slider.max = String(number);
+      if (number < Number(slider.min)) slider.min = String(number);
+      slider.value = String(number);
+      slider.setAttribute("aria-valuetext", value);
+    }
+  }
+
+  #dimension(): HTMLElement {
+    const row = element("div", { class: "row" });
+    const make = (text: string, label: string, change: 1 | -1) => {
+      const button = element("button", { type: "button", "aria-label": label }, text);
+      button.addEventListener("click", () => {
+        const system = SYSTEMS[this.#problem.system];
+        const n = entriesOf(this.#problem, system.fields[0]).length + change;
+        if (n < 2 || n > 8) return;
+        this.#change(withDimension(this.#problem, system, change));
+      });
+      return button;
+    };
+    const name = element("span", { class: "dim" }, "dimension");
+    row.append(name, make("−", "one dimension fewer", -1), make("+", "one dimension more", 1));
+    return row;
+  }
+
+  /** The problem as JSON, for data without sliders. */
+  #source(): HTMLElement {
+    const details = element("details");
+    const area = element("textarea", {
+      rows: "9",
+      spellcheck: "false",
+      "aria-label": "the problem as JSON",
+      "aria-describedby": "fault-json",
+    });
+    const fault = element("p", { class: "fault", id: "fault-json" });
+    area.addEventListener("change", () => {
+      fault.textContent = "";
+      try {
+        const problem: unknown = JSON.parse(area.value);
+        if (!problem || typeof problem !== "object" || !("system" in problem)) {
+          throw new Error("required an object with the field system");
+        }
+        this.#change(problem as Problem);
+      } catch (error) {
+        fault.textContent = `problem: ${(error as Error).message}.`;
+      }
+    });
+    details.append(element("summary", {}, "Problem as JSON"), area, fault);
+    return details;
+  }
+
+  /** Show the faults at their fields; return the sentences that have none. */
+  mark(faults: Fault[]): string[] {
+    for (const one of this.#host.querySelectorAll(".fault")) one.textContent = "";
+    for (const one of this.#host.querySelectorAll("[aria-invalid]")) {
+      one.removeAttribute("aria-invalid");
+    }
+    return faults.flatMap(({ pointer, detail }) => {
+      const [, name, place] = /^\/problem\/([^/]+)(?:\/(\d+))?/.exec(pointer) ?? [];
+      const id = `${name}-${place ?? 0}`;
+      const fault = this.#host.querySelector(`[id="fault-${id}"]`);
+      if (!fault) return [detail];
+      fault.textContent = detail.replace(/^problem\./, "");
+      this.#host.querySelector(`[id="text-${id}"]`)?.setAttribute("aria-invalid", "true");
+      return [];
+    });
+  }
+}

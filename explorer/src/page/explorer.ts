@@ -1,0 +1,380 @@
+/** The page: its state, the motion that is loaded, and what happens at every picture. */
+import type { Choice } from "../views/constants_view.ts";
+import { startOf } from "../views/constants_view.ts";
+import { element } from "../views/view.ts";
+import type { Loaded } from "../views/view.ts";
+import { Controls } from "./controls.ts";
+import { button, elements } from "./elements.ts";
+import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
+import { Facts } from "./facts.ts";
+import { EVALUATION, typeset } from "./formulas.ts";
+import { Gallery } from "./gallery.ts";
+import { FAR, load, loadEngines, loadPrecise } from "./loader.ts";
+import { Player } from "./player.ts";
+import { Sampler } from "./sampler.ts";
+import { apiKey, Refusal, Unreachable } from "./service.ts";
+import { fragmentOf, PRESETS, stateOf } from "./state.ts";
+import type { State } from "./state.ts";
+import { SYSTEMS } from "./systems.ts";
+import type { Problem } from "./systems.ts";
+import { Trail } from "./trail.ts";
+
+/** Milliseconds of rest after which the engines of the server are compared. */
+const COMPARE_AFTER_MS = 900;
+
+/** Milliseconds of a picture beyond which fewer are drawn. */
+const SLOW_MS = 24;
+
+/** Milliseconds between looks for a server that has gone. */
+const RETRY_MS = 3000;
+
+export class Explorer {
+  readonly #player = new Player();
+  readonly #controls = new Controls(elements.fields, (problem) => this.#set(problem));
+  readonly #facts = new Facts(elements.facts);
+  readonly #gallery: Gallery;
+  #state: State = stateOf(location.hash);
+  #loaded: Loaded | null = null;
+  #sampler: Sampler | null = null;
+  #trail: Trail | null = null;
+  #loading = false;
+  #wanted: Problem | null = null;
+  #abort = new AbortController();
+  #compareTimer = 0;
+  #addressTimer = 0;
+  #asksPrecise = false;
+  #written = "";
+  #rest = 0;
+
+  constructor() {
+    this.#gallery = new Gallery(
+      elements.views,
+      (choice) => this.#start(choice),
+      (name) => {
+        this.#state.large = name;
+        this.#writeAddress();
+      },
+    );
+    this.#fillChoosers();
+    this.#listen();
+    this.#adopt(this.#state);
+    for (const tex of EVALUATION) {
+      const line = element("div");
+      elements.formulas.append(line);
+      void typeset(tex, line, true);
+    }
+    requestAnimationFrame((instant) => this.#picture(instant));
+  }
+
+  #fillChoosers(): void {
+    elements.preset.append(element("option", { value: "" }, "…"));
+    for (const { name, title } of PRESETS) {
+      elements.preset.append(element("option", { value: name }, title));
+    }
+    for (const [name, { title }] of Object.entries(SYSTEMS)) {
+      elements.system.append(element("option", { value: name }, title));
+    }
+  }
+
+  /** Take a state as a whole. */
+  #adopt(state: State): void {
+    this.#state = state;
+    const fault = this.#player.go(state.t);
+    elements.timeFault.textContent = fault ?? "";
+    this.#player.playing = state.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.#setSpeed(state.speed);
+    this.#showPlaying();
+    this.#gallery.enlarge(state.large);
+    this.#set(state.problem);
+  }
+
+  #listen(): void {
+    elements.preset.addEventListener("change", () => {
+      const preset = PRESETS.find(({ name }) => name === elements.preset.value);
+      if (!preset) return;
+      this.#player.go("0");
+      this.#setSpeed(preset.speed ?? 1);
+      this.#set(preset.problem);
+    });
+    elements.system.addEventListener("change", () => {
+      this.#player.go("0");
+      this.#set(SYSTEMS[elements.system.value].example);
+    });
+    elements.play.addEventListener("click", () => this.#toggle());
+    elements.time.addEventListener("change", () => this.#go(elements.time.value));
+    elements.speed.addEventListener("input", () => {
+      this.#setSpeed(10 ** Number(elements.speed.value));
+      this.#writeAddress();
+    });
+    for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
+      jump.addEventListener("click", () => this.#go(jump.dataset.time ?? "0"));
+    }
+    elements.keyForm.addEventListener("submit", (event) => {
+      event.preventDefault();
+      apiKey.set(elements.keyText.value);
+      this.#set(this.#state.problem);
+    });
+    elements.theme.addEventListener("click", () => this.#switchTheme());
+    document.addEventListener("keydown", (event) => this.#key(event));
+    window.addEventListener("hashchange", () => {
+      if (location.hash !== this.#written) this.#adopt(stateOf(location.hash));
+    });
+    this.#listenToExports();
+  }
+
+  #listenToExports(): void {
+    const texts: Record<string, () => string> = {
+      link: () => location.href,
+      python: () => pythonOf(this.#state.problem, this.#player.text()),
+      curl: () => curlOf(this.#state.problem, this.#player.text()),
+      json: () => jsonOf(this.#state.problem, this.#player.text()),
+    };
+    for (const [id, text] of Object.entries(texts)) {
+      button(id).addEventListener("click", () => {
+        this.#writeAddress(true);
+        void this.#copy(id, text());
+      });
+    }
+    button("csv").addEventListener("click", () => {
+      if (!this.#loaded) return;
+      save(tableOf(this.#loaded, this.#player.time[0]), "motion.csv", "text/csv");
+    });
+  }
+
+  async #copy(id: string, text: string): Promise<void> {
+    const made = button(id);
+    const title = made.textContent ?? "";
+    try {
+      await navigator.clipboard.writeText(text);
+      made.textContent = "Copied";
+    } catch {
+      // A page without the right to copy gives a file.
+      save(text, `veselova-${id}.txt`);
+      made.textContent = "Saved";
+    }
+    setTimeout(() => (made.textContent = title), 1200);
+  }
+
+  #key(event: KeyboardEvent): void {
+    const target = event.target as HTMLElement;
+    const typing = target.closest("input, select, textarea, button, summary");
+    if (event.key !== " " || typing) return;
+    event.preventDefault();
+    this.#toggle();
+  }
+
+  #toggle(): void {
+    this.#player.playing = !this.#player.playing;
+    elements.time.value = this.#player.text();
+    this.#showPlaying();
+    this.#writeAddress();
+  }
+
+  #showPlaying(): void {
+    elements.play.textContent = this.#player.playing ? "Pause" : "Play";
+  }
+
+  #go(text: string): void {
+    const fault = this.#player.go(text);
+    elements.timeFault.textContent = fault ?? "";
+    elements.time.toggleAttribute("aria-invalid", fault !== null);
+    if (!fault) this.#writeAddress();
+  }
+
+  #setSpeed(speed: number): void {
+    this.#player.speed = speed;
+    elements.speed.value = String(Math.log10(speed));
+    elements.speedText.textContent = `${speed < 100 ? speed.toPrecision(2) : speed.toFixed(0)} /s`;
+  }
+
+  #switchTheme(): void {
+    const light = document.documentElement.dataset.theme !== "light";
+    applyTheme(light);
+    if (this.#loaded) this.#show(this.#loaded);
+  }
+
+  /** Begin at constants and coordinates that were chosen on the map. */
+  #start(choice: Choice): void {
+    const loaded = this.#loaded;
+    if (!loaded || loaded.A.length !== loaded.motion.n) return;
+    const { motion, A, problem } = loaded;
+    const now = motion.at(this.#player.time);
+    const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
+    const signs = order.map((i) => (now.q[i] < 0 ? -1 : 1));
+    const { q, prime } = startOf(motion.moments, choice, signs);
+    const scale = Math.hypot(...now.velocity) / Math.hypot(...prime);
+    const place = (values: number[], factor = 1) =>
+      A.map((_, i) => String(Number((values[order.indexOf(i)] * factor).toPrecision(8))));
+    const [point, velocity] = [place(q), place(prime, scale)];
+    const changed = { ...problem, normalize: true };
+    if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
+    else if ("Omega" in problem) {
+      const [g, v] = [point.map(Number), velocity.map(Number)];
+      // Ω = q̇×q.
+      const Omega = [0, 1, 2].map((i) => {
+        const [j, k] = [(i + 1) % 3, (i + 2) % 3];
+        return String(Number((v[j] * g[k] - v[k] * g[j]).toPrecision(8)));
+      });
+      Object.assign(changed, { gamma: point, Omega });
+    } else {
+      elements.message.textContent = "A new start from the map needs a body or a ball.";
+      return;
+    }
+    delete (changed as Problem).frame;
+    this.#player.go("0");
+    this.#set(changed);
+  }
+
+  /** Take another problem: show it, and load its motion. */
+  #set(problem: Problem): void {
+    this.#state.problem = problem;
+    this.#controls.show(problem);
+    elements.system.value = problem.system in SYSTEMS ? problem.system : "";
+    const text = JSON.stringify(problem);
+    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    elements.preset.value = preset?.name ?? "";
+    elements.story.textContent = preset?.text ?? "A start of your own.";
+    this.#wanted = problem;
+    void this.#load();
+    this.#writeAddress();
+  }
+
+  /** Load the problem that is wanted; one at a time, the newest last. */
+  async #load(): Promise<void> {
+    if (this.#loading) return;
+    this.#loading = true;
+    while (this.#wanted) {
+      const problem = this.#wanted;
+      this.#wanted = null;
+      const abort = new AbortController();
+      const began = performance.now();
+      try {
+        const loaded = await load(problem, abort.signal);
+        this.#abort.abort();
+        this.#abort = abort;
+        this.#accept(loaded, performance.now() - began);
+      } catch (error) {
+        if (this.#refuse(error)) this.#wanted ??= problem;
+        if (error instanceof Unreachable) break;
+      }
+    }
+    this.#loading = false;
+  }
+
+  #accept(loaded: Loaded, milliseconds: number): void {
+    elements.banner.hidden = true;
+    elements.keyForm.hidden = true;
+    elements.message.textContent = "";
+    this.#controls.mark([]);
+    this.#show(loaded);
+    const origin = loaded.document
+      ? `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`
+      : "Series of the service, in stretches of time.";
+    elements.status.textContent = origin;
+    clearTimeout(this.#compareTimer);
+    this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
+  }
+
+  /** Show a refusal at its field; return whether to try again later. */
+  #refuse(error: unknown): boolean {
+    if (error instanceof Unreachable) {
+      elements.banner.textContent =
+        "The server does not answer. The motion goes on; changes wait until it is back.";
+      elements.banner.hidden = false;
+      setTimeout(() => void this.#load(), RETRY_MS);
+      return true;
+    }
+    if (error instanceof Refusal && error.status === 401) {
+      elements.keyForm.hidden = false;
+      elements.message.textContent = apiKey.get() ? error.message : "";
+      return false;
+    }
+    const sentence = error instanceof Error ? error.message : String(error);
+    const faults = error instanceof Refusal ? error.faults : [];
+    if (error instanceof Refusal && error.outcome === "at-rest") {
+      elements.message.textContent = "The body rests: its velocity is zero, so nothing moves.";
+      return false;
+    }
+    const rest = this.#controls.mark(faults);
+    elements.message.textContent = faults.length ? rest.join(" ") : sentence;
+    return false;
+  }
+
+  #show(loaded: Loaded): void {
+    this.#trail?.close();
+    this.#sampler?.close();
+    this.#loaded = loaded;
+    this.#asksPrecise = false;
+    elements.letter.textContent = loaded.time;
+    this.#gallery.build(loaded);
+    this.#facts.build(loaded);
+    this.#sampler = new Sampler(loaded.motion);
+    this.#trail = new Trail(this.#sampler, loaded.reach, loaded.motion.genus, (samples, anew) =>
+      this.#gallery.extend(samples, anew),
+    );
+  }
+
+  async #compare(loaded: Loaded): Promise<void> {
+    if (loaded !== this.#loaded || !loaded.document) return;
+    try {
+      const found = await loadEngines(loaded, this.#abort.signal);
+      if (loaded === this.#loaded) this.#gallery.compare(found);
+    } catch {
+      // The plot is left out; what the server refuses is said where the problem is changed.
+    }
+  }
+
+  /** Ask for more digits where the phases of the time need them. */
+  async #needDigits(loaded: Loaded): Promise<void> {
+    if (this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
+    this.#asksPrecise = true;
+    try {
+      const precise = await loadPrecise(loaded, this.#abort.signal);
+      if (!precise || loaded !== this.#loaded) return;
+      this.#show(precise);
+      this.#asksPrecise = true;
+      elements.status.textContent = "Far time: the phases are those of a document of 30 digits.";
+    } catch {
+      elements.status.textContent = "No document of more digits came for this far time.";
+    }
+  }
+
+  #picture(instant: number): void {
+    requestAnimationFrame((next) => this.#picture(next));
+    this.#player.advance(instant);
+    const loaded = this.#loaded;
+    // Where pictures take long, the thread is left to others for as long as the last one took.
+    if (!loaded || document.hidden || instant < this.#rest) return;
+    const sample = loaded.motion.at(this.#player.time);
+    this.#gallery.show(sample);
+    this.#facts.show(sample, loaded);
+    void this.#trail?.follow(this.#player.time[0]);
+    void this.#needDigits(loaded);
+    const text = this.#player.text();
+    if (document.activeElement !== elements.time) elements.time.value = text;
+    if (this.#player.playing !== (elements.play.textContent === "Pause")) this.#showPlaying();
+    const took = performance.now() - instant;
+    this.#rest = took > SLOW_MS ? performance.now() + took : 0;
+  }
+
+  /** Write the state into the address, at once or when changes have come to rest. */
+  #writeAddress(now = false): void {
+    clearTimeout(this.#addressTimer);
+    const write = () => {
+      this.#state.t = this.#player.text();
+      this.#state.speed = Number(this.#player.speed.toPrecision(4));
+      this.#state.playing = this.#player.playing;
+      this.#written = fragmentOf(this.#state);
+      history.replaceState(null, "", this.#written);
+      this.#written = location.hash;
+    };
+    if (now) write();
+    else this.#addressTimer = window.setTimeout(write, 300);
+  }
+}
+
+/** Make the page light or dark. */
+export function applyTheme(light: boolean): void {
+  document.documentElement.dataset.theme = light ? "light" : "dark";
+  elements.theme.textContent = light ? "Dark" : "Light";
+}

@@ -1,0 +1,159 @@
+/** The cards of the views: which can be shown, which is large, and their pictures. */
+import type { Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { BallView } from "../views/ball_view.ts";
+import { BodyView } from "../views/body_view.ts";
+import { ConstantsView } from "../views/constants_view.ts";
+import type { Choice } from "../views/constants_view.ts";
+import { CurveView } from "../views/curve_view.ts";
+import { EllipsoidView } from "../views/ellipsoid_view.ts";
+import { EnginesView } from "../views/engines_view.ts";
+import type { Differences } from "../views/engines_view.ts";
+import { SphereView } from "../views/sphere_view.ts";
+import { sharedRenderer, View3D } from "../views/stage.ts";
+import { theme } from "../views/theme.ts";
+import { TorusView } from "../views/torus_view.ts";
+import { element } from "../views/view.ts";
+import type { Loaded, View } from "../views/view.ts";
+import { pictureOf, save, svgOf } from "./exports.ts";
+
+/** Milliseconds between two writings of the twins in text. */
+const TWIN_EVERY_MS = 1000;
+
+export class Gallery {
+  readonly #engines = new EnginesView();
+  readonly #views: View[];
+  readonly #host: HTMLElement;
+  readonly #absent = element("p", { id: "absent" });
+  readonly #seen = new Set<Element>();
+  readonly #enlarged: (name: string) => void;
+  #shown: View[] = [];
+  #written = -TWIN_EVERY_MS;
+  #time = NaN;
+
+  constructor(
+    host: HTMLElement,
+    choose: (choice: Choice) => void,
+    enlarged: (name: string) => void,
+  ) {
+    this.#host = host;
+    this.#enlarged = enlarged;
+    this.#views = [
+      new BodyView(),
+      new SphereView(),
+      new TorusView(),
+      new BallView(),
+      new EllipsoidView(),
+      new CurveView(),
+      new ConstantsView(choose),
+      this.#engines,
+    ];
+    const watch = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) {
+        if (isIntersecting) this.#seen.add(target);
+        else this.#seen.delete(target);
+      }
+    });
+    for (const view of this.#views) {
+      view.card.append(this.#tools(view));
+      host.append(view.card);
+      watch.observe(view.card);
+    }
+    host.append(this.#absent);
+  }
+
+  #tools(view: View): HTMLElement {
+    const tools = element("div", { class: "card-tools" });
+    const add = (text: string, label: string, act: () => void) => {
+      const made = element("button", { type: "button", "aria-label": `${text}, ${label}: ${view.title}` });
+      made.textContent = text;
+      made.addEventListener("click", act);
+      tools.append(made);
+    };
+    add("PNG", "save a picture", () => void this.#savePicture(view));
+    if (!(view instanceof View3D) && view.name !== "constants") {
+      add("SVG", "save the plot", () =>
+        save(svgOf(view.curves()), `${view.name}.svg`, "image/svg+xml"),
+      );
+    }
+    if (view !== this.#engines) {
+      add("⤢", "enlarge or reduce", () => {
+        const large = view.card.classList.contains("large") ? "" : view.name;
+        this.enlarge(large);
+        this.#enlarged(large);
+      });
+    }
+    return tools;
+  }
+
+  async #savePicture(view: View): Promise<void> {
+    view.draw();
+    const canvases = view === this.#engines ? this.#engines.canvases() : [view.canvas];
+    if (canvases.length) save(await pictureOf(canvases, theme().background), `${view.name}.png`);
+  }
+
+  /** Make one view as broad as the page, or none. */
+  enlarge(name: string): void {
+    for (const view of this.#views) {
+      const large = view.name === name;
+      view.card.classList.toggle("large", large);
+      if (large) this.#host.prepend(view.card);
+    }
+    if (!name) for (const view of this.#views) this.#host.append(view.card);
+    this.#host.append(this.#absent);
+  }
+
+  /** Begin with another motion; views that cannot show it are named with the reason. */
+  build(loaded: Loaded): void {
+    const reasons: string[] = [];
+    const webgl = sharedRenderer() !== null;
+    this.#shown = this.#views.filter((view) => {
+      const blind = view instanceof View3D && !webgl;
+      const reason = blind ? "this browser has no WebGL." : view.refusal(loaded);
+      view.card.hidden = reason !== null;
+      if (reason && !blind) reasons.push(`${view.title}: ${reason}`);
+      return reason === null;
+    });
+    if (!webgl) {
+      reasons.unshift("This browser has no WebGL: scenes in space are left out, plots work.");
+    }
+    this.#absent.textContent = reasons.join(" ");
+    for (const view of this.#shown) view.build(loaded);
+    this.refresh();
+  }
+
+  extend(samples: Samples, anew: boolean): void {
+    for (const view of this.#shown) view.extend(samples, anew);
+    this.refresh();
+  }
+
+  /** Take the series of the server's engines. */
+  compare(differences: Differences): void {
+    this.#engines.compare(differences);
+    this.refresh();
+  }
+
+  /** Have everything drawn and described anew. */
+  refresh(): void {
+    for (const view of this.#shown) view.stale = true;
+    this.#written = -TWIN_EVERY_MS;
+  }
+
+  /** Show a time; what has not changed is not drawn again. */
+  show(sample: Sample): void {
+    const now = performance.now();
+    const moved = sample.t !== this.#time;
+    const write = now - this.#written >= TWIN_EVERY_MS;
+    if (write) this.#written = now;
+    this.#time = sample.t;
+    for (const view of this.#shown) {
+      if (moved) view.stale = true;
+      if (write) view.twin.textContent = view.describe(sample);
+      // What is out of sight is drawn now and then, so that scrolling finds no empty card.
+      if (!view.stale || (!write && !this.#seen.has(view.card))) continue;
+      view.show(sample);
+      view.draw();
+      view.stale = false;
+    }
+  }
+}

@@ -1,0 +1,138 @@
+/** From a problem to what the views show: a closed form, or series of the service. */
+import { number, requireDocument } from "../evaluator/document.ts";
+import type { ClosedFormDocument } from "../evaluator/document.ts";
+import { ClosedFormMotion } from "../evaluator/motion.ts";
+import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
+import type { Stretch } from "../evaluator/series_motion.ts";
+import type { Differences, EngineSeries } from "../views/engines_view.ts";
+import type { Loaded, Torus } from "../views/view.ts";
+import { post, Refusal } from "./service.ts";
+import { entriesOf, numberOf, SYSTEMS } from "./systems.ts";
+import type { Problem } from "./systems.ts";
+
+/** Cycles of the slowest phase that trails reach back. */
+const CYCLES = 26;
+
+/** The time beyond which phases need a document of more digits. */
+export const FAR = 1e6;
+
+/** Digits of that document. */
+const MORE_DIGITS = 30;
+
+const LETTERS: Record<string, string> = { t: "t", s: "s", tau1: "τ₁" };
+
+/** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
+export async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
+  const system = SYSTEMS[problem.system];
+  const closed = !system || system.closedForm;
+  if (closed && dimensionOf(problem) <= 4) {
+    const found = await loadDocument(problem, signal);
+    if (found) return found;
+  }
+  return ofSeries(problem, signal);
+}
+
+/** Return the closed form; null for a motion that the service has as series alone. */
+async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Loaded | null> {
+  try {
+    // The torus first: it is quick, and says whether there is a closed form.
+    const torus = await post<Torus>("v1/tori", { problem }, signal);
+    if (torus.regime === "separatrix") return null;
+    const document = await post<ClosedFormDocument>("v1/closed-forms", { problem }, signal);
+    requireDocument(document);
+    return document.genus <= 3 ? ofDocument(problem, document, torus) : null;
+  } catch (error) {
+    if (servedBySeries(error)) return null;
+    throw error;
+  }
+}
+
+/** Return whether a refusal of the closed form leaves the motion itself to be asked for. */
+function servedBySeries(reason: unknown): boolean {
+  if (!(reason instanceof Refusal)) return false;
+  if (reason.outcome) return reason.outcome !== "at-rest";
+  return /required a system with a torus/.test(reason.message);
+}
+
+function dimensionOf(problem: Problem): number {
+  const A = problem.A ?? problem.inertia;
+  return Array.isArray(A) ? A.length : 3;
+}
+
+function ofDocument(problem: Problem, document: ClosedFormDocument, torus: Torus): Loaded {
+  const motion = new ClosedFormMotion(document);
+  const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
+  return {
+    problem,
+    motion,
+    document,
+    torus,
+    A: document.axes ? [] : document.A.map(number),
+    time: LETTERS[document.time] ?? "t",
+    reach: Number.isFinite(slowest) ? CYCLES / slowest : 60,
+  };
+}
+
+async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> {
+  const first = await stretchOf(problem, 0, signal);
+  const waiting = new Set<number>();
+  const motion: SeriesMotion = new SeriesMotion(first, inertiaOf(problem), (index) => {
+    if (waiting.has(index) || signal.aborted) return;
+    waiting.add(index);
+    stretchOf(problem, index, signal)
+      .then((stretch) => motion.add(index, stretch))
+      .catch(() => undefined)
+      .finally(() => setTimeout(() => waiting.delete(index), 2000));
+  });
+  const letter = problem.system === "ellipsoid-geodesic" ? "s" : "t";
+  const time = problem.system === "neumann" ? "τ₁" : letter;
+  const A = inertiaOf(problem);
+  return { problem, motion, document: null, torus: null, A, time, reach: 2 * STRETCH_LENGTH };
+}
+
+function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promise<Stretch> {
+  const start = index * STRETCH_LENGTH;
+  const times = { start, stop: start + STRETCH_LENGTH, count: STRETCH_COUNT };
+  return post<Stretch>("v1/trajectories", { problem, times }, signal);
+}
+
+/** Return A of a problem along its axes; empty where it has none. */
+function inertiaOf(problem: Problem): number[] {
+  const field = SYSTEMS[problem.system]?.fields[0];
+  if (!field) return [];
+  const values = entriesOf(problem, field).map(numberOf);
+  if (!values.length || !values.every((value) => value > 0)) return [];
+  if (field.name === "A") return values;
+  const ball = numberOf(String(problem.mass ?? 0)) * numberOf(String(problem.radius ?? 0)) ** 2;
+  return values.map((value) => 1 / (value + ball));
+}
+
+/** Return the document of a motion in digits that hold at far times; null where there is none. */
+export async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
+  const { document, problem, torus } = loaded;
+  if (!document || !torus || document.path || document.axes || document.digits > 15) return null;
+  const asked = { problem, digits: MORE_DIGITS };
+  const precise = await post<ClosedFormDocument>("v1/closed-forms", asked, signal);
+  requireDocument(precise);
+  return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
+}
+
+/** Return the series of the server's engines, for the plot of differences. */
+export async function loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences> {
+  const count = 241;
+  const stop = Math.min(60, Math.max(1, loaded.reach / 4));
+  const ask = async (engine: string): Promise<EngineSeries> => {
+    const times = { start: 0, stop, count };
+    const body = { problem: loaded.problem, times, engine, outputs: ["frame"] };
+    const answer = await post<{
+      times: number[];
+      series: { frame: number[][][] };
+      error: number[];
+    }>("v1/trajectories", body, signal);
+    return { times: answer.times, frame: answer.series.frame, error: answer.error };
+  };
+  const [analytic, numeric] = await Promise.allSettled([ask("analytic"), ask("numeric")]);
+  const value = (one: PromiseSettledResult<EngineSeries>) =>
+    one.status === "fulfilled" ? one.value : null;
+  return { analytic: value(analytic), numeric: value(numeric) };
+}

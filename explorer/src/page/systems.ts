@@ -1,0 +1,254 @@
+/** The systems of the page: which of their data have sliders, and how Python names them. */
+
+export type Problem = { system: string } & Record<string, unknown>;
+
+export interface Field {
+  name: string;
+  symbol: string;
+  /** What it is, with the paper's label. */
+  text: string;
+  low: number;
+  high: number;
+  scalar?: boolean;
+}
+
+export interface System {
+  title: string;
+  className: string;
+  closedForm: boolean;
+  /** Whether `normalize` mends q and its velocity. */
+  fields: Field[];
+  example: Problem;
+}
+
+const A: Field = {
+  name: "A",
+  symbol: "A",
+  text: "The inertia 𝓘(Eᵢ∧Eⱼ) = AᵢAⱼ/det A Eᵢ∧Eⱼ of the body, (4.5)",
+  low: 0.3,
+  high: 5,
+};
+const inertia: Field = {
+  name: "inertia",
+  symbol: "I",
+  text: "The principal moments of inertia about the centre",
+  low: 0.1,
+  high: 5,
+};
+const Omega: Field = {
+  name: "Omega",
+  symbol: "Ω",
+  text: "The angular velocity in the body, kept horizontal: (Ω,γ) = 0, (classical)",
+  low: -2,
+  high: 2,
+};
+const gamma: Field = {
+  name: "gamma",
+  symbol: "γ",
+  text: "The vertical seen from the body, γ = e₁",
+  low: -1,
+  high: 1,
+};
+const mass: Field = { ...inertia, name: "mass", symbol: "m", text: "The mass", scalar: true };
+const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
+const q: Field = {
+  name: "q",
+  symbol: "q",
+  text: "The unit vector q = e₁ seen from the body; its length is mended",
+  low: -1,
+  high: 1,
+};
+const qDot: Field = {
+  name: "q_dot",
+  symbol: "q̇",
+  text: "The velocity of q, made tangent to the sphere; ω = q∧q̇, (44.3)",
+  low: -1.5,
+  high: 1.5,
+};
+
+const state = { q: ["0.5", "0.5", "0.7"], q_dot: ["0.4", "0.3", "-0.1"], normalize: true };
+const ball = {
+  inertia: ["0.4", "0.6", "0.9"],
+  mass: "0.2",
+  radius: "1",
+  gamma: ["0.6", "0", "0.8"],
+  Omega: ["0.8", "1", "-0.6"],
+  normalize: true,
+};
+
+export const SYSTEMS: Record<string, System> = {
+  veselova: {
+    title: "Veselova body",
+    className: "Veselova",
+    closedForm: true,
+    fields: [A, q, qDot],
+    example: { system: "veselova", A: ["3", "2", "1"], ...state },
+  },
+  "veselova-so3": {
+    title: "Veselova body by its inertia",
+    className: "VeselovaSO3",
+    closedForm: true,
+    fields: [inertia, gamma, Omega],
+    example: {
+      system: "veselova-so3",
+      inertia: ["1", "2", "3"],
+      gamma: ball.gamma,
+      Omega: ball.Omega,
+      normalize: true,
+    },
+  },
+  "rubber-ball": {
+    title: "Ball that does not twist",
+    className: "RubberBall",
+    closedForm: true,
+    fields: [inertia, mass, radius, gamma, Omega],
+    example: { system: "rubber-ball", ...ball },
+  },
+  "chaplygin-ball": {
+    title: "Chaplygin's ball",
+    className: "ChaplyginBall",
+    closedForm: false,
+    fields: [inertia, mass, radius, gamma, Omega],
+    example: { system: "chaplygin-ball", ...ball, Omega: ["0.8", "1", "-0.3"] },
+  },
+  "ellipsoid-geodesic": {
+    title: "Geodesic on an ellipsoid",
+    className: "EllipsoidGeodesic",
+    closedForm: true,
+    fields: [
+      { ...A, text: "The squared half axes of the ellipsoid Σ Xᵢ²/Aᵢ = 1" },
+      { ...q, name: "X", symbol: "X", text: "The point on the ellipsoid", low: -2, high: 2 },
+      { ...qDot, name: "X_dot", symbol: "Ẋ", text: "The tangent dX/ds, made of unit length" },
+    ],
+    example: {
+      system: "ellipsoid-geodesic",
+      A: ["3", "2", "1"],
+      X: ["1", "1", "0.5"],
+      X_dot: ["1", "-1", "0.2"],
+      normalize: true,
+    },
+  },
+  neumann: {
+    title: "Neumann's system",
+    className: "NeumannSystem",
+    closedForm: true,
+    fields: [
+      { ...A, text: "The potential −½(A⁻¹q,q) on the sphere, (4.7)" },
+      q,
+      { ...qDot, name: "q_prime", symbol: "q′", text: "The velocity in Neumann's time τ₁, (4.6)" },
+    ],
+    example: {
+      system: "neumann",
+      A: ["3", "2", "1"],
+      q: state.q,
+      q_prime: ["0.8", "0.6", "-1"],
+      normalize: true,
+    },
+  },
+  "euler-poisson": {
+    title: "Free body (Euler)",
+    className: "EulerPoisson",
+    closedForm: false,
+    fields: [inertia, gamma, { ...Omega, text: "The angular velocity in the body" }],
+    example: {
+      system: "euler-poisson",
+      inertia: ["1", "2", "2.5"],
+      gamma: ball.gamma,
+      Omega: ["0.1", "1.5", "0.1"],
+      normalize: true,
+    },
+  },
+  lr: {
+    title: "LR system on SO(n)",
+    className: "LRSystem",
+    closedForm: false,
+    fields: [],
+    example: {
+      system: "lr",
+      n: 4,
+      rank: 2,
+      inertia: { special: ["3", "2", "1.5", "1"] },
+      omega: [
+        ["0", "1", "0.5", "-1"],
+        ["-1", "0", "0.3", "0.7"],
+        ["-0.5", "-0.3", "0", "0"],
+        ["1", "-0.7", "0", "0"],
+      ],
+      homogeneous: true,
+    },
+  },
+};
+
+/** Return the entries of a field of a problem, as texts. */
+export function entriesOf(problem: Problem, field: Field): string[] {
+  const value = problem[field.name];
+  if (field.scalar) return [String(value ?? "")];
+  return Array.isArray(value) ? value.map((entry) => String(entry)) : [];
+}
+
+/** Return whether the data of a field are a list of numbers, which sliders can change. */
+export function isEditable(problem: Problem, field: Field): boolean {
+  const value = problem[field.name];
+  const simple = (entry: unknown) => ["string", "number"].includes(typeof entry);
+  return field.scalar ? simple(value) : Array.isArray(value) && value.every(simple);
+}
+
+/** Return a copy of a problem with one entry replaced. */
+export function withEntry(problem: Problem, field: Field, i: number, text: string): Problem {
+  if (field.scalar) return { ...problem, [field.name]: text };
+  const entries = entriesOf(problem, field).map((entry, k) => (k === i ? text : entry));
+  return { ...problem, [field.name]: entries };
+}
+
+/** Systems in which Ω is horizontal, (Ω,γ) = 0. */
+const HORIZONTAL = new Set(["rubber-ball", "veselova-so3"]);
+
+/**
+ * Return an edited problem with Ω made horizontal again, if it was before: by the components that
+ * were not edited where γ allows it. Those who want another (Ω,γ) write it into the JSON.
+ */
+export function keepHorizontal(before: Problem, after: Problem, field: Field, i: number): Problem {
+  const vector = (problem: Problem, name: string) => {
+    const value = problem[name];
+    return Array.isArray(value) ? value.map((entry) => numberOf(String(entry))) : [];
+  };
+  const product = (problem: Problem) => {
+    const [g, w] = [vector(problem, "gamma"), vector(problem, "Omega")];
+    return g.reduce((sum, x, k) => sum + x * w[k], 0);
+  };
+  const off = product(after);
+  if (!HORIZONTAL.has(after.system) || !(Math.abs(product(before)) < 1e-9)) return after;
+  if (!(Math.abs(off) > 1e-12)) return after;
+  const g = vector(after, "gamma");
+  const kept = field.name === "Omega" ? i : -1;
+  const rest = g.reduce((sum, x, k) => sum + (k === kept ? 0 : x * x), 0);
+  const whole = g.reduce((sum, x) => sum + x * x, 0);
+  const all = rest < 1e-3 * whole;
+  const Omega = vector(after, "Omega").map((w, k) => {
+    if (k === kept && !all) return entriesOf(after, field)[k];
+    return String(Number((w - (off * g[k]) / (all ? whole : rest)).toPrecision(12)));
+  });
+  return { ...after, Omega };
+}
+
+/** Return the number that a text states; "7/10" too. */
+export function numberOf(text: string): number {
+  const [above, below] = text.split("/");
+  if (above.trim() === "") return NaN;
+  return below === undefined ? Number(above) : Number(above) / Number(below);
+}
+
+/** Return a copy with one dimension more or fewer. */
+export function withDimension(problem: Problem, system: System, change: 1 | -1): Problem {
+  const changed: Problem = { ...problem };
+  for (const field of system.fields.filter((one) => !one.scalar)) {
+    const entries = entriesOf(problem, field);
+    const last = field.low > 0 ? String(Number(entries.at(-1)) / 2) : "0.2";
+    changed[field.name] = change > 0 ? [...entries, last] : entries.slice(0, -1);
+  }
+  delete changed.frame;
+  return changed;
+}
+
+/** Systems whose dimension can be changed. */
+export const ANY_DIMENSION = new Set(["veselova", "neumann", "ellipsoid-geodesic"]);

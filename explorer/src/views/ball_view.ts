@@ -1,0 +1,164 @@
+/** The ball on its plane: contact path, horizontal momentum, and the line of its mean drift. */
+import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
+import { BufferAttribute, Color } from "three";
+import type { ArrowHelper, Line } from "three";
+import type { Motion, Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { aim, arrow, line, moveLine } from "./shapes.ts";
+import type { Point } from "./shapes.ts";
+import { View3D } from "./stage.ts";
+import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
+import { TrailLine } from "./trail_line.ts";
+import { short } from "./view.ts";
+import type { Loaded } from "./view.ts";
+
+/** The distance between lines of the plane, in radii. */
+const MESH = 1;
+
+export class BallView extends View3D {
+  #radius = 1;
+  #ball = new Group();
+  #plane = new Group();
+  #trail: TrailLine | null = null;
+  #momentum: ArrowHelper | null = null;
+  #drift: Line | null = null;
+  #mean: [number, number] = [0, 0];
+  #origin: [number, number] = [0, 0];
+
+  constructor() {
+    super(
+      "ball",
+      "Rolling ball",
+      "The contact point draws its path (blue). The arrow is the mean velocity, along the momentum.",
+      [3.2, -6.4, 4.2],
+    );
+  }
+
+  refusal({ motion }: Loaded): string | null {
+    return motion.at(0).position ? null : "This system does not roll: choose a ball.";
+  }
+
+  build(loaded: Loaded): void {
+    this.clear();
+    const colours = theme();
+    this.#radius = Number(loaded.problem.radius) || 1;
+    this.#ball = new Group();
+    this.#ball.matrixAutoUpdate = false;
+    this.#ball.add(painted(this.#radius, colours.dark));
+    this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
+    this.#trail = new TrailLine(10000, BLUE);
+    this.#momentum = arrow(ORANGE, 1.6 * this.#radius, 0.25 * this.#radius);
+    this.#drift = line([[0, 0, 0], [1, 0, 0]], GREEN, 0.8);
+    this.world.add(this.#plane, this.#ball, this.#trail.object, this.#momentum, this.#drift);
+    this.#mean = meanVelocity(loaded.motion, loaded.reach);
+    this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
+    this.camera.position.add(this.controls.target);
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    if (!samples.position.length) return;
+    if (anew) {
+      // Places are kept relative to the newest point, so that single precision is enough.
+      const last = samples.times.length - 1;
+      this.#origin = [samples.position[2 * last], samples.position[2 * last + 1]];
+    }
+    this.#trail?.extend(samples, anew, ({ position }, k) => [
+      position[2 * k] - this.#origin[0],
+      position[2 * k + 1] - this.#origin[1],
+      0.012 * this.#radius,
+    ]);
+  }
+
+  show({ frame, position }: Sample): void {
+    if (!position) return;
+    const a = this.#radius;
+    const x = position[0] - this.#origin[0];
+    const y = position[1] - this.#origin[1];
+    const E = (i: number, j: number) => frame[3 * i + j];
+    this.#ball.matrix.set(
+      ...([E(0, 1), E(1, 1), E(2, 1), x] as const),
+      ...([E(0, 2), E(1, 2), E(2, 2), y] as const),
+      ...([E(0, 0), E(1, 0), E(2, 0), a] as const),
+      ...([0, 0, 0, 1] as const),
+    );
+    this.#ball.matrixWorldNeedsUpdate = true;
+    this.#trail?.lead([x, y, 0.012 * a]);
+    const step = MESH * a;
+    this.#plane.position.set(Math.round(x / step) * step, Math.round(y / step) * step, 0);
+    const moved = this.camera.position.clone().sub(this.controls.target);
+    this.controls.target.set(x, y, 0.5 * a);
+    this.camera.position.copy(moved.add(this.controls.target));
+    this.camera.lookAt(this.controls.target);
+    const [u, v] = this.#mean;
+    const size = Math.hypot(u, v);
+    if (this.#momentum && this.#drift) {
+      aim(this.#momentum, u, v, 0, 1.6 * a);
+      // On the ground, from where the ball ends.
+      const ahead = size > 0 ? (1.1 * a) / size : 0;
+      this.#momentum.position.set(x + ahead * u, y + ahead * v, 0.06 * a);
+      this.#drift.visible = size > 0;
+      const far = (30 * a) / (size || 1);
+      const [left, right]: Point[] = [
+        [x - far * u, y - far * v, 0.01 * a],
+        [x + far * u, y + far * v, 0.01 * a],
+      ];
+      moveLine(this.#drift, [left, right]);
+    }
+  }
+
+  describe({ position, q }: Sample): string {
+    if (!position) return "";
+    const [u, v] = this.#mean;
+    return (
+      `The contact point is (${short(position[0], 6)}, ${short(position[1], 6)}). ` +
+      `Its mean velocity is (${short(u)}, ${short(v)}). The vertical in the body is ` +
+      `(${Array.from(q, (entry) => short(entry)).join(", ")}).`
+    );
+  }
+}
+
+/** Return the mean velocity of the contact point over a long time. */
+function meanVelocity(motion: Motion, reach: number): [number, number] {
+  const [far, near] = [motion.at(4 * reach).position, motion.at(0).position];
+  if (!far || !near || motion.genus === 0) {
+    const [a, b] = [motion.at(38).position, motion.at(0).position];
+    return a && b ? [(a[0] - b[0]) / 38, (a[1] - b[1]) / 38] : [0, 0];
+  }
+  return [(far[0] - near[0]) / (4 * reach), (far[1] - near[1]) / (4 * reach)];
+}
+
+/** Return a ball whose octants have two colours in turn, and a cap at the end of each axis. */
+function painted(radius: number, dark: boolean): Mesh {
+  const geometry = new SphereGeometry(radius, 96, 64).toNonIndexed();
+  const position = geometry.getAttribute("position");
+  const shades = new Float32Array(3 * position.count);
+  const [even, odd] = [new Color(BLUE), new Color(dark ? "#e8eef5" : "#f4f7fa")];
+  const cap = new Color(VERMILION);
+  for (let corner = 0; corner < position.count; corner += 3) {
+    const centre = [0, 1, 2].map((axis) => {
+      const array = [position.getX, position.getY, position.getZ][axis];
+      return [0, 1, 2].reduce((sum, k) => sum + array.call(position, corner + k), 0);
+    });
+    const size = Math.hypot(...centre);
+    const capped = Math.abs(centre[2]) / size > 0.96;
+    const shade = capped ? cap : centre.filter((x) => x > 0).length % 2 ? even : odd;
+    for (let k = 0; k < 3; k++) shade.toArray(shades, 3 * (corner + k));
+  }
+  geometry.setAttribute("color", new BufferAttribute(shades, 3));
+  return new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+}
+
+function grid(radius: number, rule: string, ground: string): Group {
+  const group = new Group();
+  const half = 14 * radius;
+  const floor = new MeshStandardMaterial({ color: ground, roughness: 1 });
+  const plane = new Mesh(new PlaneGeometry(2 * half, 2 * half), floor);
+  plane.position.z = -0.02 * radius;
+  group.add(plane);
+  for (let k = -14; k <= 14; k++) {
+    const at = k * MESH * radius;
+    group.add(line([[at, -half, 0], [at, half, 0]], rule, 0.7));
+    group.add(line([[-half, at, 0], [half, at, 0]], rule, 0.7));
+  }
+  return group;
+}

@@ -1,0 +1,224 @@
+/**
+ * The body in space: its ellipsoid, a box along its axes, ω and its trail. e_1 = q points upwards.
+ * In four and more dimensions the box is a hypercube, seen in perspective along e_4.
+ */
+import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
+import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
+import type { ArrowHelper } from "three";
+import type { Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
+import type { Point } from "./shapes.ts";
+import { View3D } from "./stage.ts";
+import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
+import { TrailLine } from "./trail_line.ts";
+import { list, short } from "./view.ts";
+import type { Loaded } from "./view.ts";
+
+const CAPTION =
+  "The body in space; e₁ points upwards. ω (orange) stays horizontal. Blue: path of a body axis.";
+
+const SIZE = 0.78;
+
+/** Lengths of drawn angular velocities. */
+const OMEGA_LENGTH = 0.85;
+
+export class BodyView extends View3D {
+  #n = 3;
+  #axes: number[] = [1, 1, 1];
+  #solid = new Group();
+  #trail: TrailLine | null = null;
+  #tip: TrailLine | null = null;
+  #omega: ArrowHelper | null = null;
+  #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
+  #scale = 1;
+
+  constructor() {
+    super(
+      "body",
+      "Body",
+      CAPTION,
+      [2.5, -3.1, 1.75],
+    );
+  }
+
+  refusal({ motion }: Loaded): string | null {
+    const some = motion.at(0);
+    return some.frame.length ? null : "This system has no attitude of a body.";
+  }
+
+  build({ motion, A, reach }: Loaded): void {
+    this.clear();
+    const colours = theme();
+    this.#n = motion.n;
+    this.caption.textContent =
+      this.#n > 3
+        ? `Shadow of a box in ${this.#n} dimensions; blue edges are near along e₄, red ones far.`
+        : CAPTION;
+    const biggest = Math.sqrt(Math.max(...A, 0));
+    this.#axes = A.map((entry) => (SIZE * Math.sqrt(entry)) / biggest);
+    // A system without axes of its own gets a cube, and a plane body a thin box.
+    while (this.#axes.length < Math.max(3, this.#n)) this.#axes.push(A.length ? 0.12 : 0.6);
+    this.#solid = new Group();
+    this.#solid.matrixAutoUpdate = false;
+    this.#cube = null;
+    this.world.add(this.#solid);
+    if (this.#n <= 3) this.#addSolid(colours.dark);
+    else this.#addCube();
+    this.#addSpace(colours.line, colours.dim);
+    this.#trail = new TrailLine(10000, ORANGE, { opacity: 0.75 });
+    this.#tip = new TrailLine(10000, BLUE, { opacity: 0.6 });
+    this.#omega = this.#n === 3 ? arrow(ORANGE, 1) : null;
+    if (this.#omega) this.world.add(this.#trail.object, this.#omega);
+    this.world.add(this.#tip.object);
+    // The largest ω of some times is as long as OMEGA_LENGTH.
+    let largest = 1e-30;
+    for (let k = 0; k < 40; k++) {
+      largest = Math.max(largest, Math.hypot(...motion.at((-reach * k) / 400).Omega));
+    }
+    this.#scale = OMEGA_LENGTH / largest;
+  }
+
+  #addSolid(dark: boolean): void {
+    const axes = this.#axes;
+    const body = surface((u, v) => onEllipsoid(u, v, axes), dark ? "#9fb4cc" : "#7d93ad", {
+      opacity: 0.42,
+    });
+    body.renderOrder = 1;
+    // A box in the ellipsoid, with edges in the ratio of its half axes.
+    const edges = axes.map((axis) => (1.98 * axis) / Math.sqrt(3));
+    const box = new BoxGeometry(edges[0], edges[1], edges[2]);
+    const material = new MeshStandardMaterial({ color: "#3d78ad", roughness: 0.5 });
+    const rim = new LineBasicMaterial({ color: dark ? "#d6e6f5" : "#12385c" });
+    this.#solid.add(new Mesh(box, material), new LineSegments(new EdgesGeometry(box), rim), body);
+    axes.forEach((axis, k) => {
+      const one = arrow(dark ? "#ffffff" : "#1c2733", axis + 0.28, 0.09);
+      aim(one, k === 0 ? 1 : 0, k === 1 ? 1 : 0, k === 2 ? 1 : 0, axis + 0.28);
+      this.#solid.add(one);
+    });
+  }
+
+  #addCube(): void {
+    const n = Math.min(this.#n, 7);
+    const edges: [number, number][] = [];
+    for (let a = 0; a < 2 ** n; a++) {
+      for (let k = 0; k < n; k++) if (!(a & (1 << k))) edges.push([a, a | (1 << k)]);
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(new Float32Array(6 * edges.length), 3));
+    geometry.setAttribute("color", new BufferAttribute(new Float32Array(6 * edges.length), 3));
+    const material = new LineBasicMaterial({ vertexColors: true });
+    const lines = new LineSegments(geometry, material);
+    lines.frustumCulled = false;
+    this.#cube = { lines, edges };
+    this.world.add(lines);
+  }
+
+  #addSpace(rule: string, dim: string): void {
+    const circle = Array.from({ length: 97 }, (_, k): Point => {
+      const angle = (2 * Math.PI * k) / 96;
+      return [Math.cos(angle), Math.sin(angle), 0];
+    });
+    this.world.add(line(circle, dim, 0.55));
+    for (let k = 0; k < 4; k++) {
+      const [x, y] = [Math.cos((k * Math.PI) / 4), Math.sin((k * Math.PI) / 4)];
+      this.world.add(line([[-x, -y, 0], [x, y, 0]], rule, 0.6));
+    }
+    const ends: Point[] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]];
+    ends.slice(0, Math.max(2, Math.min(3, this.#n))).forEach((end, k) => {
+      const one = arrow(AXES[k], 1.18);
+      aim(one, ...end, 1.18);
+      this.world.add(one);
+    });
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    const n = this.#n;
+    const size = n * n;
+    const longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, n)));
+    const reach = this.#axes[longest] + 0.28;
+    this.#tip?.extend(samples, anew, ({ frame }, k) => {
+      const row = k * size + longest * n;
+      return [reach * frame[row + 1], n > 2 ? reach * frame[row + 2] : 0, reach * frame[row]];
+    });
+    if (!this.#omega) return;
+    this.#trail?.extend(samples, anew, ({ frame, Omega }, k) =>
+      this.#inSpace(frame, Omega, k * size, 3 * k),
+    );
+  }
+
+  /** Return Ω in space: its components along e_2, e_3, e_1. */
+  #inSpace(frame: ArrayLike<number>, Omega: ArrayLike<number>, f = 0, o = 0): Point {
+    const along = (j: number) =>
+      this.#scale *
+      (frame[f + j] * Omega[o] + frame[f + 3 + j] * Omega[o + 1] + frame[f + 6 + j] * Omega[o + 2]);
+    return [along(1), along(2), along(0)];
+  }
+
+  show({ frame, Omega }: Sample): void {
+    const n = this.#n;
+    const E = (i: number, j: number) => frame[i * n + j];
+    if (n === 3) {
+      // The attitude Eᵀ, whose rows are taken in the order e_2, e_3, e_1.
+      this.#solid.matrix.set(
+        ...([E(0, 1), E(1, 1), E(2, 1), 0] as const),
+        ...([E(0, 2), E(1, 2), E(2, 2), 0] as const),
+        ...([E(0, 0), E(1, 0), E(2, 0), 0] as const),
+        ...([0, 0, 0, 1] as const),
+      );
+    } else if (n === 2) {
+      this.#solid.matrix.set(
+        ...([E(0, 1), E(1, 1), 0, 0] as const),
+        ...([0, 0, 1, 0] as const),
+        ...([E(0, 0), E(1, 0), 0, 0] as const),
+        ...([0, 0, 0, 1] as const),
+      );
+    } else {
+      this.#showCube(frame);
+    }
+    this.#solid.matrixWorldNeedsUpdate = true;
+    if (this.#omega && Omega.length) {
+      const end = this.#inSpace(frame, Omega);
+      aim(this.#omega, ...end);
+      this.#trail?.lead(end);
+    }
+  }
+
+  /** Move the vertices of the hypercube: y = Eᵀx, in perspective along y_4, coloured by it. */
+  #showCube(frame: Float64Array): void {
+    if (!this.#cube) return;
+    const n = this.#n;
+    const m = Math.min(n, 7);
+    const vertices = Array.from({ length: 2 ** m }, (_, a) => {
+      const y = new Float64Array(n);
+      for (let i = 0; i < m; i++) {
+        const x = (a & (1 << i) ? 0.62 : -0.62) * this.#axes[i];
+        for (let j = 0; j < n; j++) y[j] += frame[i * n + j] * x;
+      }
+      const near = 1 / (1 - 0.42 * y[3]);
+      return { point: [near * y[1], near * y[2], near * y[0]] as Point, depth: y[3] };
+    });
+    const { lines, edges } = this.#cube;
+    const position = lines.geometry.getAttribute("position") as BufferAttribute;
+    const colour = lines.geometry.getAttribute("color") as BufferAttribute;
+    edges.flat().forEach((a, k) => {
+      const { point, depth } = vertices[a];
+      position.setXYZ(k, ...point);
+      const mix = Math.min(1, Math.max(0, 0.5 + 0.75 * depth));
+      // From vermilion, far along e_4, to blue, near.
+      colour.setXYZ(k, 0.67 * (1 - mix) + 0.09 * mix, 0.11 + 0.33 * mix, 0.01 + 0.8 * mix);
+    });
+    position.needsUpdate = colour.needsUpdate = true;
+  }
+
+  describe({ frame, Omega, q }: Sample): string {
+    const n = this.#n;
+    const attitude = n === 3 ? `e₂ is (${list(column(frame, n, 1))}) in the body. ` : "";
+    const turning = Omega.length ? `Ω is (${list(Omega)}), of size ${short(Math.hypot(...Omega))}. ` : "";
+    return `q = e₁ is (${list(q)}) in the body. ${attitude}${turning}`;
+  }
+}
+
+const column = (frame: Float64Array, n: number, j: number): number[] =>
+  Array.from({ length: n }, (_, i) => frame[i * n + j]);
+

@@ -1,0 +1,265 @@
+/**
+ * The constants and the regimes. For n = 3 the plane of c_2 and λ: where λ_1 and λ_2 move, for every
+ * c_2. For n = 4 the plane of c_2 and c_3. A click is a start with the constants clicked at.
+ */
+import type { Sample } from "../evaluator/motion.ts";
+import { disc, FONT, stroke, subscript } from "./curve_view.ts";
+import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { list, short, View } from "./view.ts";
+import type { Loaded, Torus } from "./view.ts";
+
+/** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}. */
+export interface Choice {
+  constants: number[];
+  lambda: number[];
+}
+
+/** Room at the sides of the map, parts of the canvas. */
+const [LEFT, RIGHT, TOP, BOTTOM] = [0.11, 0.03, 0.05, 0.13];
+
+export class ConstantsView extends View {
+  #torus: Torus | null = null;
+  #I: number[] = [];
+  #lambda: number[] = [];
+  #cursor: [number, number] | null = null;
+  readonly #choose: (choice: Choice) => void;
+
+  constructor(choose: (choice: Choice) => void) {
+    super("constants", "Constants", "");
+    this.#choose = choose;
+    this.canvas.classList.add("map");
+    this.canvas.addEventListener("click", (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      const x = (event.clientX - box.left) / box.width;
+      this.#pick(x, (event.clientY - box.top) / box.height);
+    });
+    this.canvas.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  refusal({ torus, motion }: Loaded): string | null {
+    if (!torus || !motion.genus) return "The page knows no constants c of this motion.";
+    if (motion.n < 3) return "In two dimensions the energy is the only constant.";
+    return motion.n <= 4 && motion.genus === motion.n - 1
+      ? null
+      : "The map shows motions of full genus in three and four dimensions.";
+  }
+
+  build({ torus, motion }: Loaded): void {
+    this.#torus = torus;
+    this.#I = motion.moments;
+    this.#cursor = null;
+    this.caption.textContent =
+      motion.n === 3
+        ? "Where λ₁ (green) and λ₂ (pink) move for each c₂. Click for a new start."
+        : "The regimes of c₂ and c₃. The point is this motion; click for a new start.";
+  }
+
+  show({ lambda }: Sample): void {
+    this.#lambda = Array.from(lambda);
+  }
+
+  get #flat(): boolean {
+    return this.#I.length === 3;
+  }
+
+  /** Return the ranges of the two axes. */
+  #ranges(): [[number, number], [number, number]] {
+    const I = this.#I;
+    return this.#flat
+      ? [[I[0], I[2]], [I[0], I[2]]]
+      : [[I[0], I[2]], [I[1], I[3]]];
+  }
+
+  #x(value: number): number {
+    const [low, high] = this.#ranges()[0];
+    const part = (value - low) / (high - low);
+    return (LEFT + (1 - LEFT - RIGHT) * part) * this.canvas.width;
+  }
+
+  #y(value: number): number {
+    const [low, high] = this.#ranges()[1];
+    const part = (value - low) / (high - low);
+    return (1 - BOTTOM - (1 - TOP - BOTTOM) * part) * this.canvas.height;
+  }
+
+  draw(): void {
+    const ratio = this.fit();
+    const context = this.canvas.getContext("2d");
+    const torus = this.#torus;
+    if (!context || !torus) return;
+    const colours = theme();
+    context.fillStyle = colours.background;
+    context.fillRect(0, 0, this.canvas.width, this.canvas.height);
+    context.font = `${12 * ratio}px ${FONT}`;
+    if (this.#flat) this.#drawZones(context);
+    else this.#drawCells(context);
+    this.#drawAxes(context, ratio);
+    context.lineWidth = 1.5 * ratio;
+    if (this.#flat) {
+      context.strokeStyle = ORANGE;
+      const x = this.#x(torus.constants[0]);
+      stroke(context, [[x, TOP * this.canvas.height], [x, (1 - BOTTOM) * this.canvas.height]]);
+      this.#lambda.forEach((value, s) => {
+        this.#mark(context, x, this.#y(value), s ? PINK : GREEN, ratio);
+      });
+    } else {
+      const [c2, c3] = torus.constants;
+      this.#mark(context, this.#x(c2), this.#y(c3), VERMILION, ratio);
+    }
+    if (this.#cursor && document.activeElement === this.canvas) {
+      const [x, y] = [this.#cursor[0] * this.canvas.width, this.#cursor[1] * this.canvas.height];
+      context.strokeStyle = colours.text;
+      stroke(context, [[x - 9 * ratio, y], [x + 9 * ratio, y]]);
+      stroke(context, [[x, y - 9 * ratio], [x, y + 9 * ratio]]);
+    }
+  }
+
+  #mark(context: CanvasRenderingContext2D, x: number, y: number, fill: string, ratio: number) {
+    context.fillStyle = theme().text;
+    disc(context, x, y, 6.5 * ratio);
+    context.fillStyle = fill;
+    disc(context, x, y, 4.5 * ratio);
+  }
+
+  /** Shade where λ_1 and λ_2 move, for each c_2. */
+  #drawZones(context: CanvasRenderingContext2D): void {
+    const [low, middle, high] = this.#I;
+    const fill = (colour: string, points: [number, number][]) => {
+      context.globalAlpha = 0.38;
+      context.fillStyle = colour;
+      context.beginPath();
+      for (const [c, value] of points) context.lineTo(this.#x(c), this.#y(value));
+      context.fill();
+      context.globalAlpha = 1;
+    };
+    // λ_1 ∈ [I_1, min(c_2, I_2)], λ_2 ∈ [max(c_2, I_2), I_3].
+    fill(GREEN, [[low, low], [middle, middle], [high, middle], [high, low]]);
+    fill(PINK, [[low, middle], [middle, middle], [high, high], [low, high]]);
+  }
+
+  /** Shade the four regimes of c_2 < c_3. */
+  #drawCells(context: CanvasRenderingContext2D): void {
+    const [, I2, I3, I4] = this.#I;
+    const low = this.#I[0];
+    const cells: [string, [number, number][]][] = [
+      [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]]],
+      [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]]],
+      [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]]],
+      [VERMILION, [[I2, I2], [I3, I3], [I2, I3]]],
+    ];
+    for (const [colour, points] of cells) {
+      context.globalAlpha = 0.34;
+      context.fillStyle = colour;
+      context.beginPath();
+      for (const [c2, c3] of points) context.lineTo(this.#x(c2), this.#y(c3));
+      context.fill();
+    }
+    context.globalAlpha = 1;
+  }
+
+  #drawAxes(context: CanvasRenderingContext2D, ratio: number): void {
+    const colours = theme();
+    const { width, height } = this.canvas;
+    context.strokeStyle = colours.dim;
+    context.fillStyle = colours.text;
+    context.lineWidth = ratio;
+    const [, right] = this.#ranges()[0];
+    const inX = this.#I.filter((value) => value <= right);
+    const inY = this.#flat ? this.#I : this.#I.filter((value) => value >= this.#I[1]);
+    context.setLineDash([4 * ratio, 4 * ratio]);
+    for (const x of inX.map((value) => this.#x(value))) {
+      stroke(context, [[x, TOP * height], [x, (1 - BOTTOM) * height]]);
+    }
+    for (const y of inY.map((value) => this.#y(value))) {
+      stroke(context, [[LEFT * width, y], [(1 - RIGHT) * width, y]]);
+    }
+    context.setLineDash([]);
+    context.textAlign = "center";
+    for (const value of inX) {
+      const name = `I${subscript(this.#I.indexOf(value) + 1)}`;
+      context.fillText(name, this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
+    }
+    const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
+    context.fillText(names[0], (0.5 * (1 + LEFT)) * width, height - 6 * ratio);
+    context.textAlign = "right";
+    for (const value of inY) {
+      const name = `I${subscript(this.#I.indexOf(value) + 1)}`;
+      context.fillText(name, LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
+    }
+    context.textAlign = "left";
+    context.fillText(names[1], 5 * ratio, 0.5 * height);
+  }
+
+  #key(event: KeyboardEvent): void {
+    const steps: Record<string, [number, number]> = {
+      ArrowLeft: [-0.02, 0],
+      ArrowRight: [0.02, 0],
+      ArrowUp: [0, -0.02],
+      ArrowDown: [0, 0.02],
+    };
+    const [x, y] = this.#cursor ?? [0.5, 0.45];
+    if (event.key === "Enter") this.#pick(x, y);
+    const step = steps[event.key];
+    if (!step) return;
+    event.preventDefault();
+    this.#cursor = [x + step[0], y + step[1]];
+  }
+
+  /** Choose the constants at a place of the canvas. */
+  #pick(x: number, y: number): void {
+    const [[low, high], [bottom, top]] = this.#ranges();
+    const across = low + ((high - low) * (x - LEFT)) / (1 - LEFT - RIGHT);
+    const up = bottom + ((top - bottom) * (1 - BOTTOM - y)) / (1 - TOP - BOTTOM);
+    const choice = this.#flat ? zoneChoice(this.#I, across, up) : cellChoice(this.#I, across, up);
+    if (choice) this.#choose(choice);
+  }
+
+  describe(): string {
+    if (!this.#torus) return "";
+    const { constants, regime } = this.#torus;
+    const names = constants.map((value, k) => `c${subscript(k + 2)} = ${short(value, 6)}`);
+    return `${names.join(", ")}; the regime is ${regime}. I is ${list(this.#I)}.`;
+  }
+}
+
+/** Return c_2 and λ of a place in the map of n = 3; null outside of what moves. */
+function zoneChoice(I: number[], c2: number, value: number): Choice | null {
+  if (!(c2 > I[0] && c2 < I[2])) return null;
+  const cuts = [[I[0], Math.min(c2, I[1])], [Math.max(c2, I[1]), I[2]]];
+  const chosen = cuts.findIndex(([low, high]) => value > low && value < high);
+  if (chosen < 0) return null;
+  const lambda = cuts.map(([low, high], s) => (s === chosen ? value : (low + high) / 2));
+  return { constants: [c2], lambda };
+}
+
+/** Return c_2, c_3 and λ in the middle of the cuts; null where no motion has them. */
+function cellChoice(I: number[], c2: number, c3: number): Choice | null {
+  if (!(c2 > I[0] && c2 < I[2] && c3 > I[1] && c3 < I[3] && c2 < c3)) return null;
+  const [inner, outer] = [[0, c2, c3], [c2, c3, Infinity]];
+  const lambda = [0, 1, 2].map((s) => {
+    const left = Math.max(inner[s], I[s]);
+    return (left + Math.min(outer[s], I[s + 1])) / 2;
+  });
+  return { constants: [c2, c3], lambda };
+}
+
+/**
+ * Return q and q' of a choice: q_i² = Π(I_i − λ_s)/Π_{j≠i}(I_i − I_j) and
+ * λ_s' = 2w_s/Π_{j≠s}(λ_s − λ_j), w² = R(λ). I increases; signs are those given.
+ */
+export function startOf(I: number[], { constants, lambda }: Choice, signs: number[]) {
+  const q = I.map((value, i) => {
+    const above = lambda.reduce((product, l) => product * (value - l), 1);
+    const below = I.reduce((product, other, j) => (j === i ? product : product * (value - other)), 1);
+    return signs[i] * Math.sqrt(Math.max(0, above / below));
+  });
+  const speeds = lambda.map((value, s) => {
+    const R = [0, ...constants, ...I].reduce((product, b) => product * (value - b), -1);
+    const below = lambda.reduce((product, l, j) => (j === s ? product : product * (value - l)), 1);
+    return (2 * Math.sqrt(Math.abs(R))) / below;
+  });
+  const prime = q.map((entry, i) =>
+    lambda.reduce((sum, value, s) => sum + (entry / 2) * (speeds[s] / (value - I[i])), 0),
+  );
+  return { q, prime };
+}

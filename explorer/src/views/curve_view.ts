@@ -1,0 +1,165 @@
+/** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
+import type { Sample } from "../evaluator/motion.ts";
+import { SERIES, theme } from "./theme.ts";
+import { list, View } from "./view.ts";
+import type { Curves, Loaded, Torus } from "./view.ts";
+
+/** Points of half an oval. */
+const STEPS = 90;
+
+export class CurveView extends View {
+  #torus: Torus | null = null;
+  #lambda: number[] = [];
+  #w: number[] = [];
+
+  constructor() {
+    super(
+      "curve",
+      "Curve",
+      "w² = R(λ). Each λ runs round an oval over its cut; gaps between the cuts are grey.",
+    );
+  }
+
+  refusal({ torus, motion }: Loaded): string | null {
+    return torus && motion.genus ? null : "The page has no curve of this motion.";
+  }
+
+  build({ torus }: Loaded): void {
+    this.#torus = torus;
+  }
+
+  show({ lambda, directions }: Sample): void {
+    const torus = this.#torus;
+    if (!torus) return;
+    const g = torus.branch_points.length >> 1;
+    this.#lambda = Array.from(lambda).slice(0, g);
+    // λ_s increases where (−1)^{g−s} w_s > 0.
+    this.#w = this.#lambda.map((value, k) => {
+      const sign = directions[k] * ((g - k - 1) % 2 ? -1 : 1);
+      return sign * Math.sqrt(Math.abs(this.#R(value)));
+    });
+  }
+
+  #R(lambda: number): number {
+    return this.#torus!.branch_points.reduce((product, b) => product * (lambda - b), -1);
+  }
+
+  /** Return cut s as [left, right, largest w]. */
+  #cut(s: number): [number, number, number] {
+    const [left, right] = this.#torus!.branch_points.slice(2 * s - 1, 2 * s + 1);
+    let most = 1e-300;
+    for (let k = 1; k < 40; k++) {
+      most = Math.max(most, Math.abs(this.#R(left + ((right - left) * k) / 40)));
+    }
+    return [left, right, Math.sqrt(most)];
+  }
+
+  draw(): void {
+    const ratio = this.fit();
+    const context = this.canvas.getContext("2d");
+    if (!context || !this.#torus) return;
+    const { width, height } = this.canvas;
+    const colours = theme();
+    const { branch_points: b, origins } = this.#torus;
+    const end = b[b.length - 1];
+    const x = (value: number) => (0.06 + (0.88 * value) / end) * width;
+    const middle = 0.46 * height;
+    const tall = 0.37 * height;
+    context.fillStyle = colours.background;
+    context.fillRect(0, 0, width, height);
+    context.lineWidth = ratio;
+    context.strokeStyle = colours.line;
+    stroke(context, [[0, middle], [width, middle]]);
+    context.lineWidth = 5 * ratio;
+    context.strokeStyle = colours.dim;
+    for (let s = 0; 2 * s + 1 < b.length; s++) {
+      stroke(context, [[x(b[2 * s]), middle], [x(b[2 * s + 1]), middle]]);
+    }
+    for (let s = 1; 2 * s < b.length; s++) {
+      const [left, right, most] = this.#cut(s);
+      const colour = SERIES[(s - 1) % SERIES.length];
+      context.lineWidth = 2.2 * ratio;
+      context.strokeStyle = colour;
+      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): [number, number] => {
+        const value = left + ((right - left) * (1 - Math.cos((Math.PI * k) / STEPS))) / 2;
+        const up = k <= STEPS ? 1 : -1;
+        return [x(value), middle - (up * tall * Math.sqrt(Math.abs(this.#R(value)))) / most];
+      });
+      stroke(context, points);
+      const value = Math.min(right, Math.max(left, this.#lambda[s - 1]));
+      const y = middle - (tall * this.#w[s - 1]) / most;
+      context.fillStyle = colours.text;
+      disc(context, x(value), y, 6.5 * ratio);
+      context.fillStyle = colour;
+      disc(context, x(value), y, 4.5 * ratio);
+      context.fillStyle = colours.text;
+      context.font = `${12 * ratio}px ${FONT}`;
+      context.textAlign = "center";
+      context.fillText(`λ${subscript(s)}`, x((left + right) / 2), middle + 4 * ratio);
+    }
+    this.#label(context, ratio, x, height, origins);
+  }
+
+  /** Write the names of the branch points, those that would overlap one row lower. */
+  #label(
+    context: CanvasRenderingContext2D,
+    ratio: number,
+    x: (value: number) => number,
+    height: number,
+    origins: string[],
+  ): void {
+    const colours = theme();
+    context.font = `${12.5 * ratio}px ${FONT}`;
+    context.textAlign = "center";
+    let [last, row] = [-Infinity, 0];
+    this.#torus!.branch_points.forEach((value, k) => {
+      const at = x(value);
+      row = at - last < 26 * ratio ? (row + 1) % 3 : 0;
+      last = at;
+      context.strokeStyle = colours.dim;
+      context.lineWidth = ratio;
+      const y = height - (30 - 11 * row) * ratio;
+      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, y - 12 * ratio]]);
+      context.fillStyle = colours.text;
+      context.fillText(`${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`, at, y);
+    });
+  }
+
+  override curves(): Curves[] {
+    if (!this.#torus) return [];
+    const lines = [];
+    for (let s = 1; 2 * s < this.#torus.branch_points.length; s++) {
+      const [left, right] = this.#cut(s);
+      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): [number, number] => {
+        const value = left + ((right - left) * (1 - Math.cos((Math.PI * k) / STEPS))) / 2;
+        return [value, (k <= STEPS ? 1 : -1) * Math.sqrt(Math.abs(this.#R(value)))];
+      });
+      lines.push({ name: `oval ${s}`, colour: SERIES[(s - 1) % SERIES.length], points });
+    }
+    return [{ title: "w² = R(λ)", x: "λ", y: "w", logarithmic: false, lines }];
+  }
+
+  describe(): string {
+    if (!this.#torus) return "";
+    const { branch_points: b, origins } = this.#torus;
+    const names = origins.map((name, k) => `${name} = ${list([b[k]])}`).join(", ");
+    return `λ is ${list(this.#lambda, 5)}. Branch points: ${names}.`;
+  }
+}
+
+export const FONT = '"DejaVu Sans", system-ui, sans-serif';
+
+export function stroke(context: CanvasRenderingContext2D, points: [number, number][]): void {
+  context.beginPath();
+  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.stroke();
+}
+
+export function disc(context: CanvasRenderingContext2D, x: number, y: number, r: number): void {
+  context.beginPath();
+  context.arc(x, y, r, 0, 2 * Math.PI);
+  context.fill();
+}
+
+export const subscript = (k: number): string =>
+  String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);

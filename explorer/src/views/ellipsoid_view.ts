@@ -1,0 +1,146 @@
+/**
+ * The geodesic on Σ X_i²/A_i = 1 with X = Aq/√(q,Aq), (Gauss): its tangent lines touch the confocal
+ * quadric of μ = 1/c_2 (Chasles).
+ */
+import type { Line, Mesh } from "three";
+import type { Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { confocalQuadric } from "./conics.ts";
+import { ball, line, moveLine, onEllipsoid, surface } from "./shapes.ts";
+import type { Point } from "./shapes.ts";
+import { View3D } from "./stage.ts";
+import { BLUE, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { TrailLine } from "./trail_line.ts";
+import { list, short } from "./view.ts";
+import type { Loaded } from "./view.ts";
+
+const CAPTION =
+  "The same motion as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
+
+export class EllipsoidView extends View3D {
+  #A: number[] = [];
+  #scale = 1;
+  #mu: number | null = null;
+  #trail: TrailLine | null = null;
+  #point: Mesh | null = null;
+  #touch: Mesh | null = null;
+  #tangent: Line | null = null;
+
+  constructor() {
+    super(
+      "ellipsoid",
+      "Ellipsoid",
+      CAPTION,
+      [2.5, -3.0, 1.7],
+    );
+  }
+
+  refusal({ A, motion }: Loaded): string | null {
+    if (A.length !== motion.n || motion.moments.length === 0) {
+      return "No geodesic on an ellipsoid goes with this system.";
+    }
+    return motion.n >= 3 ? null : "In two dimensions the ellipsoid is an ellipse.";
+  }
+
+  build({ A, torus }: Loaded): void {
+    this.clear();
+    const colours = theme();
+    this.#A = A;
+    this.caption.textContent =
+      A.length > 3
+        ? "The first three components of the geodesic that goes with the motion, and its tangent."
+        : CAPTION;
+    this.#scale = Math.sqrt(Math.max(...A));
+    const half = A.map((entry) => Math.sqrt(entry) / this.#scale);
+    const globe = surface((u, v) => onEllipsoid(u, v, half), colours.dark ? "#243042" : "#dfe6ee", {
+      opacity: 0.6,
+    });
+    this.#mu = A.length === 3 && torus?.constants.length ? 1 / torus.constants[0] : null;
+    this.world.add(globe);
+    if (this.#mu !== null) {
+      const quadric = confocalQuadric(A, this.#mu, this.#scale, ORANGE);
+      this.world.add(quadric);
+    }
+    for (const umbilic of umbilics(A)) {
+      const one = ball(PINK, 0.022);
+      one.position.set(...(umbilic.map((x) => x / this.#scale) as Point));
+      this.world.add(one);
+    }
+    this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");
+    this.#point = ball(VERMILION, 0.035);
+    this.#touch = ball(ORANGE, 0.03);
+    this.#tangent = line([[0, 0, 0], [0, 0, 0]], ORANGE);
+    this.world.add(this.#trail.object, this.#point, this.#touch, this.#tangent);
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    const n = this.#A.length;
+    this.#trail?.extend(samples, anew, ({ q }, k) => {
+      const X = this.#position(q.subarray(k * n, k * n + n));
+      return [1.004 * X[0], 1.004 * X[1], 1.004 * X[2]];
+    });
+  }
+
+  /** Return X/scale. */
+  #position(q: ArrayLike<number>): number[] {
+    const size = Math.sqrt(this.#A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0));
+    return this.#A.map((a, i) => (a * q[i]) / (size * this.#scale));
+  }
+
+  show({ q, velocity }: Sample): void {
+    const X = this.#position(q);
+    // dX/dt ∝ A q̇ (q,Aq) − A q (q,Aq̇).
+    const size = this.#A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0);
+    const mixed = this.#A.reduce((sum, a, i) => sum + a * q[i] * velocity[i], 0);
+    const D = this.#A.map((a, i) => a * (velocity[i] * size - q[i] * mixed));
+    const length = Math.hypot(...D) || 1;
+    const unit = D.map((x) => x / length);
+    const at = (s: number): Point => [X[0] + s * unit[0], X[1] + s * unit[1], X[2] + s * unit[2]];
+    this.#point?.position.set(...at(0));
+    this.#trail?.lead(at(0));
+    const touch = this.#touchAt(X, unit);
+    const reach = Math.max(1.2, Math.min(2.6, Math.abs(touch ?? 0) + 0.3));
+    if (this.#tangent) moveLine(this.#tangent, [at(-reach), at(reach)]);
+    if (this.#touch) {
+      this.#touch.visible = touch !== null && Math.abs(touch) < 2.6;
+      this.#touch.position.set(...at(touch ?? 0));
+    }
+  }
+
+  /** Return where along the tangent it touches the quadric. */
+  #touchAt(X: number[], D: number[]): number | null {
+    if (this.#mu === null) return null;
+    const mu = this.#mu;
+    let [a, b] = [0, 0];
+    this.#A.forEach((entry, i) => {
+      const weight = this.#scale ** 2 / (entry - mu);
+      a += weight * D[i] * D[i];
+      b += weight * X[i] * D[i];
+    });
+    return Number.isFinite(b / a) ? -b / a : null;
+  }
+
+  describe({ q }: Sample): string {
+    const X = this.#position(q).map((x) => x * this.#scale);
+    const quadric =
+      this.#mu === null ? "" : ` The tangents touch the quadric of μ = 1/c₂ = ${short(this.#mu)}.`;
+    return `X is (${list(X)}).${quadric}`;
+  }
+}
+
+/** Return the four umbilics of an ellipsoid with three different axes. */
+function umbilics(A: number[]): number[][] {
+  if (A.length !== 3) return [];
+  const order = [0, 1, 2].sort((i, j) => A[j] - A[i]);
+  const [a, b, c] = order.map((i) => A[i]);
+  if (a === b || b === c) return [];
+  const [x, z] = [Math.sqrt((a * (a - b)) / (a - c)), Math.sqrt((c * (b - c)) / (a - c))];
+  return [1, -1].flatMap((s) =>
+    [1, -1].map((t) => {
+      const point = [0, 0, 0];
+      point[order[0]] = s * x;
+      point[order[2]] = t * z;
+      return point;
+    }),
+  );
+}

@@ -1,0 +1,283 @@
+/**
+ * Plots: λ_s(t), integrals at times up to 10¹², and the differences of browser, closed form and
+ * integration, with their errors, on a logarithmic axis.
+ */
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import type { Motion, Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
+import { element, short, View } from "./view.ts";
+import type { Curves, Loaded } from "./view.ts";
+
+/** Samples of the trail that the first plot shows. */
+const WINDOW = 1200;
+
+/** What is zero is drawn here on a logarithmic axis. */
+const FLOOR = 1e-17;
+
+/** A series of one engine of the server, with its own error at each time. */
+export interface EngineSeries {
+  times: number[];
+  frame: number[][][];
+  error: number[];
+}
+
+export interface Differences {
+  analytic: EngineSeries | null;
+  numeric: EngineSeries | null;
+}
+
+interface Plot {
+  title: string;
+  x: string;
+  host: HTMLElement;
+  logarithmic: boolean;
+  longTimes: boolean;
+  lines: { name: string; colour: string; dashed?: boolean }[];
+  data: uPlot.AlignedData;
+  chart: uPlot | null;
+}
+
+export class EnginesView extends View {
+  readonly #host = element("div", { class: "plots" });
+  #plots: Plot[] = [];
+  #loaded: Loaded | null = null;
+  #times: number[] = [];
+  #lambda: number[][] = [];
+  #largest: string[] = [];
+  #stale = true;
+
+  constructor() {
+    super(
+      "engines",
+      "Engines",
+      "λ(t); how integrals hold at far times; how far browser, closed form and integration differ.",
+    );
+    this.canvas.replaceWith(this.#host);
+    this.#host.setAttribute("role", "img");
+    this.#host.setAttribute("aria-label", "Plots of the motion and of its errors");
+    this.#host.setAttribute("aria-describedby", this.twin.id);
+  }
+
+  refusal(): string | null {
+    return null;
+  }
+
+  build(loaded: Loaded): void {
+    this.#loaded = loaded;
+    for (const { chart } of this.#plots) chart?.destroy();
+    this.#plots = [];
+    this.#times = [];
+    this.#lambda = [];
+    this.#largest = [];
+    this.#host.replaceChildren();
+    const count = loaded.motion.at(0).lambda.length;
+    if (count) {
+      const lines = Array.from({ length: count }, (_, s) => ({
+        name: `λ${"₁₂₃₄₅₆₇₈₉"[s] ?? ""}`,
+        colour: SERIES[s % SERIES.length],
+      }));
+      this.#add("λ(t)", loaded.time, lines, false, false);
+    }
+    if (loaded.document) {
+      const { times, columns, names } = integralErrors(loaded.motion, loaded.document.time === "t", loaded.A);
+      const colours = [BLUE, GREEN, ORANGE, PINK];
+      const lines = names.map((name, k) => ({ name, colour: colours[k] }));
+      const plot = this.#add("Change of integrals", loaded.time, lines, true, true);
+      plot.data = [times, ...columns];
+      const last = columns.map((column) => column[column.length - 1]);
+      this.#largest.push(`At 10⁶ the integrals are off by ${short(Math.max(...last), 2)}.`);
+    }
+  }
+
+  /** Take the series of the server's engines. */
+  compare({ analytic, numeric }: Differences): void {
+    if (!this.#loaded) return;
+    const { motion, time } = this.#loaded;
+    const difference = ({ times, frame }: EngineSeries) =>
+      times.map((t, k) => {
+        const own = motion.at(t).frame;
+        const away = frame[k].flat().reduce((most, x, i) => Math.max(most, Math.abs(x - own[i])), 0);
+        return Math.max(away, FLOOR);
+      });
+    const lines: Plot["lines"] = [];
+    const columns: number[][] = [];
+    const add = (name: string, colour: string, series: EngineSeries | null) => {
+      if (!series) return;
+      const found = difference(series);
+      lines.push({ name: `browser − ${name}`, colour });
+      lines.push({ name: `error of ${name}`, colour, dashed: true });
+      columns.push(found, series.error.map((x) => Math.max(x, FLOOR)));
+      const most = short(Math.max(...found), 2);
+      this.#largest.push(`Browser and ${name} differ by at most ${most}.`);
+    };
+    add("closed form", BLUE, analytic);
+    add("integration", VERMILION, numeric);
+    const times = (analytic ?? numeric)?.times;
+    if (!times) return;
+    const plot = this.#add("Difference of frames", time, lines, true, false);
+    plot.data = [times, ...columns];
+    this.#stale = true;
+  }
+
+  #add(title: string, x: string, lines: Plot["lines"], logarithmic: boolean, longTimes: boolean) {
+    const host = element("div", { class: "plot" });
+    const heading = element("h3", {}, title);
+    const legend = element("p", { class: "legend" });
+    for (const { name, colour, dashed } of lines) {
+      const mark = element("i", { class: dashed ? "dashed" : "" });
+      mark.style.borderColor = colour;
+      const entry = element("span", {}, name);
+      entry.prepend(mark);
+      legend.append(entry);
+    }
+    host.append(heading, legend);
+    this.#host.append(host);
+    const plot: Plot = { title, x, host, logarithmic, longTimes, lines, data: [[]], chart: null };
+    this.#plots.push(plot);
+    return plot;
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    const count = samples.times.length ? samples.lambda.length / samples.times.length : 0;
+    if (!count) return;
+    if (anew) {
+      this.#times = [];
+      this.#lambda = Array.from({ length: count }, () => []);
+    }
+    const first = Math.max(0, samples.times.length - WINDOW);
+    for (let k = first; k < samples.times.length; k++) {
+      this.#times.push(samples.times[k]);
+      this.#lambda.forEach((column, s) => column.push(samples.lambda[k * count + s]));
+    }
+    const extra = this.#times.length - WINDOW;
+    if (extra > 0) {
+      this.#times.splice(0, extra);
+      for (const column of this.#lambda) column.splice(0, extra);
+    }
+    const plot = this.#plots.find(({ title }) => title === "λ(t)");
+    if (!plot) return;
+    plot.data = [this.#times, ...this.#lambda];
+    plot.chart?.setData(plot.data);
+  }
+
+  show(_: Sample): void {}
+
+  draw(): void {
+    const width = Math.floor(this.#host.clientWidth);
+    if (!width) return;
+    for (const plot of this.#plots) {
+      const fit = plot.host.clientWidth - 4;
+      if (plot.data.length < 2 || fit < 60) continue;
+      if (!plot.chart || this.#stale) {
+        plot.chart?.destroy();
+        plot.chart = makeChart(plot, fit);
+      } else if (Math.abs(plot.chart.width - fit) > 2) {
+        plot.chart.setSize({ width: fit, height: plot.chart.height });
+      }
+    }
+    this.#stale = false;
+  }
+
+  /** Return the canvases of the plots, for pictures. */
+  canvases(): HTMLCanvasElement[] {
+    return this.#plots.flatMap(({ chart }) => (chart ? [chart.ctx.canvas] : []));
+  }
+
+  override curves(): Curves[] {
+    return this.#plots
+      .filter(({ data }) => data.length > 1)
+      .map(({ title, x, logarithmic, lines, data }) => ({
+        title,
+        x,
+        y: "",
+        logarithmic,
+        lines: lines.map((line, k) => ({
+          ...line,
+          points: Array.from(data[0], (t, i): [number, number] => [t, data[k + 1][i] as number]),
+        })),
+      }));
+  }
+
+  describe({ lambda }: Sample): string {
+    const now = lambda.length ? `λ is ${Array.from(lambda, (x) => short(x)).join(", ")}. ` : "";
+    return `${now}${this.#largest.join(" ")}`;
+  }
+}
+
+function makeChart(plot: Plot, width: number): uPlot {
+  const colours = theme();
+  const powers = (_: uPlot, values: number[]) =>
+    values.map((value) => {
+      const power = Math.log10(value);
+      return Number.isInteger(Math.round(1e6 * power) / 1e6) ? `1e${Math.round(power)}` : "";
+    });
+  const axis = (side: number, logarithmic: boolean): uPlot.Axis => ({
+    stroke: colours.text,
+    grid: { stroke: colours.line, width: 1 },
+    ticks: { stroke: colours.line, width: 1, size: 4 },
+    size: side === 2 ? 26 : 46,
+    font: "11px 'DejaVu Sans', system-ui, sans-serif",
+    ...(logarithmic ? { values: powers, space: side === 2 ? 34 : 18 } : {}),
+  });
+  const options: uPlot.Options = {
+    width,
+    height: 138,
+    legend: { show: false },
+    cursor: { show: false },
+    scales: {
+      x: { time: false, distr: plot.longTimes ? 3 : 1 },
+      y: { distr: plot.logarithmic ? 3 : 1 },
+    },
+    axes: [axis(2, plot.longTimes), axis(3, plot.logarithmic)],
+    series: [
+      {},
+      ...plot.lines.map(({ name, colour, dashed }) => ({
+        label: name,
+        stroke: colour,
+        width: 1.5,
+        points: { show: false },
+        ...(dashed ? { dash: [5, 4] } : {}),
+      })),
+    ],
+  };
+  return new uPlot(options, plot.data, plot.host);
+}
+
+/** Return how far integrals at times from 0.1 to 10⁶ are from those at the start. */
+function integralErrors(motion: Motion, physical: boolean, A: number[]) {
+  const times = Array.from({ length: 141 }, (_, k) => 10 ** (-1 + k / 20));
+  const start = integrals(motion.at(0), A, motion.n);
+  const names = ["(q,q)", "EᵀE", "Σ cₖ", ...(physical && A.length === motion.n ? ["energy"] : [])];
+  const columns: number[][] = names.map(() => []);
+  for (const t of times) {
+    const now = integrals(motion.at(t), A, motion.n);
+    names.forEach((_, k) => {
+      const scale = Math.abs(start[k]) || 1;
+      columns[k].push(Math.max(FLOOR, Math.abs(now[k] - start[k]) / scale));
+    });
+  }
+  return { times, columns, names };
+}
+
+/** Return (q,q), the largest entry of EᵀE − 1, Σ c_k = tr I − (q,Iq) − (q',q'), and the energy. */
+function integrals({ q, prime, velocity, frame }: Sample, A: number[], n: number): number[] {
+  const sum = (f: (i: number) => number) => A.reduce((total, _, i) => total + f(i), 0);
+  let off = 0;
+  for (let a = 0; a < n; a++) {
+    for (let b = 0; b <= a; b++) {
+      let product = a === b ? -1 : 0;
+      for (let i = 0; i < n; i++) product += frame[i * n + a] * frame[i * n + b];
+      off = Math.max(off, Math.abs(product));
+    }
+  }
+  const length = Array.from(q).reduce((total, x) => total + x * x, 0);
+  const c = sum((i) => (1 - q[i] * q[i]) / A[i] - prime[i] * prime[i]);
+  const [vv, qq, qv] = [
+    sum((i) => A[i] * velocity[i] ** 2),
+    sum((i) => A[i] * q[i] ** 2),
+    sum((i) => A[i] * q[i] * velocity[i]),
+  ];
+  return [length, 1 + off, c, vv * qq - qv * qv];
+}

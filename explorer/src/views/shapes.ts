@@ -1,0 +1,119 @@
+/** Surfaces, lines, arrows and points of the three-dimensional views. */
+import {
+  ArrowHelper,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DoubleSide,
+  Float32BufferAttribute,
+  Line,
+  LineBasicMaterial,
+  Mesh,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+  SphereGeometry,
+  Vector3,
+} from "three";
+
+export type Point = [number, number, number];
+
+/** Return the line through points. */
+export function line(points: Point[], colour: string, opacity = 1): Line {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(points.flat(), 3));
+  const transparent = opacity < 1;
+  const material = new LineBasicMaterial({ color: colour, transparent, opacity });
+  material.depthWrite = !transparent;
+  const made = new Line(geometry, material);
+  made.frustumCulled = false;
+  return made;
+}
+
+/** Move the points of a line. */
+export function moveLine(one: Line, points: Point[]): void {
+  const attribute = one.geometry.getAttribute("position") as BufferAttribute;
+  attribute.array.set(points.flat());
+  attribute.needsUpdate = true;
+}
+
+export interface SurfaceOptions {
+  opacity?: number;
+  /** The colour of a point, where it is not that of all. */
+  colours?: (point: Point) => string;
+  across?: number;
+  along?: number;
+}
+
+/** Return the surface of f on the unit square. */
+export function surface(
+  f: (u: number, v: number) => Point,
+  colour: string,
+  { opacity = 1, colours, across = 64, along = 32 }: SurfaceOptions = {},
+): Mesh {
+  const position: number[] = [];
+  const shade: number[] = [];
+  const index: number[] = [];
+  for (let i = 0; i <= across; i++) {
+    for (let j = 0; j <= along; j++) {
+      const point = f(i / across, j / along);
+      position.push(...point);
+      if (colours) shade.push(...new Color(colours(point)).toArray());
+      if (i < across && j < along) {
+        const a = i * (along + 1) + j;
+        index.push(a, a + 1, a + along + 1, a + 1, a + along + 2, a + along + 1);
+      }
+    }
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(position, 3));
+  if (colours) geometry.setAttribute("color", new Float32BufferAttribute(shade, 3));
+  geometry.setIndex(index);
+  geometry.computeVertexNormals();
+  const material = new MeshStandardMaterial({
+    color: colours ? 0xffffff : colour,
+    vertexColors: colours !== undefined,
+    transparent: opacity < 1,
+    opacity,
+    side: DoubleSide,
+    roughness: 0.55,
+    depthWrite: opacity >= 1,
+  });
+  return new Mesh(geometry, material);
+}
+
+/** Return a point of the unit sphere, scaled along the axes. */
+export function onEllipsoid(u: number, v: number, axes: ArrayLike<number>): Point {
+  const [longitude, colatitude] = [2 * Math.PI * u, Math.PI * v];
+  return [
+    axes[0] * Math.cos(longitude) * Math.sin(colatitude),
+    axes[1] * Math.sin(longitude) * Math.sin(colatitude),
+    axes[2] * Math.cos(colatitude),
+  ];
+}
+
+export function arrow(colour: string, length: number, head = 0.11): ArrowHelper {
+  const made = new ArrowHelper(
+    new Vector3(0, 0, 1),
+    new Vector3(),
+    length,
+    colour,
+    head,
+    0.5 * head,
+  );
+  made.line.frustumCulled = made.cone.frustumCulled = false;
+  return made;
+}
+
+/** Point an arrow along a vector, with its length where that is not given. */
+export function aim(one: ArrowHelper, x: number, y: number, z: number, length?: number): void {
+  const size = Math.hypot(x, y, z);
+  one.visible = size > 1e-12;
+  if (!one.visible) return;
+  one.setDirection(new Vector3(x / size, y / size, z / size));
+  if (length === undefined) one.setLength(size, Math.min(0.11, 0.4 * size), 0.055);
+}
+
+export function ball(colour: string, radius: number): Mesh {
+  const geometry = new SphereGeometry(radius, 20, 14);
+  return new Mesh(geometry, new MeshBasicMaterial({ color: colour }));
+}

@@ -1,0 +1,108 @@
+/** q on the unit sphere: its trail, the net of spheroconic coordinates, the zone of the motion. */
+import type { ArrowHelper, Mesh } from "three";
+import type { Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { netValues, spheroconicLine } from "./conics.ts";
+import { aim, arrow, ball, line, onEllipsoid, surface } from "./shapes.ts";
+import type { Point } from "./shapes.ts";
+import { View3D } from "./stage.ts";
+import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
+import { TrailLine } from "./trail_line.ts";
+import { list, short } from "./view.ts";
+import type { Loaded } from "./view.ts";
+
+const CAPTION =
+  "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
+
+export class SphereView extends View3D {
+  #n = 3;
+  #trail: TrailLine | null = null;
+  #point: Mesh | null = null;
+  #velocity: ArrowHelper | null = null;
+  #zone = "";
+
+  constructor() {
+    super(
+      "sphere",
+      "Sphere",
+      CAPTION,
+      [2.5, -3.0, 1.7],
+    );
+  }
+
+  refusal({ motion }: Loaded): string | null {
+    return motion.at(0).q.length ? null : "This system has no vector q.";
+  }
+
+  build({ motion, torus, A }: Loaded): void {
+    this.clear();
+    const colours = theme();
+    this.#n = motion.n;
+    this.caption.textContent =
+      this.#n > 3
+        ? "The first three components of q, which moves on a sphere of more dimensions."
+        : CAPTION;
+    const c2 = torus && motion.n === 3 ? torus.constants[0] : null;
+    const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
+    const unit = [1, 1, 1];
+    const [plain, shaded] = colours.dark ? ["#243042", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
+    const inside = I && c2 !== null ? zoneOf(I, c2) : null;
+    const globe = surface((u, v) => onEllipsoid(u, v, unit), plain, {
+      opacity: 0.62,
+      across: 160,
+      along: 96,
+      colours: (point) => (inside?.(point) ? shaded : plain),
+    });
+    globe.renderOrder = 0;
+    this.world.add(globe);
+    this.#zone = "";
+    if (I && this.#n === 3) {
+      for (const value of netValues(I)) {
+        for (const one of spheroconicLine(I, value)) this.world.add(line(one, colours.dim, 0.42));
+      }
+      if (c2 !== null) {
+        for (const one of spheroconicLine(I, c2)) this.world.add(line(one, ORANGE));
+        this.#zone = `The zone is bounded by λ = c₂ = ${short(c2)}. `;
+      }
+    }
+    this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");
+    this.#point = ball(VERMILION, 0.035);
+    this.#velocity = arrow(GREEN, 0.4);
+    this.world.add(this.#trail.object, this.#point, this.#velocity);
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    this.#trail?.extend(samples, anew, ({ q }, k) => place(q, k * this.#n, this.#n));
+  }
+
+  show({ q, velocity }: Sample): void {
+    const at = place(q, 0, this.#n);
+    this.#point?.position.set(...at);
+    this.#trail?.lead(at);
+    if (this.#velocity) {
+      this.#velocity.position.set(...at);
+      aim(this.#velocity, ...place(velocity, 0, this.#n, 0), 0.42);
+    }
+  }
+
+  describe({ q, lambda }: Sample): string {
+    const coordinates = lambda.length ? `Its coordinates λ are ${list(lambda, 5)}. ` : "";
+    const shadow = this.#n > 3 ? "The picture shows its first three components. " : "";
+    return `q is (${list(q)}). ${coordinates}${this.#zone}${shadow}`;
+  }
+}
+
+/** Return the point of q in the picture: its first three components, a little above the sphere. */
+function place(q: ArrayLike<number>, from: number, n: number, lift = 1.004): Point {
+  const scale = lift || 1;
+  return [scale * q[from], scale * q[from + 1], n > 2 ? scale * q[from + 2] : 0];
+}
+
+/** Return whether a point is where a motion with this c_2 can be. */
+function zoneOf(I: number[], c2: number): (point: Point) => boolean {
+  const middle = [...I].sort((a, b) => a - b)[1];
+  return (point) => {
+    const sum = point.reduce((total, x, i) => total + (x * x) / (c2 - I[i]), 0);
+    return c2 < middle ? sum <= 0 : sum >= 0;
+  };
+}

@@ -1,0 +1,120 @@
+/** Three dimensions: one WebGL renderer draws for all views, each into a canvas of its own. */
+import {
+  AmbientLight,
+  Color,
+  DirectionalLight,
+  Group,
+  HemisphereLight,
+  PerspectiveCamera,
+  Scene,
+  Spherical,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import type { Material, Mesh } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { View } from "./view.ts";
+import { theme } from "./theme.ts";
+
+let renderer: WebGLRenderer | null = null;
+let failed = false;
+
+/** Return the renderer, null where the browser has no WebGL. */
+export function sharedRenderer(): WebGLRenderer | null {
+  if (renderer || failed) return renderer;
+  try {
+    renderer = new WebGLRenderer({ antialias: true, alpha: false, preserveDrawingBuffer: true });
+    renderer.autoClear = true;
+  } catch {
+    failed = true;
+  }
+  return renderer;
+}
+
+export abstract class View3D extends View {
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(32, 1, 0.02, 4000);
+  readonly world = new Group();
+  readonly controls: OrbitControls;
+  /** The distance that the camera keeps from what it looks at. */
+  readonly distance: number;
+
+  constructor(name: string, title: string, caption: string, from: [number, number, number]) {
+    super(name, title, caption);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(...from);
+    this.distance = this.camera.position.length();
+    this.scene.add(new HemisphereLight(0xffffff, 0x556677, 1.5), new AmbientLight(0xffffff, 0.4));
+    const sun = new DirectionalLight(0xffffff, 1.5);
+    sun.position.set(2, -3, 4);
+    this.scene.add(sun, this.world);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.enablePan = false;
+    this.controls.addEventListener("change", () => (this.stale = true));
+    // The wheel scrolls the page unless a view has the focus.
+    this.controls.enableZoom = false;
+    this.canvas.addEventListener("focus", () => (this.controls.enableZoom = true));
+    this.canvas.addEventListener("blur", () => (this.controls.enableZoom = false));
+    this.canvas.addEventListener("keydown", (event) => this.#turn(event));
+    this.canvas.classList.add("space");
+    this.canvas.setAttribute("aria-roledescription", "scene; arrows turn it, + and − zoom");
+  }
+
+  override draw(): void {
+    const shared = sharedRenderer();
+    const context = this.canvas.getContext("2d");
+    this.fit();
+    const { width, height } = this.canvas;
+    if (!shared || !context || !width || !height) return;
+    this.scene.background = new Color(theme().background);
+    this.camera.aspect = width / height;
+    // A tall canvas sees as much of the breadth as a square one does.
+    this.camera.fov = this.camera.aspect < 1 ? 32 / Math.max(this.camera.aspect, 0.55) : 32;
+    this.camera.updateProjectionMatrix();
+    const canvas = shared.domElement;
+    if (canvas.width < width || canvas.height < height) {
+      const [w, h] = [Math.max(canvas.width, width), Math.max(canvas.height, height)];
+      shared.setSize(w, h, false);
+    }
+    shared.setScissorTest(true);
+    shared.setViewport(0, 0, width, height);
+    shared.setScissor(0, 0, width, height);
+    shared.render(this.scene, this.camera);
+    context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+  }
+
+  /** Take everything out of the world and free its memory. */
+  protected clear(): void {
+    this.world.traverse((object) => {
+      const { geometry, material } = object as Partial<Mesh>;
+      geometry?.dispose();
+      for (const one of [material].flat()) (one as Material | undefined)?.dispose();
+    });
+    this.world.clear();
+  }
+
+  #turn(event: KeyboardEvent): void {
+    const turns: Record<string, [number, number, number]> = {
+      ArrowLeft: [-0.12, 0, 1],
+      ArrowRight: [0.12, 0, 1],
+      ArrowUp: [0, -0.12, 1],
+      ArrowDown: [0, 0.12, 1],
+      "+": [0, 0, 1 / 1.12],
+      "=": [0, 0, 1 / 1.12],
+      "-": [0, 0, 1.12],
+    };
+    const turn = turns[event.key];
+    if (!turn || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    const arm = this.camera.position.clone().sub(this.controls.target);
+    // Spherical coordinates have their pole along y; the views have it along z.
+    const place = new Spherical().setFromVector3(new Vector3(arm.y, arm.z, arm.x));
+    place.theta += turn[0];
+    place.phi = Math.min(Math.PI - 0.05, Math.max(0.05, place.phi + turn[1]));
+    place.radius *= turn[2];
+    const moved = new Vector3().setFromSpherical(place);
+    this.camera.position.set(moved.z, moved.x, moved.y).add(this.controls.target);
+    this.controls.update();
+  }
+}

@@ -1,0 +1,40 @@
+/** Colours: those of Okabe and Ito, and those of the page, light or dark. */
+
+export const BLUE = "#56b4e9";
+export const ORANGE = "#e69f00";
+export const GREEN = "#009e73";
+export const VERMILION = "#d55e00";
+export const PINK = "#cc79a7";
+export const DEEP_BLUE = "#0072b2";
+export const YELLOW = "#f0e442";
+
+/** Colours of λ_1, λ_2, … and of the phases z_1, z_2, … */
+export const SERIES = [GREEN, PINK, ORANGE, BLUE, VERMILION];
+
+/** Colours of e_1, e_2, … */
+export const AXES = [BLUE, VERMILION, GREEN, PINK, ORANGE];
+
+export interface Theme {
+  background: string;
+  surface: string;
+  line: string;
+  text: string;
+  dim: string;
+  accent: string;
+  dark: boolean;
+}
+
+/** Return the colours that the style sheet has at the moment. */
+export function theme(): Theme {
+  const style = getComputedStyle(document.documentElement);
+  const value = (name: string) => style.getPropertyValue(name).trim();
+  return {
+    background: value("--view"),
+    surface: value("--surface"),
+    line: value("--line"),
+    text: value("--text"),
+    dim: value("--dim"),
+    accent: value("--accent"),
+    dark: value("--dark") === "1",
+  };
+}

@@ -1,0 +1,139 @@
+/** The invariant torus: phases z on T² as a ring, on T³ as a cube, on T¹ as a circle. */
+import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments } from "three";
+import type { Mesh } from "three";
+import { convergents, partialQuotients } from "../evaluator/continued_fraction.ts";
+import type { Sample } from "../evaluator/motion.ts";
+import type { Samples } from "../evaluator/samples.ts";
+import { ball, line, surface } from "./shapes.ts";
+import type { Point } from "./shapes.ts";
+import { View3D } from "./stage.ts";
+import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { TrailLine } from "./trail_line.ts";
+import { list, short } from "./view.ts";
+import type { Loaded } from "./view.ts";
+
+/** Dots of the section z_1 = 0. */
+const SECTION = 160;
+
+export class TorusView extends View3D {
+  #genus = 2;
+  #trail: TrailLine | null = null;
+  #point: Mesh | null = null;
+  #ratio = "";
+
+  constructor() {
+    super(
+      "torus",
+      "Torus",
+      "The phases z move on straight lines. Dots mark the section z₁ = 0 (orange).",
+      [2.75, -3.3, 2.5],
+    );
+  }
+
+  refusal({ motion, torus }: Loaded): string | null {
+    if (!torus || !motion.genus) return "The page has no torus of this motion.";
+    return motion.genus <= 3 ? null : "A torus of more than three phases is not drawn.";
+  }
+
+  build({ motion, torus }: Loaded): void {
+    this.clear();
+    const colours = theme();
+    this.#genus = motion.genus;
+    const trailColour = colours.dark ? BLUE : "#0072b2";
+    if (this.#genus === 3) this.#buildCube(colours.dim, trailColour);
+    else if (this.#genus === 2) this.#buildRing(torus!, colours.dark, trailColour);
+    else this.#buildCircle(colours.dim, trailColour);
+    this.#point = ball(VERMILION, 0.045);
+    this.world.add(this.#point);
+    const ratios = torus!.rotation_numbers.slice(1);
+    this.#ratio = ratios.map(fractionText).join(" ");
+    const captions = [
+      "One phase: the motion is periodic.",
+      `z₁ runs along green, z₂ along pink. ${this.#ratio} Dots: the section z₁ = 0.`,
+      "Three phases in a cube, z₁ along green, z₂ along pink, z₃ along orange: straight lines.",
+    ];
+    this.caption.textContent = captions[this.#genus - 1];
+  }
+
+  #buildRing(torus: NonNullable<Loaded["torus"]>, dark: boolean, trailColour: string): void {
+    const skin = surface((u, v) => onRing(u, v, 0.985), dark ? "#243042" : "#dfe6ee", {
+      opacity: 0.62,
+      across: 112,
+      along: 48,
+    });
+    this.#trail = new TrailLine(10000, trailColour, { opacity: 0.7 });
+    this.world.add(skin, this.#trail.object);
+    const circle = (f: (x: number) => Point) =>
+      Array.from({ length: 97 }, (_, k) => f(k / 96));
+    this.world.add(
+      line(circle((x) => onRing(x, 0, 1.012)), GREEN),
+      line(circle((x) => onRing(0, x, 1.012)), PINK),
+    );
+    const [z, f] = [torus.phases, torus.frequencies_tau1];
+    for (let k = 0; k < SECTION; k++) {
+      const dot = ball(ORANGE, 0.009);
+      dot.position.set(...onRing(0, z[1] + ((k - z[0]) * f[1]) / f[0], 1.02));
+      this.world.add(dot);
+    }
+  }
+
+  #buildCube(dim: string, trailColour: string): void {
+    const box = new EdgesGeometry(new BoxGeometry(1.5, 1.5, 1.5));
+    this.world.add(new LineSegments(box, new LineBasicMaterial({ color: dim })));
+    this.#trail = new TrailLine(10000, trailColour, { opacity: 0.8, points: 2.4 });
+    this.world.add(this.#trail.object);
+    const corner: Point = [-0.75, -0.75, -0.75];
+    [GREEN, PINK, ORANGE].forEach((colour, axis) => {
+      const end = corner.map((x, i) => (i === axis ? 0.75 : x)) as Point;
+      this.world.add(line([corner, end], colour));
+    });
+  }
+
+  #buildCircle(dim: string, trailColour: string): void {
+    const points = Array.from({ length: 129 }, (_, k) => this.#place([k / 128], 0));
+    this.world.add(line(points, dim));
+    this.#trail = new TrailLine(10000, trailColour, { points: 3 });
+    this.world.add(this.#trail.object);
+  }
+
+  #place(z: ArrayLike<number>, from: number): Point {
+    if (this.#genus === 2) return onRing(z[from], z[from + 1], 1.004);
+    if (this.#genus === 3) {
+      const inCube = (x: number) => 1.5 * (x - Math.floor(x)) - 0.75;
+      return [inCube(z[from]), inCube(z[from + 1]), inCube(z[from + 2])];
+    }
+    const angle = 2 * Math.PI * z[from];
+    return [Math.cos(angle), Math.sin(angle), 0];
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    this.#trail?.extend(samples, anew, ({ z }, k) => this.#place(z, k * this.#genus));
+  }
+
+  show({ z }: Sample): void {
+    const at = this.#place(z, 0);
+    this.#point?.position.set(...at);
+    if (this.#genus === 2) this.#trail?.lead(at);
+  }
+
+  describe({ z }: Sample): string {
+    const phases = Array.from(z, (entry) => entry - Math.floor(entry));
+    return `The phases z are ${list(phases)} cycles. ${this.#ratio}`;
+  }
+}
+
+function onRing(a: number, b: number, lift: number): Point {
+  const [u, v] = [2 * Math.PI * a, 2 * Math.PI * b];
+  const r = 0.4 * lift;
+  return [(0.85 + r * Math.cos(v)) * Math.cos(u), (0.85 + r * Math.cos(v)) * Math.sin(u), r * Math.sin(v)];
+}
+
+/** Return a rotation number with its continued fraction and the best fraction of two digits. */
+export function fractionText(ratio: number): string {
+  const [whole, ...rest] = partialQuotients(ratio);
+  const near = convergents(ratio).filter(({ denominator }) => denominator < 100).at(-1);
+  const expansion = rest.length ? `[${whole}; ${rest.join(", ")}]` : `[${whole}]`;
+  const exact = near && near.error < 1e-12;
+  const fraction = near ? ` ${exact ? "=" : "≈"} ${near.numerator}/${near.denominator}` : "";
+  return `Rotation number ${short(ratio, 7)} = ${expansion}${fraction}.`;
+}

@@ -1,0 +1,95 @@
+/**
+ * The evaluator against series that the Python engine made: EVALUATOR_CASES names a JSON file of
+ * cases (tests/explorer/test_evaluator.py writes it).
+ */
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { convergents, partialQuotients } from "../src/evaluator/continued_fraction.ts";
+import * as dd from "../src/evaluator/double_double.ts";
+import { requireDocument } from "../src/evaluator/document.ts";
+import type { ClosedFormDocument } from "../src/evaluator/document.ts";
+import { ClosedFormMotion } from "../src/evaluator/motion.ts";
+import { spheroconic } from "../src/evaluator/spheroconic.ts";
+
+interface Case {
+  name: string;
+  document: ClosedFormDocument;
+  times: (number | string)[];
+  /** Bounds of the deviation, of each time. */
+  bounds: number[];
+  frame: number[][][];
+  position?: number[][];
+  velocity?: number[][];
+}
+
+const file = process.env.EVALUATOR_CASES;
+const cases: Case[] = file ? JSON.parse(readFileSync(file, "utf8")) : [];
+
+const largest = (values: number[]): number => Math.max(...values.map(Math.abs));
+
+for (const { name, document, times, bounds, frame, position, velocity } of cases) {
+  test(`${name}: frame, contact point and velocity are those of the engine`, () => {
+    const motion = new ClosedFormMotion(document);
+    times.forEach((time, k) => {
+      const sample = motion.at(dd.parse(time));
+      const deviation = largest(frame[k].flat().map((entry, i) => entry - sample.frame[i]));
+      assert.ok(deviation <= bounds[k], `t = ${time}: ${deviation} exceeds ${bounds[k]}`);
+      if (position && sample.position) {
+        const away = largest(position[k].map((entry, i) => entry - sample.position![i]));
+        const scale = 1 + largest(position[k]);
+        assert.ok(away <= 10 * bounds[k] * scale, `t = ${time}: contact point ${away}`);
+      }
+      if (velocity) {
+        const off = largest(velocity[k].map((entry, i) => entry - sample.velocity[i]));
+        assert.ok(off <= 20 * bounds[k], `t = ${time}: velocity ${off} exceeds ${20 * bounds[k]}`);
+      }
+    });
+  });
+  test(`${name}: a frame takes at most the milliseconds that a picture has for it`, () => {
+    const motion = new ClosedFormMotion(document);
+    for (let k = 0; k < 300; k++) motion.at(k * 0.37);
+    const durations = Array.from({ length: 9 }, (_, block) => {
+      const began = performance.now();
+      for (let k = 0; k < 20; k++) motion.at(1000 + block + k * 0.37);
+      return (performance.now() - began) / 20;
+    }).sort((a, b) => a - b);
+    const limit = document.genus <= 2 ? 1 : 4;
+    console.log(`${name}: ${(1000 * durations[4]).toFixed(0)} µs a frame`);
+    assert.ok(durations[4] < limit, `${durations[4]} ms`);
+  });
+}
+
+test("decimal texts are numbers of 32 digits", () => {
+  const tenth = dd.parse("0.1");
+  assert.equal(tenth[0], 0.1);
+  assert.ok(Math.abs(tenth[1] + 5.551115123125783e-18) < 1e-33);
+  const third = dd.parse("1/3");
+  const rest = dd.add(dd.multiply(third, [3, 0]), [-1, 0]);
+  assert.ok(Math.abs(rest[0]) < 1e-31);
+  assert.ok(Math.abs(dd.remainder(dd.multiply(dd.parse("0.1"), dd.parse("1e15")), 2)) < 1e-15);
+  assert.ok(Math.abs(dd.remainder(dd.parse("-0.25"), 2) - 1.75) < 1e-15);
+  assert.ok(Number.isNaN(dd.parse("x")[0]));
+});
+
+test("continued fractions find the ratio of a resonance and the golden section", () => {
+  assert.deepEqual(partialQuotients(1.5), [1, 2]);
+  assert.deepEqual(partialQuotients((1 + Math.sqrt(5)) / 2, 6), [1, 1, 1, 1, 1, 1]);
+  const [, , third] = convergents(Math.PI, 3);
+  assert.deepEqual([third.numerator, third.denominator], [333, 106]);
+});
+
+test("spheroconic coordinates are zeros of their equation", () => {
+  const [q, I] = [[0.6, 0.48, 0.64], [1 / 3, 1 / 2, 1]];
+  for (const value of spheroconic(q, I, new Float64Array(2))) {
+    const sum = q.reduce((total, entry, i) => total + entry ** 2 / (value - I[i]), 0);
+    assert.ok(Math.abs(sum) < 1e-12, `${value}`);
+  }
+});
+
+test("a document of another version is refused in a sentence", () => {
+  assert.throws(
+    () => requireDocument({ format: "veselova.closed-form/2" }),
+    /must have the format veselova.closed-form\/1; this server gave veselova.closed-form\/2/,
+  );
+});

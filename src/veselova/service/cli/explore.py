@@ -1,0 +1,80 @@
+"""``veselova explore``: the explorer on a free port of loopback, in the browser of the desktop."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import threading
+import time
+import webbrowser
+from typing import Any
+from urllib.parse import urlencode
+
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.service.http.explorer import BUNDLE, MISSING
+from veselova.service.http.server import serve
+
+__all__ = ["address_of", "explore"]
+
+#: Seconds that the server may take until it answers.
+_PATIENCE_S = 60.0
+
+_LOOPBACK = "127.0.0.1"
+
+
+def explore(document: Any, port: int, browser: bool) -> None:
+    """Serve the explorer until interrupted, with a problem where one is given.
+
+    ``document`` is the body of a request, or None; port 0 takes a free one; ``browser`` opens the
+    page. Raises InvalidInput where the document has no problem, and for a port that is taken.
+    """
+    chosen = port or _free_port()
+    address = address_of(chosen, document)
+    if not (BUNDLE / "index.html").is_file():
+        print(MISSING, end="")
+    announce = threading.Thread(target=_announce, args=(chosen, address, browser), daemon=True)
+    announce.start()
+    serve(_LOOPBACK, chosen, log_level="warning")
+
+
+def address_of(port: int, document: Any = None) -> str:
+    """Return the address of the page, with the problem of a request in its fragment."""
+    address = f"http://{_LOOPBACK}:{port}/"
+    if document is None:
+        return address
+    problem = document.get("problem") if isinstance(document, dict) else None
+    if not isinstance(problem, dict) or not isinstance(problem.get("system"), str):
+        required = "a request with a problem that names its system"
+        raise InvalidInput(("FILE",), required, show(document))
+    fragment = urlencode({"problem": json.dumps(problem, separators=(",", ":"))})
+    return f"{address}#{fragment}"
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((_LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+def _announce(port: int, address: str, browser: bool) -> None:
+    """Print the address once the server answers, and open it."""
+    deadline = time.monotonic() + _PATIENCE_S
+    while not _answers(port):
+        if time.monotonic() > deadline:
+            return
+        time.sleep(0.05)
+    print(f"The explorer is at {address} until you interrupt it (Ctrl-C).", flush=True)
+    if browser:
+        webbrowser.open(address)
+
+
+def _answers(port: int) -> bool:
+    connection = http.client.HTTPConnection(_LOOPBACK, port, timeout=2)
+    try:
+        connection.request("GET", "/healthz")
+        return connection.getresponse().status == 200
+    except OSError:
+        return False
+    finally:
+        connection.close()

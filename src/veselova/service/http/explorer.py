@@ -1,0 +1,116 @@
+"""The explorer at ``/``: files of a bundle that the build of the package makes, with the one policy
+that lets them run.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import mimetypes
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+
+__all__ = ["BUNDLE", "FILES", "MISSING", "add_explorer"]
+
+#: Where the build puts the bundle (``explorer/build.py``); no commit has it.
+BUNDLE = Path(__file__).parents[2] / "explorer"
+
+#: The path of its files besides the page itself.
+FILES = "/explorer/"
+
+_POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "worker-src 'self'",
+        "style-src 'self'",
+        "font-src 'self'",
+        "img-src 'self' data: blob:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+
+#: Names of files hold a hash of what is in them, so they never change; the page names them anew.
+_FOR_EVER = "public, max-age=31536000, immutable"
+
+#: What is said where the bundle is missing.
+MISSING = (
+    "The explorer was not built with this installation: with Node 22 or newer in PATH, "
+    "run `python explorer/build.py` in a clone and start the server again.\n"
+)
+
+#: Types that mimetypes of some systems do not know.
+_TYPES = {".js": "text/javascript", ".woff2": "font/woff2", ".css": "text/css"}
+
+#: Types that are compressed already.
+_COMPRESSED = frozenset({"font/woff2", "image/png"})
+
+
+@dataclass(frozen=True)
+class _File:
+    """A file of the bundle, read when it is asked for first."""
+
+    path: Path
+
+    @cached_property
+    def content(self) -> bytes:
+        """Return what is in the file."""
+        return self.path.read_bytes()
+
+    @cached_property
+    def compressed(self) -> bytes | None:
+        """Return the content in gzip, None where that saves nothing."""
+        return None if self.media_type in _COMPRESSED else gzip.compress(self.content, mtime=0)
+
+    @cached_property
+    def etag(self) -> str:
+        """Return the name of the content."""
+        return f'"{hashlib.sha256(self.content).hexdigest()[:32]}"'
+
+    @property
+    def media_type(self) -> str:
+        """Return the media type by the name of the file."""
+        known = _TYPES.get(self.path.suffix)
+        return known or mimetypes.guess_type(self.path.name)[0] or "application/octet-stream"
+
+    def answer(self, request: Request, cache_control: str) -> Response:
+        """Return the file, compressed where the client takes that; 304 where the client has it."""
+        headers = {"ETag": self.etag, "Cache-Control": cache_control, "Vary": "Accept-Encoding"}
+        headers["Content-Security-Policy"] = _POLICY
+        if request.headers.get("if-none-match") == self.etag:
+            return Response(status_code=304, headers=headers)
+        content = self.content
+        takes = request.headers.get("accept-encoding", "")
+        if self.compressed is not None and "gzip" in takes:
+            headers["Content-Encoding"] = "gzip"
+            content = self.compressed
+        return Response(content, headers=headers, media_type=self.media_type)
+
+
+def add_explorer(app: FastAPI, bundle: Path = BUNDLE) -> None:
+    """Serve the explorer at ``/``, or one sentence where it was not built."""
+    folder = bundle / "explorer"
+    files = {path.name: _File(path) for path in folder.glob("*")} if folder.is_dir() else {}
+    page = _File(bundle / "index.html") if (bundle / "index.html").is_file() else None
+
+    async def index(request: Request) -> Response:
+        if page is None:
+            return PlainTextResponse(MISSING, status_code=404)
+        return page.answer(request, "no-cache")
+
+    async def file(request: Request) -> Response:
+        found = files.get(request.path_params["name"])
+        if found is None:
+            return PlainTextResponse("The explorer has no such file.\n", status_code=404)
+        return found.answer(request, _FOR_EVER)
+
+    app.add_route("/", index, include_in_schema=False)
+    app.add_route(FILES + "{name}", file, include_in_schema=False)

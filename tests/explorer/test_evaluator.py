@@ -1,0 +1,108 @@
+"""The evaluator of the explorer, in Node, against the engine: every preset that has a closed form,
+and bodies of two, three and four dimensions.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from explorer_bundle import EXPLORER, npm_or_skip
+
+import veselova as vs
+from veselova.mechanics.core.problem import Problem
+from veselova.service.api.request_models import TorusRequest, read_request
+
+PRESETS = json.loads((EXPLORER / "src" / "presets.json").read_text())
+
+#: Presets that the page takes from the service as series: two without a closed form, and one on a
+#: separatrix.
+SERIES = {"chaplygin", "chaos", "umbilic"}
+
+#: Times up to which twice a document's own error bounds the evaluator.
+TIMES: list[Any] = [0, 0.25, -2.75, 1, 17.25, 123, 999.5, 10_000]
+
+#: A time beyond, digits of the document, and the deviation that is allowed there.
+FAR = [(10**6, 15, 1e-9), (10**12, 30, 1e-9)]
+
+#: Whose document of 30 digits is evaluated too.
+PRECISE = {"plane", "generic", "symmetric"}
+
+BODIES: dict[str, Problem] = {
+    "plane": vs.Veselova([3, 2], ["0.6", "0.8"], ["0.8", "-0.6"]),
+    "pairs of equal A": vs.Veselova([3, 3, 1, 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"]),
+    "matrix": vs.Veselova(
+        [["2.5", "0.25", 0], ["0.25", 2, "0.125"], [0, "0.125", 1]],
+        ["0.6", 0, "0.8"],
+        ["0.8", 1, "-0.6"],
+    ),
+    "neumann": vs.NeumannSystem([3, 2, 1], ["0.6", 0, "0.8"], ["0.8", 1, "-0.6"]),
+}
+
+
+def problems() -> dict[str, Problem]:
+    """Return the problems of the presets that have a closed form, and further ones."""
+    found = dict(BODIES)
+    for preset in PRESETS:
+        if preset["name"] not in SERIES:
+            request = read_request(TorusRequest, {"problem": preset["problem"]})
+            found[preset["name"]] = request.problem.problem()
+    return found
+
+
+def case(name: str, problem: Problem, times: list[Any], digits: int, bound: float | None) -> Any:
+    """Return a document, what the engine has at these times, and the deviations allowed."""
+    document = vs.closed_form(problem, digits=digits).document
+    error = document["error"]
+    truth = vs.solve(problem, times, digits=digits)
+    bounds = (
+        np.full(len(times), bound)
+        if bound
+        else 2
+        * (
+            float(error["at_start"])
+            + float(error["per_unit_time"]) * np.abs(np.asarray(truth.times, float))
+        )
+    )
+    found = {
+        "name": f"{name}, {digits} digits",
+        "document": document,
+        "times": [str(time) for time in times],
+        "bounds": (bounds + truth.error).tolist(),
+        "frame": truth.frame.tolist(),
+    }
+    if "path" in document:
+        found["position"] = truth.position.tolist()
+    if document["problem"]["system"] == "veselova" and digits == 15 and not bound:
+        found["velocity"] = truth.q_dot.tolist()
+    return found
+
+
+def test_the_evaluator_has_what_the_engine_has(tmp_path: Path) -> None:
+    npm = npm_or_skip()
+    cases = []
+    for name, problem in problems().items():
+        cases.append(case(name, problem, TIMES, 15, None))
+        for time, digits, bound in FAR:
+            if digits == 15 or name in PRECISE:
+                cases.append(case(name, problem, [time], digits, bound))
+    file = tmp_path / "cases.json"
+    file.write_text(json.dumps(cases))
+    answer = subprocess.run(
+        [*npm, "test", "--silent"],
+        cwd=EXPLORER,
+        env={
+            **os.environ,
+            "PATH": f"{Path(npm[0]).parent}:{os.environ['PATH']}",
+            "EVALUATOR_CASES": str(file),
+        },
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert answer.returncode == 0, answer.stdout[-6000:]
+    assert f"tests {2 * len(cases) + 4}" in answer.stdout

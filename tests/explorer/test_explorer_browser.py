@@ -1,0 +1,461 @@
+"""The explorer in a real browser: Debian's chromium, driven by playwright.
+
+Every page reports its errors, breaches of its policy and requests to other origins; each test
+fails for any of them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from explorer_bundle import EXPLORER, build_or_skip
+
+from conftest import Server, running_server
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+CHROMIUM = shutil.which("chromium")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium in PATH")
+
+#: Seconds that a page may take for what must come; only a failure takes them.
+PATIENCE_S = 60.0
+
+#: Graphics are drawn by the processor, and the browser asks nothing of any network.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+
+PRESETS = [preset["name"] for preset in json.loads((EXPLORER / "src/presets.json").read_text())]
+
+#: Breaches of the policy, collected in the page.
+_WATCH = """
+window.breaches = [];
+document.addEventListener("securitypolicyviolation", (event) =>
+  window.breaches.push(`${event.violatedDirective} ${event.blockedURI}`));
+"""
+
+#: How many different colours a canvas shows, and the part that is not the commonest.
+_INK = """(canvas) => {
+  const { width, height } = canvas;
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [width, height];
+  const context = copy.getContext("2d");
+  context.drawImage(canvas, 0, 0);
+  const data = context.getImageData(0, 0, width, height).data;
+  const counts = new Map();
+  for (let k = 0; k < data.length; k += 4) {
+    const colour = (data[k] << 16) | (data[k + 1] << 8) | data[k + 2];
+    counts.set(colour, (counts.get(colour) ?? 0) + 1);
+  }
+  return [counts.size, 1 - Math.max(...counts.values()) / (data.length / 4)];
+}"""
+
+
+@dataclass
+class Visit:
+    """A page, and what went wrong in it."""
+
+    page: Any
+    origin: str
+    faults: list[str] = field(default_factory=list)
+
+    def open(self, address: str = "") -> None:
+        """Go to an address of the server, and wait until a motion is shown."""
+        self.page.goto(f"{self.origin}/{address}")
+        self.wait_for("document.getElementById('status').textContent !== ''")
+
+    def wait_for(self, condition: str) -> None:
+        """Wait until an expression of JavaScript is true."""
+        # By asking again: the policy of the page forbids what playwright would evaluate in it.
+        deadline = time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(f"Boolean({condition})"):
+            assert time.monotonic() < deadline, f"{condition} did not come"
+            self.page.wait_for_timeout(30)
+
+    def text(self, selector: str) -> str:
+        """Return the text of an element."""
+        return str(self.page.text_content(selector))
+
+    def time(self) -> float:
+        """Return the time that is shown."""
+        return float(Fraction(self.page.input_value("#time")))
+
+    def state(self) -> dict[str, str]:
+        """Return the state in the address."""
+        fragment = urlsplit(self.page.url).fragment
+        return {name: values[0] for name, values in parse_qs(fragment).items()}
+
+    def ink(self, view: str) -> tuple[int, float]:
+        """Return how many colours a view shows, and how much of it is drawn on."""
+        canvas = self.page.locator(f'[data-view="{view}"] canvas').first
+        canvas.scroll_into_view_if_needed()
+        colours, part = canvas.evaluate(_INK)
+        return int(colours), float(part)
+
+    def wait_for_ink(self, view: str, colours: int, part: float) -> None:
+        """Wait until a view shows so many colours on so much of it."""
+        for _ in range(200):
+            found = self.ink(view)
+            if found[0] >= colours and found[1] >= part:
+                return
+            self.page.wait_for_timeout(100)
+        raise AssertionError(f"{view} shows {found}")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Return chromium, without a window."""
+    build_or_skip()
+    with playwright.sync_playwright() as tool:
+        running = tool.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield running
+        running.close()
+
+
+@contextmanager
+def visiting(browser: Any, origin: str, allowed: tuple[str, ...] = (), **options: Any) -> Any:
+    """Open a page in a context of its own; what went wrong in it fails the test."""
+    options.setdefault("viewport", {"width": 1000, "height": 640})
+    context = browser.new_context(**options)
+    context.add_init_script(_WATCH)
+    page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE_S)
+    visit = Visit(page, origin)
+    page.on("console", lambda message: _note(visit, message, allowed))
+    page.on("pageerror", lambda error: visit.faults.append(f"uncaught {error}"))
+    page.on("request", lambda request: _check_origin(visit, request.url))
+    try:
+        yield visit
+        visit.faults += page.evaluate("window.breaches")
+        assert not visit.faults
+    finally:
+        context.close()
+
+
+def _note(visit: Visit, message: Any, allowed: tuple[str, ...]) -> None:
+    if message.type == "error" and not any(text in message.text for text in allowed):
+        visit.faults.append(f"console: {message.text}")
+
+
+def _check_origin(visit: Visit, address: str) -> None:
+    parts = urlsplit(address)
+    if parts.scheme not in ("blob", "data") and f"{parts.scheme}://{parts.netloc}" != visit.origin:
+        visit.faults.append(f"request to {address}")
+
+
+@pytest.fixture
+def visit(browser: Any, server: Server) -> Iterator[Visit]:
+    """Return a page of the server that all tests share."""
+    with visiting(browser, server.url) as found:
+        yield found
+
+
+def test_every_view_draws_and_the_motion_plays(visit: Visit) -> None:
+    visit.open()
+    for view in ("body", "sphere", "torus", "ellipsoid"):
+        visit.wait_for_ink(view, colours=300, part=0.2)
+    for view in ("curve", "constants"):
+        visit.wait_for_ink(view, colours=20, part=0.01)
+    visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
+    visit.wait_for_ink("engines", colours=10, part=0.01)
+    before = visit.time()
+    visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.3")
+    visit.page.click("#play")
+    assert visit.text("#play") == "Play"
+    still = visit.time()
+    visit.page.wait_for_timeout(300)
+    assert visit.time() == still
+    for view in ("body", "sphere", "torus", "curve", "constants", "engines"):
+        assert len(visit.text(f"#twin-{view}")) > 20
+
+
+def test_the_three_engines_agree_in_the_plot(visit: Visit) -> None:
+    visit.open("#preset=generic&play=0")
+    visit.wait_for("document.getElementById('twin-engines').textContent.includes('integration')")
+    words = visit.text("#twin-engines").split()
+    closed = float(words[words.index("form") + 5].rstrip(".").replace("−", "-"))
+    assert closed < 1e-11
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_moves(visit: Visit, preset: str) -> None:
+    visit.open(f"#preset={preset}&play=0")
+    assert visit.text("#message") == ""
+    assert visit.page.input_value("#preset") == preset
+    ball = preset in ("ball", "drift", "chaplygin")
+    visit.wait_for_ink("ball" if ball else "body", colours=100, part=0.03)
+    first = visit.text("#facts td")
+    visit.page.fill("#time", "7/10")
+    visit.page.keyboard.press("Enter")
+    visit.wait_for(f"document.querySelector('#facts td').textContent !== {first!r}")
+    assert visit.time() == 0.7
+
+
+def test_a_slider_changes_the_motion(visit: Visit) -> None:
+    visit.open("#preset=generic&t=3&play=0")
+    before = visit.text("#facts td")
+    began = visit.page.evaluate("performance.now()")
+    visit.page.evaluate(
+        """() => {
+          const slider = document.getElementById("slider-A-0");
+          slider.value = "4";
+          slider.dispatchEvent(new Event("input", { bubbles: true }));
+        }"""
+    )
+    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+    took = visit.page.evaluate("performance.now()") - began
+    print(f"{took:.0f} ms from the slider to the new motion")
+    assert visit.page.input_value("#text-A-0") == "4"
+    visit.page.wait_for_timeout(400)
+    assert json.loads(visit.state()["problem"])["A"] == ["4", "2", "1"]
+
+
+def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
+    visit.open("#preset=ball&play=0")
+    visit.page.fill("#time", "12345.6789")
+    visit.page.keyboard.press("Enter")
+    visit.page.fill("#text-gamma-1", "1/7")
+    visit.page.keyboard.press("Enter")
+    visit.wait_for("document.getElementById('story').textContent === 'A start of your own.'")
+    visit.page.click('[data-view="ball"] button:has-text("⤢")')
+    visit.page.wait_for_timeout(500)
+    wanted = visit.state()
+    assert wanted["t"] == "12345.6789"
+    assert wanted["view"] == "ball"
+    with visiting(browser, visit.origin) as other:
+        other.open(f"#{urlsplit(visit.page.url).fragment}")
+        other.page.wait_for_timeout(500)
+        assert other.state() == wanted
+        assert other.page.input_value("#text-gamma-1") == "1/7"
+        assert other.text("#facts td") == visit.text("#facts td")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "place", "part"),
+    [
+        ("text-A-2", "-1", "#fault-A-2", "greater than 0"),
+        ("text-q-1", "x", "#fault-q-1", "required a finite real number"),
+        ("time", "soon", "#time-fault", "required a number"),
+        ("time", "1e13", "#time-fault", "at most 10¹²"),
+    ],
+)
+def test_bad_input_is_named_at_its_field(
+    browser: Any, server: Server, name: str, value: str, place: str, part: str
+) -> None:
+    with visiting(browser, server.url, allowed=("422",)) as visit:
+        visit.open("#preset=generic&play=0")
+        visit.page.fill(f"#{name}", value)
+        visit.page.keyboard.press("Enter")
+        visit.wait_for(f"document.querySelector({place!r}).textContent.includes({part!r})")
+        assert visit.page.get_attribute(f"#{name}", "aria-invalid") is not None
+
+
+def test_a_body_at_rest_is_said_to_rest(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url, allowed=("422",)) as visit:
+        visit.open("#preset=generic&play=0")
+        for i in range(3):
+            visit.page.fill(f"#text-q_dot-{i}", "0")
+            visit.page.keyboard.press("Enter")
+        visit.wait_for("document.getElementById('message').textContent.includes('rests')")
+
+
+def test_far_times_come_with_more_digits(visit: Visit) -> None:
+    visit.open("#preset=generic&play=0")
+    visit.page.click('[data-time="1000000000000"]')
+    visit.wait_for("document.getElementById('status').textContent.includes('30 digits')")
+    assert visit.time() == 1e12
+    found = visit.text("#facts td").replace("−", "-").split(", ")
+    import veselova as vs
+
+    preset = json.loads((EXPLORER / "src/presets.json").read_text())[0]["problem"]
+    body = vs.Veselova(preset["A"], preset["q"], preset["q_dot"], normalize=True)
+    truth = vs.solve(body, [10**12], digits=20).q[0]
+    assert [float(entry) for entry in found] == pytest.approx(truth, abs=2e-4)
+
+
+def test_the_map_of_constants_gives_a_new_start(visit: Visit) -> None:
+    visit.open("#preset=generic&play=0")
+    visit.page.locator('[data-view="constants"] canvas').click(position={"x": 250, "y": 40})
+    visit.wait_for("document.getElementById('story').textContent === 'A start of your own.'")
+    visit.wait_for("document.getElementById('twin-constants').textContent.includes('generic')")
+    c2 = visit.text("#facts").split("constants c")[1]
+    visit.page.wait_for_timeout(800)
+    assert json.loads(visit.state()["problem"])["q"] != ["0.5", "0.5", "0.7"]
+    assert c2
+
+
+def test_files_leave_the_page(visit: Visit, tmp_path: Path) -> None:
+    visit.open("#preset=generic&play=0")
+    visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
+
+    def download(selector: str) -> bytes:
+        with visit.page.expect_download() as waiting:
+            visit.page.click(selector)
+        target = tmp_path / waiting.value.suggested_filename
+        waiting.value.save_as(target)
+        return target.read_bytes()
+
+    table = download("#csv").decode().splitlines()
+    assert table[0].startswith("t,q.1,q.2,q.3,frame.1.1")
+    assert len(table) == 1002
+    assert all(len(row.split(",")) == len(table[0].split(",")) for row in table)
+    for view in ("body", "curve", "engines"):
+        assert download(f'[data-view="{view}"] button:has-text("PNG")')[:4] == b"\x89PNG"
+    assert download('[data-view="engines"] button:has-text("SVG")').startswith(b"<svg")
+
+
+def test_texts_can_be_copied(browser: Any, server: Server) -> None:
+    rights = {"permissions": ["clipboard-read", "clipboard-write"]}
+    with visiting(browser, server.url, **rights) as visit:
+        visit.open("#preset=generic&t=2&play=0")
+
+        def copied(name: str) -> str:
+            visit.page.click(f"#{name}")
+            visit.wait_for(f"document.getElementById({name!r}).textContent === 'Copied'")
+            return str(visit.page.evaluate("navigator.clipboard.readText()"))
+
+        scope: dict[str, Any] = {}
+        exec(copied("python"), scope)
+        shown = [float(x) for x in visit.text("#facts td").replace("−", "-").split(", ")]
+        assert scope["trajectory"].q[0] == pytest.approx(shown, abs=2e-4)
+        assert json.loads(copied("json"))["times"] == ["2"]
+        assert "v1/trajectories" in copied("curl")
+        assert copied("link").startswith(f"{server.url}/#problem=")
+
+
+def test_everything_is_reached_by_keyboard(visit: Visit) -> None:
+    visit.open("#preset=generic&play=0")
+    reached = set()
+    for _ in range(90):
+        visit.page.keyboard.press("Tab")
+        reached.add(
+            visit.page.evaluate(
+                """() => {
+                  const at = document.activeElement;
+                  return at.id || at.closest("[data-view]")?.dataset.view || at.tagName;
+                }"""
+            )
+        )
+    wanted = {"preset", "link", "play", "time", "speed", "system", "slider-A-0", "text-A-0"}
+    assert wanted | {"body", "torus", "constants"} <= reached
+    visit.page.focus('[data-view="body"] canvas')
+    before = visit.page.locator('[data-view="body"] canvas').screenshot()
+    visit.page.keyboard.press("ArrowLeft")
+    visit.page.wait_for_timeout(400)
+    assert visit.page.locator('[data-view="body"] canvas').screenshot() != before
+    visit.page.keyboard.press(" ")
+    assert visit.text("#play") == "Pause"
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_no_barrier_is_found_by_axe(browser: Any, server: Server, scheme: str) -> None:
+    with visiting(browser, server.url, color_scheme=scheme) as visit:
+        visit.open("#preset=generic&play=0")
+        visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
+        axe = EXPLORER / "node_modules" / "axe-core" / "axe.min.js"
+        visit.page.evaluate(axe.read_text())
+        found = visit.page.evaluate("axe.run()")
+        serious = [
+            (one["id"], [node["target"] for node in one["nodes"]])
+            for one in found["violations"]
+            if one["impact"] in ("serious", "critical")
+        ]
+        assert not serious
+        assert len(found["passes"]) > 15
+
+
+def test_a_narrow_page_has_one_column(browser: Any, server: Server) -> None:
+    size = {"width": 390, "height": 844}
+    with visiting(browser, server.url, viewport=size, has_touch=True) as visit:
+        visit.open("#preset=ball&play=0")
+        visit.wait_for_ink("ball", colours=200, part=0.1)
+        boxes = [card.bounding_box() for card in visit.page.locator(".card:visible").all()]
+        assert len({round(box["x"]) for box in boxes}) == 1
+        assert all(box["x"] >= 0 and box["x"] + box["width"] <= 390 for box in boxes)
+        assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_who_wants_less_motion_gets_a_page_that_waits(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url, reduced_motion="reduce") as visit:
+        visit.open()
+        assert visit.text("#play") == "Play"
+        assert visit.time() == 0
+
+
+def test_without_webgl_the_plots_work(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url, allowed=("WebGL",)) as visit:
+        visit.page.add_init_script(
+            """const original = HTMLCanvasElement.prototype.getContext;
+            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+              return kind.startsWith("webgl") ? null : original.call(this, kind, ...rest);
+            };"""
+        )
+        visit.open()
+        assert visit.text("#absent").startswith("This browser has no WebGL")
+        visit.wait_for_ink("curve", colours=20, part=0.01)
+
+
+def test_a_document_of_another_version_is_refused_in_a_sentence(
+    browser: Any, server: Server
+) -> None:
+    with visiting(browser, server.url) as visit:
+        body = {"format": "veselova.closed-form/2"}
+        visit.page.route("**/v1/closed-forms", lambda route: route.fulfill(json=body))
+        visit.page.goto(visit.origin)
+        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/2')")
+
+
+def test_where_keys_are_required_the_page_asks_for_one(browser: Any, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "veselova", "keys", "create", "browser"]
+    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path / "data")}
+    made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    key = made.stdout.strip()
+    with (
+        running_server(tmp_path, "--require-keys", awaited="/healthz") as server,
+        visiting(browser, server.url, allowed=("401",)) as visit,
+    ):
+        visit.page.goto(server.url)
+        visit.page.wait_for_selector("#key-text")
+        visit.page.fill("#key-text", key)
+        visit.page.click("#key button")
+        visit.wait_for("document.getElementById('status').textContent !== ''")
+        assert visit.page.is_hidden("#key")
+        assert visit.page.evaluate("Object.keys(localStorage).length") == 0
+
+
+def test_when_the_server_goes_the_motion_goes_on(browser: Any, tmp_path: Path) -> None:
+    with (
+        running_server(tmp_path) as server,
+        visiting(browser, server.url, allowed=("Failed to load", "ERR_")) as visit,
+    ):
+        visit.open("#preset=generic")
+        server.process.send_signal(signal.SIGKILL)
+        server.process.wait()
+        visit.page.fill("#text-A-0", "4")
+        visit.page.keyboard.press("Enter")
+        visit.wait_for("!document.getElementById('banner').hidden")
+        assert "The server does not answer." in visit.text("#banner")
+        before = visit.time()
+        visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.2")
