@@ -58,13 +58,6 @@ class WindowGrid:
         return WindowGrid(self.length, self.starts[chosen], self.tails[chosen])
 
     @classmethod
-    def uniform(cls, length: float, first: int, last: int, tail: float = np.inf) -> WindowGrid:
-        """Return the windows from first·length to last·length."""
-        return cls(
-            length, np.arange(first, last, dtype=float) * length, np.full(last - first, tail)
-        )
-
-    @classmethod
     def concatenate(cls, parts: Sequence[WindowGrid]) -> WindowGrid:
         """Return all windows of the parts."""
         return cls(

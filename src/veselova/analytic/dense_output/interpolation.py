@@ -6,10 +6,6 @@ error to the next. A window takes one sum of the time map, at its start, and one
 motion at each of its nodes; on its pieces the series become polynomials in t
 (analytic.dense_output.piecewise_polynomial). All times in it are sums of these, whatever the genus
 and the route.
-
-A time map by panels is asked nothing where windows adjoin from t = 0 on. They are of Neumann time
-then, and t is the running sum of their dt/dτ₁ (analytic.dense_output.adjoining_windows), as it is
-of panels.
 """
 
 from __future__ import annotations
@@ -22,7 +18,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.adjoining_windows import AdjoiningWindows
 from veselova.analytic.dense_output.chebyshev_window import (
     MOST_HALVINGS,
     Evaluation,
@@ -30,7 +25,6 @@ from veselova.analytic.dense_output.chebyshev_window import (
     WindowGrid,
 )
 from veselova.analytic.dense_output.output_array import AT_ONCE, OutputArray, Samples
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap
 
 __all__ = ["FEW_TIMES", "Windows"]
@@ -54,10 +48,6 @@ _FARTHEST = 2.0**32
 
 #: Windows tried before all of the same length.
 _FIRST_WINDOWS = 8
-
-#: Part of the windows from t = 0 on that have times enough, from which a time map by panels takes
-#: dt/dτ₁ from them.
-_COVERED = 0.7
 
 
 @dataclass(frozen=True)
@@ -139,10 +129,7 @@ class Windows:
         output = OutputArray(
             self._times, self._fewest, time_map, rates, evaluation, self._remainders
         )
-        if self._stretches.windows and not (
-            isinstance(time_map, ChebyshevTimeMap)
-            and self._fill_adjoining(output, time_map, evaluation)
-        ):
+        if self._stretches.windows:
             window_grid, count = self._over_stretches(output, time_map)
             for _ in range(MOST_HALVINGS):
                 window_grid = window_grid.remaining(
@@ -163,50 +150,6 @@ class Windows:
             return WindowGrid(length, starts, np.full(starts.size, tail))
 
         return _resolving(over, output.batch, self._length)
-
-    def _fill_adjoining(
-        self, output: OutputArray, time_map: ChebyshevTimeMap, evaluation: Evaluation
-    ) -> bool:
-        """Fill all times by windows that adjoin, and take t(τ₁) from their dt/dτ₁; return whether
-        that could be done.
-        """
-        ends = np.array([min(self._times[0], 0.0), max(self._times[-1], 0.0)])
-        if self._stretches.windows < _COVERED * float(np.ptp(ends)) / self._length:
-            return False
-        low, high = ends / time_map.mean
-
-        def over(length: float, tail: float) -> WindowGrid:
-            return WindowGrid.uniform(
-                length, math.floor(low / length), math.ceil(high / length), tail
-            )
-
-        adjoining = AdjoiningWindows(output, evaluation, time_map.in_tau1)
-        window_grid, count = _resolving(
-            over, adjoining.batch, _few_bits(self._length / time_map.mean)
-        )
-        while len(window_grid):
-            if not adjoining.extend(window_grid, count):
-                return False
-            panels = adjoining.panels()
-            length, (first, last) = (
-                window_grid.length,
-                np.rint(panels.borders[[0, -1]] / window_grid.length).astype(int).tolist(),
-            )
-            more = max(1, (last - first) // 8)  # the ends were those of the mean time map
-            before = (
-                WindowGrid.uniform(length, first - more, first)
-                if panels.values[0] > self._times[0]
-                else window_grid[:0]
-            )
-            after = (
-                WindowGrid.uniform(length, last, last + more)
-                if panels.values[-1] < self._times[-1]
-                else window_grid[:0]
-            )
-            window_grid = WindowGrid.concatenate([before, after])
-        output.take_time_map(time_map.on(panels))
-        adjoining.fill(self._times, panels)
-        return True
 
 
 def _resolving(

@@ -96,27 +96,18 @@ class OutputArray:
         )
         return Samples(self._states[0], series, self._error, self._evaluations, self._time_map)
 
-    def take_time_map(self, time_map: TimeMap) -> None:
-        """Use another time map of the same orbit from now on."""
-        self._time_map = time_map
-
     def batch(self, window_grid: WindowGrid, z: Array | None = None) -> WindowBatch:
         """Return windows of mean time; z (W, g) are the phases at their starts."""
         z = self._time_map.periodic_part(window_grid.starts)[1] if z is None else z
         mean = self._time_map.mean
-        return self.count_evaluations(
-            WindowBatch.of(
-                self._evaluation,
-                window_grid.starts / mean,
-                z,
-                window_grid.length / mean,
-                self._rates,
-                window_grid.tails,
-            )
+        batch = WindowBatch.of(
+            self._evaluation,
+            window_grid.starts / mean,
+            z,
+            window_grid.length / mean,
+            self._rates,
+            window_grid.tails,
         )
-
-    def count_evaluations(self, batch: WindowBatch) -> WindowBatch:
-        """Return the trial, with its evaluations counted."""
         self._evaluations += batch.rates.size
         self._shapes = batch.shapes
         return batch

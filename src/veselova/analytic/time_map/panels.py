@@ -47,18 +47,12 @@ class ChebyshevTimeMap(TimeMap):
         in_tau1: LinearFlow,
         earliest: float,
         latest: float,
-        panels: Panels | None = None,
     ) -> None:
         self._rate = rate
         self._mean = mean
         self.in_tau1 = in_tau1
         self._earliest, self._latest = min(earliest, 0.0), max(latest, 0.0)
-        self._panels = panels
-
-    def on(self, panels: Panels) -> ChebyshevTimeMap:
-        """Return the same time map on panels that are known."""
-        span = self._earliest, self._latest
-        return ChebyshevTimeMap(self._rate, self._mean, self.in_tau1, *span, panels)
+        self._panels: Panels | None = None
 
     @property
     def panels(self) -> Panels:
