@@ -90,9 +90,6 @@ class FixedPoint:
         """Return the same numbers with limbs that products take."""
         return FixedPoint(_carry(self.limbs.copy()))
 
-    def __add__(self, other: FixedPoint) -> FixedPoint:
-        return FixedPoint(self.limbs + other.limbs)
-
     def __mul__(self, other: FixedPoint) -> FixedPoint:
         return FixedPoint(_carry(_products(self.limbs, other.limbs))[:-1])
 
@@ -111,18 +108,6 @@ class FixedPoint:
             sums = _products(a[:, 0], b[:, 1]) + _products(a[:, 1], b[:, 0])
         return FixedPoint(_carry(sums)[:-1])
 
-    def polynomials(self, count: int) -> FixedPoint:
-        """Return Chebyshev's T_0 … of numbers (N,), shape (count, N), from T_{h+i} = 2T_hT_i −
-        T_{h−i} for a whole range of i.
-        """
-        table = np.zeros((len(self.limbs), max(count, 2), self.limbs.shape[1]))
-        table[0, 0], table[:, 1] = 1, self.limbs
-        for last, rows in _ranges(count):
-            sums = _products(2 * table[:, last : last + 1], table[:, 1 : rows + 1])
-            sums[:-1] -= table[:, last - rows : last][:, ::-1]
-            table[:, last + 1 : last + 1 + rows] = _carry(sums)[:-1]
-        return FixedPoint(table[:, :count])
-
     def turns(self, sines: FixedPoint, count: int) -> FixedPoint:
         """Return cos mφ and sin mφ, m = 0 … count−1, shape (2, count, N), of cosines (N,) and
         sines: w^{h+i} = w^h w^i.
@@ -140,22 +125,6 @@ class FixedPoint:
                     power, part
                 ).limbs
         return FixedPoint(table[:, :, :count])
-
-    @staticmethod
-    def growth(count: int, error: float) -> Array:
-        """Return the errors of these polynomials, |x| ≤ 1, to first order, in units of that of an
-        operation.
-
-        ``error``: that of their numbers.
-        """
-        errors = np.zeros(count)
-        errors[1:2] = error
-        for last, rows in _ranges(count):
-            sums = (
-                2 * errors[last] + 2 * errors[1 : rows + 1] + errors[last - rows : last][::-1] + 1
-            )
-            errors[last + 1 : last + 1 + rows] = sums
-        return errors
 
     def dot(self, other: FixedPoint) -> FixedPoint:
         """Return Σ_k x_…k y_…k over the last axis."""
@@ -209,7 +178,7 @@ class FixedPoint:
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
     """Return the h from which those of h + i follow, and how many, until there are so many
-    polynomials or powers.
+    powers.
     """
     last = 1
     while last < count - 1:
