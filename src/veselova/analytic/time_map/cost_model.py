@@ -1,5 +1,6 @@
-"""What an orbit costs, and which time map is the cheaper for given times: seconds on one core, from
-measurements.
+"""What an orbit costs, and which time map is the cheaper for given times: seconds on one core.
+
+Their units are the tunings of analytic.time_map.tuned_costs.
 
 The Fourier time map costs its modes once, and all of them again at every inversion; panels cost
 evaluations all along the orbit, and their inversions nothing to speak of. A window of many times
@@ -12,67 +13,66 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from veselova.analytic.time_map.tuned_costs import (
+    EVALUATION,
+    EVALUATION_IN_ANGLES,
+    MODE,
+    MODE_INVERTED,
+    PANEL_CYCLE,
+    PANEL_CYCLE_IN_ANGLES,
+    PANEL_INVERSION,
+    grow,
+)
+
 __all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs", "estimate_modes"]
 
-#: Cycles of the fastest phase from which frequencies are computed with guard digits: before, one
-#: rounding of them is below 1e-13.
+#: Derived: cycles of the fastest phase from which frequencies are computed with guard digits;
+#: before, one rounding of them is below 1e-13.
 GUARDED_FROM = 200.0
 
-#: Digits of the frequencies then.
+#: Budget: digits of the frequencies then, enough for 1e28 cycles.
 GUARD_DIGITS = 30
 
-#: Cycles that panels are willing to cover: minutes.
+#: Budget: cycles that panels cover, minutes of work; and modes of a Fourier time map.
 PANEL_CYCLES = 5e4
-
-#: Largest genus at which guard digits decide for the Fourier time map, which keeps them, whatever
-#: it costs.
-_GUARDED_GENUS = 3
-
-#: Largest genus at which a Fourier time map is the last resort where panels do not reach, and modes
-#: with which it is chosen before.
-_LAST_RESORT_GENUS = 5
 _MOST_MODES = 2e5
 
-#: The coefficients fall below 4e-16 = e^−36 inside a convex body of volume (36/π)^g/det T times
-#: this, half of it counted.
-_EXPONENT = 36.0
-_BODY = {1: 1.0, 2: 1.25, 3: 1.07, 4: 0.67}
-_HIGH_BODY = 0.29
+#: Tuning: largest genus at which guard digits decide for the Fourier time map, which keeps them,
+#: whatever it costs; and at which it is the last resort where panels do not reach.
+_GUARDED_GENUS = 3
+_LAST_RESORT_GENUS = 5
+
+#: Derived: coefficients fall below 4e-16 = e^−36 outside a convex body. Its volume is about
+#: (2.34·36/π)^g/(g! det T), as counts of modes up to genus 5 show; half of it counts.
+_BODY = 2.34 * 36 / math.pi
+_COUNTED_GENUS = 5
 
 #: Modes of a time map that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
 
-#: Seconds: of a mode, and of one in an inversion, with what each begins with; of a cycle on panels,
-#: by theta functions or in angles, and of an evaluation.
-_MODE = 12e-6
-_MODES = 1e-3
-_MODE_INVERTED = 0.02e-6
-_INVERSION = 1e-6
-_PANEL_CYCLE = {1: 1.7e-5, 2: 2.5e-5, 3: 4e-5, 4: 6.5e-5, 5: 1.5e-4, 6: 4e-4}
-_PANEL_CYCLE_IN_ANGLES = {1: 2.2e-5, 2: 2e-4, 3: 2.6e-4, 4: 4e-4, 5: 6e-4, 6: 8e-4}
-_EVALUATION = {1: 0.8e-6, 2: 1.2e-6, 3: 2e-6, 4: 6e-6}
-_HIGH_PANEL_CYCLE = 1e-3
-_HIGH_EVALUATION = 1e-5
+#: Tuning: modes that take as long as what a Fourier time map begins with, at its set-up and at
+#: every inversion.
+_FIRST_MODES = 60
 
-#: Cycles from which panels are longer ones of more nodes: what finding them takes in such cycles,
-#: and what one costs then.
-_LONG_STRETCH = 80.0
+#: Largest genera at which a state, and dt/dτ₁, come from theta functions as a rule
+#: (analytic.motion.torus_solution).
+_THETA_GENUS = 4
+_RATE_GENUS = 6
+
+#: Tuning: beyond 80 cycles, where panels are longer, what finding their length takes in cycles, and
+#: the part of the evaluations that is left.
 _PROBES = 48.0
 _LONGER_PANELS = 0.4
-
-#: An inversion on panels, and the cycles that these reach beyond the times.
-_PANEL_INVERSION = 3e-6
-_PANEL_MARGIN = 1.0
 
 
 def estimate_modes(genus: int, log_determinant: float) -> float:
     """Return about how many modes the Fourier time map has, for the Riemann matrix iT
     with log det T.
     """
-    exponent = genus * math.log(_EXPONENT / math.pi) - log_determinant
-    return _BODY.get(genus, _HIGH_BODY) * math.exp(
-        exponent if exponent < _LARGEST_EXPONENT else _LARGEST_EXPONENT
-    )
+    counted = min(genus, _COUNTED_GENUS)
+    exponent = genus * math.log(_BODY) - log_determinant
+    exponent -= (genus - counted) * math.log(_BODY * math.pi / 36)
+    return math.exp(min(exponent, _LARGEST_EXPONENT)) / (2 * math.factorial(counted))
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,11 @@ class Costs:
 
     def fewest_in_window(self, nodes: int, time_map: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""
-        inversion = (
-            _INVERSION + self.modes * _MODE_INVERTED if time_map == "fourier" else _PANEL_INVERSION
-        )
-        evaluation = _EVALUATION.get(self.genus, _HIGH_EVALUATION)
+        by_theta = self.genus <= _THETA_GENUS
+        evaluation = grow(EVALUATION, self.genus) if by_theta else EVALUATION_IN_ANGLES * self.genus
+        inversion = PANEL_INVERSION
+        if time_map == "fourier":
+            inversion = (_FIRST_MODES + self.modes) * MODE_INVERTED
         return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
 
     def seconds(self, time_map: str, inversions: int) -> float:
@@ -101,22 +102,15 @@ class Costs:
         taken of its own accord.
         """
         if time_map == "fourier":
-            of_modes = self.modes * (_MODE + inversions * _MODE_INVERTED)
-            return (
-                _MODES + of_modes + inversions * _INVERSION
-                if self.modes <= _MOST_MODES
-                else math.inf
-            )
+            if self.modes > _MOST_MODES:
+                return math.inf
+            return (_FIRST_MODES + self.modes) * (MODE + inversions * MODE_INVERTED)
         if self.cycles > PANEL_CYCLES:
             return math.inf
-        cycles = (
-            self.cycles if self.cycles < _LONG_STRETCH else _PROBES + _LONGER_PANELS * self.cycles
-        )
-        of_cycles = (_PANEL_CYCLE_IN_ANGLES if self.in_angles else _PANEL_CYCLE).get(
-            self.genus, _HIGH_PANEL_CYCLE
-        )
-        of_panels = (cycles + _PANEL_MARGIN) * of_cycles
-        return of_panels + inversions * _PANEL_INVERSION
+        cycles = min(self.cycles, _PROBES + _LONGER_PANELS * self.cycles) + 1
+        by_theta = self.genus <= _RATE_GENUS and not self.in_angles
+        cycle = grow(PANEL_CYCLE, self.genus) if by_theta else PANEL_CYCLE_IN_ANGLES * self.genus
+        return cycles * cycle + inversions * PANEL_INVERSION
 
     def estimates(self, inversions: int) -> dict[str, float]:
         """Return the seconds of either time map, those out of the question left out."""
