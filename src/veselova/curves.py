@@ -24,6 +24,7 @@ from veselova.analytic.curve.nodal_forms import difference_product
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.budget import iterate
+from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
     curve_outputs,
@@ -364,7 +365,8 @@ class RealHyperelliptic:
         inverse of ``invert``.
         """
         rows = [exact_points(row) for row in (points if np.ndim(points) == 2 else [points])]
-        directions = np.atleast_2d(np.array(signs, dtype=float))
+        wanted = f"rows of {self.genus} numbers, the signs of w"
+        directions = np.atleast_2d(complex_array(signs, ("signs",), wanted).real)
         if any(len(row) != self.genus for row in rows) or directions.shape != (
             len(rows),
             self.genus,

@@ -66,7 +66,9 @@ def evaluate_theta(asked: ThetaArguments) -> ScaledTheta:
 
 def _evaluate(asked: ThetaArguments, with_errors: bool) -> ScaledTheta:
     function = SiegelTheta(asked.tau)
-    if not function.terms < np.inf:
+    with np.errstate(over="ignore", invalid="ignore"):
+        terms = function.terms
+    if not terms < np.inf:
         raise Unsolved("beyond-floats", "the reduced τ leaves the range of a float")
     if not function.is_small:
         raise Unsolved("too-many-terms", f"the sum has about {function.terms:.1e} terms")

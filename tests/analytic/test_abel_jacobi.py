@@ -113,5 +113,7 @@ def test_continuation_leads_where_newtons_method_loses_its_way() -> None:
     assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 1e-12
     for point in z[:20]:
         assert np.allclose(
-            inversion._continue_angles(point), inversion.invert(point[None])[0], atol=1e-6
+            inversion._continue_angles(point, 2 * np.pi * point),
+            inversion.invert(point[None])[0],
+            atol=1e-6,
         )

@@ -15,6 +15,7 @@ from scipy.integrate import quad
 from conftest import Server, slow
 from separable_truth import true_motion_in_potential
 from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
+from veselova.analytic.separable.periods import SeparatedPeriods
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 
 Array = NDArray[np.float64]
@@ -188,6 +189,55 @@ def test_frames_of_bodies_are_right_up_to_the_collision(seed: int) -> None:
     assert np.max(closed.error[6:-6]) < 1e-9
 
 
+@pytest.mark.parametrize("small", ["-1e-3", "7.8e-7", "1e-9", "1e-12"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_beside_a_plane_two_coordinates_share_it(small: str, axis: int) -> None:
+    """q_i is small, the point hardly leaves the plane, and where I_i is in the middle both
+    coordinates run into it: their intervals are 1e-13 and 0.06 wide, phases swing by 1e5 cycles.
+    """
+    q: list[Any] = ["0.45", "0.89"]
+    betas: list[Any] = ["-0.5", 0]
+    q.insert(axis, small)
+    betas.insert(axis, "-0.123")
+    potential = {"quartic": "-0.585", "quadratic": "0.72", "centrifugal": betas}
+    A = ["0.92", "0.84", "0.776"]
+    problem = SeparableVeselova(A, q, ["0.3", "0.5", "-0.2"], potential, normalize=True)
+    ends = collisions_of(problem)
+    assert ends is not None
+    closed = solve(problem, np.array([0.9, 0.5]) * ends)
+    exact = problem.exact
+    truth, _ = true_motion_in_potential(
+        exact.A, exact.q, exact.tangent, problem.potential, closed.times
+    )
+    assert np.all(np.max(np.abs(closed.q - truth), axis=1) <= closed.error)
+    assert np.max(closed.error) < 1e-11
+
+
+def test_angles_without_a_remedy_name_no_theta_quotients() -> None:
+    """These have none in a potential."""
+    assert SeparatedPeriods.without_angles == "integrate numerically"
+
+
+def test_frames_beside_a_plane_are_right() -> None:
+    """All that the body turns by is far below a radian, and values next to the plane have no
+    digit.
+    """
+    body = VeselovaSO3(
+        ["1.19", "1.288", "1.087"],
+        ["-1e-6", "0.45", "0.89"],
+        [0, "0.89", "-0.45"],
+        {"family": ["0.72", "-0.123", "-0.526", "0.833", "-0.26"]},
+        normalize=True,
+    )
+    ends = collisions_of(body)
+    assert ends is not None
+    closed = solve(body, np.array([0.9, 0.5]) * ends)
+    truth = solve(body, closed.times, "numeric", "taylor")
+    off = np.max(np.abs(closed.frame - truth.frame), axis=(1, 2))
+    assert np.all(off <= closed.error + truth.error)
+    assert np.max(closed.error) < 1e-12
+
+
 def test_planes_that_are_not_reached_end_nothing() -> None:
     """A root of R keeps the coordinate away from an attracting plane."""
     problem = SeparableVeselova(
@@ -219,3 +269,19 @@ def test_every_door_answers_before_the_collision_and_names_it_beyond(server: Ser
     assert refused.status_code == 422
     assert "collision" in refused.text
     assert f"t = {ends[1]:.12g}" in refused.text
+
+
+@pytest.mark.parametrize("beta", ["1e-30", "3.87e-152", "1e-200"])
+def test_the_weakest_wall_repels(beta: str) -> None:
+    """Its turning point is nearer to the plane than roots have digits, and on the side of the
+    point.
+    """
+    rng = np.random.default_rng(2)
+    for _ in range(6):
+        q, v = rng.uniform(0.3, 1, 3), rng.normal(size=3)
+        A = np.sort(rng.uniform(0.4, 3, 3))
+        for signs in ((1, 1, 1), (1, -1, 0), (0, 0, -1)):
+            betas = [f"{'-' * (sign < 0)}{beta}" if sign else "0" for sign in signs]
+            problem = SeparableVeselova(A, q, v, {"centrifugal": betas}, normalize=True)
+            collides = collisions_of(problem) is not None
+            assert collides <= (-1 in signs)

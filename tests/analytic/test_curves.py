@@ -317,3 +317,28 @@ def test_digits_of_curves_are_bounded_and_named() -> None:
         curves.RealHyperelliptic([0, 1], digits=2000, certified=1)  # type: ignore[arg-type]
     fields = [fault.field for fault in caught.value.faults]
     assert fields == ["branch_points", "digits", "certified"]
+
+
+def test_far_and_near_points_have_images_and_bad_arguments_are_named() -> None:
+    curve = curves.RealHyperelliptic([0, 1, 2, 3, 4])
+    with np.errstate(all="raise", under="ignore"):
+        far = curve.abel([1e300, -1e300, 1e300j], [1, 1, 1])
+    assert np.max(np.abs(far)) < 1e-100  # infinity is where paths begin
+    assert curve.abel([], []).shape == (0, 2)
+    precise = curves.RealHyperelliptic([0, 1, 2, 3, 4], digits=20)
+    none = precise.abel_decimals([], [])
+    assert none is not None
+    assert none.midpoints["abel"].shape == (0, 2, 2)
+    tiny = curves.RealHyperelliptic(["0", "1e-300", "2e-300"])
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        tiny.abel([1e300], [1])
+    for call, field in (
+        (lambda: curve.torus([1.5, 3.5], ["a", 1]), "signs[0]"),
+        (lambda: curve.torus([1.5, 3.5], [[1], [1, 2]]), "signs"),
+        (lambda: curves.RealHyperelliptic([0, 1, 2], np.array([1, 1])), "sign"),  # type: ignore[arg-type]
+        (lambda: theta.riemann_theta([0], [[1j]], derivatives=np.array([1])), "derivatives"),  # type: ignore[arg-type]
+        (lambda: theta.riemann_theta([0], [[1j]], derivatives=1.0), "derivatives"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            call()
+        assert caught.value.faults[0].field == field

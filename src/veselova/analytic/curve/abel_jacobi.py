@@ -102,19 +102,27 @@ class AbelJacobi(Generic[P]):
         xp = self.arithmetic
         cycles = xp.floor(z)
         reduced = z - cycles
-        psi = self._newton(reduced) if self.coarse is None else self._enclose(reduced, self.coarse)
+        psi = (
+            self.invert_from(reduced, 2 * np.pi * reduced)
+            if self.coarse is None
+            else self._enclose(reduced, self.coarse)
+        )
         return np.asarray(psi + 2 * xp.pi * cycles)
 
-    def _newton(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        psi = 2 * np.pi * z
+    def invert_from(
+        self, z: NDArray[np.float64], start: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at
+        ``start`` (N, g); raises Unsolved (``narrow-gap``).
+        """
+        psi = np.array(start)
         residual = self.map(psi) - z
         open_ = np.arange(z.shape[0])
         step_fraction = np.ones(z.shape[0])
         tolerance = _CONVERGED * DOUBLE.epsilon
         for _ in range(_MOST_STEPS):
             checkpoint()
-            size = np.max(np.abs(residual[open_]), axis=1)
-            open_ = open_[size > tolerance]
+            open_ = open_[self._size(residual[open_]) > tolerance]
             if open_.size == 0:
                 return psi
             try:
@@ -125,25 +133,33 @@ class AbelJacobi(Generic[P]):
                 break
             trial = psi[open_] - step_fraction[open_, None] * step
             trial_residual = self.map(trial) - z[open_]
-            better = np.max(np.abs(trial_residual), axis=1) < np.max(
-                np.abs(residual[open_]), axis=1
-            )
+            size = self._size(residual[open_])
+            better = self._size(trial_residual) < size
             accepted = open_[better]
             psi[accepted], residual[accepted] = trial[better], trial_residual[better]
             step_fraction[accepted] = np.minimum(1.0, 4 * step_fraction[accepted])
             step_fraction[open_[~better]] /= 4
             # A full step that no longer improves has met the rounding of the sums, which grows with
             # their length.
-            stalled = open_[
-                ~better & (np.max(np.abs(residual[open_]), axis=1) < _STALLED * tolerance)
-            ]
+            stalled = open_[~better & (size < _STALLED * tolerance)]
             open_ = np.setdiff1d(open_, stalled, assume_unique=True)
         for i in iterate(open_.tolist()):
-            psi[i] = self._continue_angles(z[i])
+            psi[i] = self._continue_angles(z[i], start[i])
         return psi
 
-    def _continue_angles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the angles of one point, led there along the line of phases from those of 2πz: the
+    def _size(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest residual of a phase in units of its rounding, over ε."""
+        return np.asarray(np.max(np.abs(residual) / self.rounding, axis=-1))
+
+    @cached_property
+    def rounding(self) -> NDArray[np.float64]:
+        """Return the rounding of each phase over ε, (g,), at the angles of least rounding."""
+        return np.ones(self.periods.genus)
+
+    def _continue_angles(
+        self, z: NDArray[np.float64], psi: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the angles of one point, led there along the line of phases from those of ψ: the
         map is one-to-one.
 
         Next to a narrow gap the phases hardly move with the angles, and Newton's method from afar
@@ -151,14 +167,13 @@ class AbelJacobi(Generic[P]):
         bent valley as narrow as the gap, which a tangent leaves at once: a cubic through the last
         two stations follows it.
         """
-        psi = 2 * np.pi * z
         begin = self.map(psi[None])[0]
         done = 0.0
         step = _FIRST_STRETCH
         stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         while done < 1 and step > _LEAST_STRETCH:
             reached = min(1.0, done + step)
-            found = self._iterate_newton(
+            found = self.settle(
                 _extrapolate(stations, reached) if len(stations) == 2 else psi,
                 begin + reached * (z - begin),
             )
@@ -176,22 +191,22 @@ class AbelJacobi(Generic[P]):
         if gap < NARROW_GAP:
             raise Unsolved(
                 "narrow-gap",
-                f"angles are ill-conditioned at a relative gap of {gap:.2g}; theta quotients "
-                "serve to n = 8",
+                f"angles are ill-conditioned at a relative gap of {gap:.2g}; "
+                f"{self.periods.without_angles}",
             )
         raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
 
-    def _iterate_newton(
+    def settle(
         self, psi: NDArray[np.float64], z: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
-        """Return the angles to which plain Newton steps from nearby settle, None
+        """Return the angles at z (g,) to which Newton steps from nearby ψ (g,) settle, None
         where they do not.
         """
         tolerance = _CONVERGED * DOUBLE.epsilon
         last = np.inf
         for _ in range(_NEAR_STEPS):
             residual = self.map(psi[None])[0] - z
-            size = float(np.max(np.abs(residual)))
+            size = float(self._size(residual))
             if size <= tolerance or (size >= last and size < _STALLED * tolerance):
                 return psi
             if not size < last:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,6 +21,9 @@ class AngleSeries(ABC):
 
     Where they are those of many curves, every array has a first axis for these.
     """
+
+    #: What serves where the angles of this curve are ill-conditioned.
+    without_angles: ClassVar[str] = "theta quotients serve to n = 8"
 
     @property
     @abstractmethod

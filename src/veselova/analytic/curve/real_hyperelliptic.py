@@ -238,7 +238,7 @@ class RealCurve:
         gaps = np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1)
         return a, np.cumsum(gaps, axis=1)
 
-    def angles(self, points: Sequence[Sequence[Fraction]], increasing: Array) -> Array:
+    def angles(self, points: Sequence[Sequence[Fraction]], increasing: NDArray[np.bool_]) -> Array:
         """Return the elliptic angles of points μ (N, g), one on each cut, negative on
         the way back.
         """
@@ -306,14 +306,18 @@ class RealCurve:
         """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a
         complex μ; the integral is (g,).
 
-        The sheet is that of the returned v.
+        The sheet is that of the returned v, which is v up to a positive factor.
         """
-        target = complex(*map(float, mu))
+        try:
+            target = complex(*map(float, mu))
+        except OverflowError:
+            reason = "a point is too far from the branch points for doubles"
+            raise Unsolved("beyond-floats", reason) from None
         betas = self.periods.curve.branch_points
         zeros = (betas[2:-1:2] + betas[3::2]) / 2
         centre = (betas[0] + betas[-1]) / 2
         radius = (betas[-1] - betas[0]) / 2
-        if abs(target - centre) > 2 * radius:
+        if math.hypot(target.real - centre, target.imag) > 2 * radius:
             # t = (μ−c)^{−1/2}: v = i t^{−2g−1} Π√(1+(c−β)t²), and each root stays away from its
             # branch line.
             end = 1 / np.sqrt(complex(target - centre))
@@ -330,7 +334,9 @@ class RealCurve:
                     1j * forms / np.prod(np.sqrt(1 + square * (centre - betas)), axis=1)
                 )
 
-            v = 1j * end ** (-2 * self.genus - 1) * np.prod(np.sqrt(1 + end**2 * (centre - betas)))
+            # its phase alone names the sheet: powers of far points leave the range of a double
+            turn = (end / abs(end)) ** (-2 * self.genus - 1)
+            v = 1j * turn * np.prod(np.sqrt(1 + end**2 * (centre - betas)))
             return None, self.periods.inverse_cycles @ _integral(over_t, end), complex(v)
         j = int(np.argmin(np.abs(target - betas)))
         start = betas[j]

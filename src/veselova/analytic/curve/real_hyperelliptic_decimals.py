@@ -101,7 +101,7 @@ class CurveDecimals:
                 image_of(self._curve, fine, self._halves, *place)
                 for place in iterate(list(zip(points, sheets, strict=True)))
             ]
-            images = np.array(rows, dtype=object)
+            images = np.array(rows, dtype=object).reshape(-1, self._curve.genus)
             return np.stack(fine.arithmetic.parts(images), axis=-1)
 
         return self._decimals({"abel": partial(self._find, compute, _of_points)}, ("abel",))

@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.separable.open_interval import OpenInterval
+from veselova.analytic.separable.orbit_stations import OrbitStations
 from veselova.mechanics.core.errors import InternalContradiction
 
 __all__ = ["Arrival", "CollisionOrbit"]
 
 Array = NDArray[np.float64]
+
+#: Cycles of a swing of the phases from which the angles are led along the orbit.
+_WIDE_SWING = 100.0
 
 #: Points among which the first is looked for that is beyond a plane, and how often.
 _POINTS = 16
@@ -54,6 +58,7 @@ class CollisionOrbit:
         self.rate = SeparatedRate(motion.inversion)
         self.origin = self.inversion.map(motion.angles[None, :])[0]
         self.rates = np.asarray(motion.periods.frequencies)
+        self._stations = self._lead() if np.max(self.inversion.rounding) > _WIDE_SWING else None
         found = self._arrive(-1), self._arrive(1)
         before, after = (tau for tau, _, _ in found)
         self._half = (after - before) / 2
@@ -64,16 +69,32 @@ class CollisionOrbit:
         )
         self.arrivals = first, last
 
+    def _lead(self) -> tuple[OrbitStations, OrbitStations] | None:
+        """Return stations to both collisions; None where these are too many."""
+        before, after = (OrbitStations(self.motion, self.origin) for _ in range(2))
+        reached = before.reach(self._planes(-1), -1) and after.reach(self._planes(1), 1)
+        return (before, after) if reached else None
+
+    def _planes(self, direction: int) -> dict[int, float]:
+        """Return, per coordinate that runs into a plane, its angle there, in one direction of
+        time.
+        """
+        return {
+            s: cut.arrivals(float(self.motion.angles[s]))[direction > 0]
+            for s, cut in enumerate(self.motion.cuts)
+            if isinstance(cut, OpenInterval)
+        }
+
     def _arrive(self, direction: int) -> tuple[float, int, Array]:
         """Return τ, the coordinate and the angles of the first collision forwards (1) or backwards
         (−1) in time.
         """
-        angles = self.motion.angles
-        planes = {
-            s: cut.arrivals(float(angles[s]))[direction > 0]
-            for s, cut in enumerate(self.motion.cuts)
-            if isinstance(cut, OpenInterval)
-        }
+        planes = self._planes(direction)
+        if self._stations is not None:
+            stations = self._stations[direction > 0]
+            high, last = float(stations.tau[-1]), stations.angles[-1]
+            passed = direction * (last[list(planes)] - np.array(list(planes.values()))) >= 0
+            return self._first(list(planes.items()), passed, high, last)
 
         def beyond(taus: Array) -> NDArray[np.bool_]:
             theta = self.inversion.invert(self.origin + taus[:, None] * self.rates)
@@ -87,17 +108,27 @@ class CollisionOrbit:
             taus = np.linspace(low, high, _POINTS + 1)[1:]
             first = int(np.argmax(beyond(taus).any(axis=1)))
             low, high = taus[first - 1] if first else low, float(taus[first])
-        reached = np.flatnonzero(beyond(np.array([high]))[0])
-        found = [self._refine(list(planes.items())[i], high) for i in reached]
+        last = self.inversion.invert((self.origin + high * self.rates)[None])[0]
+        return self._first(list(planes.items()), beyond(np.array([high]))[0], high, last)
+
+    def _first(
+        self, planes: list[tuple[int, float]], passed: NDArray[np.bool_], tau: float, last: Array
+    ) -> tuple[float, int, Array]:
+        """Return the first arrival at the planes that are passed at τ, of angles ``last`` there."""
+        found = [self._refine(planes[i], tau, last) for i in np.flatnonzero(passed)]
         return min(found, key=lambda arrival: abs(arrival[0]))
 
-    def _refine(self, plane: tuple[int, float], tau: float) -> tuple[float, int, Array]:
+    def _refine(
+        self, plane: tuple[int, float], tau: float, last: Array
+    ) -> tuple[float, int, Array]:
         """Return the arrival of a coordinate at a plane near τ: Newton's method for τ and the
         other angles.
         """
         s, angle = plane
-        theta = self.inversion.invert((self.origin + tau * self.rates)[None])[0]
+        theta = np.array(last)
         theta[s] = angle
+        last_size = np.inf
+        rounding = float(np.max(self.inversion.rounding))
         for _ in range(_MOST_STEPS):
             excess = self.inversion.map(theta[None])[0] - self.origin - tau * self.rates
             slopes = self.inversion.jacobian(theta[None])[0]
@@ -107,8 +138,12 @@ class CollisionOrbit:
             theta = theta - step
             theta[s] = angle
             step[s] *= np.max(np.abs(self.rates))
-            if np.max(np.abs(step)) <= _LAST_STEP * DOUBLE.epsilon * max(1, np.max(np.abs(theta))):
+            size = float(np.max(np.abs(step)))
+            least = _LAST_STEP * DOUBLE.epsilon * max(1.0, float(np.max(np.abs(theta))))
+            # Steps end at the rounding of the phases, which swing by many cycles.
+            if size <= least or last_size <= size <= least * rounding:
                 return tau, s, theta
+            last_size = size
         raise InternalContradiction("the time of a collision did not settle")
 
     def tau(self, u: Array) -> Array:
@@ -127,4 +162,10 @@ class CollisionOrbit:
 
     def angles(self, u: Array) -> Array:
         """Return the angles at u, (N, g)."""
-        return self.inversion.invert(self.origin + self.tau(u)[:, None] * self.rates)
+        tau = self.tau(u)
+        z = self.origin + tau[:, None] * self.rates
+        if self._stations is None:
+            return self.inversion.invert(z)
+        before, after = self._stations
+        nearby = np.where((tau < 0)[:, None], before.at(tau), after.at(tau))
+        return self.inversion.invert_from(z, nearby)

@@ -313,7 +313,12 @@ def find_cuts(start: SeparableStart) -> list[AnyCut]:
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
     near = NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
     # A root that is I_i to all digits is I_i: a double root is then seen to be one.
-    single = [next((own for own in free if abs(x - own) <= near), x) for x, y in found if y == 0]
+    walls = [x for x in start.inverse if x not in free]
+    single = [
+        next((own for own in free if abs(x - own) <= near), _beside(walls, x, near, factor))
+        for x, y in found
+        if y == 0
+    ]
     real = sorted([Fraction(0), *free, *single])
     pairs = [(x, y) for x, y in found if y > 0]
     R = [2 * c for c in product([Fraction(0), Fraction(1)], product(monic(free), factor))]
@@ -322,6 +327,17 @@ def find_cuts(start: SeparableStart) -> list[AnyCut]:
     if max(leading, 1 / leading, far) > _LARGEST:
         raise Unsolved("beyond-floats", "R leaves the range of a float; integrate numerically")
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
+
+
+def _beside(walls: list[Fraction], x: Fraction, near: Fraction, factor: Polynomial) -> Fraction:
+    """Return a root of the factor, on the right side of a wall I_i that it is near: where β_i is
+    tiny its digits do not tell, and one step of Newton's method from I_i is exact.
+    """
+    wall = next((own for own in walls if abs(x - own) <= near), None)
+    if wall is None:
+        return x
+    slope = value([m * c for m, c in enumerate(factor)][1:], wall)
+    return wall - value(factor, wall) / slope if slope else x
 
 
 def _cut(

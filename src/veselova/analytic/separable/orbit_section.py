@@ -31,7 +31,7 @@ _PANELS = 2
 
 #: Rounding in ε: of one evaluation; of a phase; of frequencies, τ and t, relative.
 _EVALUATION = 16.0
-_PHASE = 8.0
+_PHASE = 4.0
 _RATE = 4.0
 
 #: Next to a collision the coordinate lines turn like 1/q_i, which is rounded to ε/q_i² of itself:
@@ -94,15 +94,17 @@ class OrbitSection:
         before = sides[0][:0:-1] if self.low < 0 else sides[0][:0]
         return np.concatenate([before, sides[1] if self.high > 0 else sides[1][:1]])
 
-    def integrate(self, function: Callable[[Array], Array], noise: float = 0.0) -> Panels:
+    def integrate(
+        self, function: Callable[[Array], Array], noise: float = 0.0, scale: float = 0.0
+    ) -> Panels:
         """Return u ↦ ∫ f dτ from the start, for a function of the angles that is rounded to
-        ``noise``.
+        ``noise``, to the rounding of ``scale``.
         """
 
         def integrand(u: Array) -> Array:
             return function(self.orbit.angles(u)) * self.orbit.slope(u)
 
-        return integrate_between(integrand, self._borders, noise)
+        return integrate_between(integrand, self._borders, noise, scale)
 
     @cached_property
     def time_panels(self) -> Panels:
@@ -112,7 +114,7 @@ class OrbitSection:
     @cached_property
     def turning(self) -> Panels:
         """Return u ↦ the angle by which m_1 has turned towards m_2, n = 3."""
-        return self.integrate(self.motion.turning, _NOISE)
+        return self.integrate(self.motion.turning, _NOISE, 1.0)  # of a radian
 
     @property
     def size(self) -> int:
@@ -165,7 +167,7 @@ class OrbitSection:
 
     def states(self, passage: Passage) -> tuple[Attitude, Array, Array]:
         """Return positions and coordinate lines, q̇ = q'/(dt/dτ), (N, n), and the angles."""
-        phi = self.motion.inversion.invert(passage.z)
+        phi = self.orbit.angles(passage.u)
         at = self.motion.attitude(phi)
         return at, at.q_prime / self.orbit.rate.at(phi)[:, None], phi
 

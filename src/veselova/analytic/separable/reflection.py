@@ -96,6 +96,14 @@ class ReflectedAbelJacobi(AbelJacobi[ReflectedPeriods]):
             for series, integral in zip(periods.cut_series, periods.half_integrals, strict=True)
         )
 
+    @cached_property
+    def rounding(self) -> Array:
+        """Return the rounding of each phase over ε, (g,): as many cycles as it may swing by while
+        one coordinate turns, or one.
+        """
+        sizes = sum(np.sum(np.abs(series[:, 1:]), axis=1) for series in self.periods.cut_series)
+        return np.asarray(np.maximum(1.0, np.abs(self.periods.inverse_cycles) @ sizes))
+
     def map(self, psi: Array) -> Array:
         """Return z for angles θ of shape (N, g); θ_s + 2π adds one to z_s."""
         result = np.zeros_like(psi)

@@ -38,9 +38,14 @@ _PROBED = 8
 #: Last coefficients below this part of the first may be rounding of the phases.
 _NOISE_TAIL = 1e-11
 
-#: Halvings of a panel before giving up; near a separatrix integrands vary over a few hundredths of
-#: a cycle.
-_MOST_HALVINGS = 30
+#: Halvings of a panel before giving up: a jump, where a weak wall throws the point back, then
+#: counts for less than the rounding of the integral.
+_MOST_HALVINGS = 56
+
+#: Panels that may be halved at once, beyond some times those to begin with: a jump halves two each
+#: time, and values without a digit halve all.
+_MOST_HALVED = 2000
+_MOST_HALVED_AGAIN = 8
 
 #: Nodes evaluated at once.
 _BLOCK = 4096
@@ -81,13 +86,13 @@ def integrate_on_panels(
 
 
 def integrate_between(
-    integrand: Callable[[Array], Array], borders: Array, noise: float = 0.0
+    integrand: Callable[[Array], Array], borders: Array, noise: float = 0.0, scale: float = 0.0
 ) -> Panels:
     """Return x ↦ ∫_0^x f over the stretch of increasing ``borders``, zero among them, panels of
     which are halved.
 
     ``integrand`` gives f at points (N,). Panels are resolved to rounding of their means, or of the
-    integral of |f| over all of them. Otherwise as ``integrate_on_panels``.
+    integral of |f| over all of them, or of ``scale``. Otherwise as ``integrate_on_panels``.
     """
     points, to_coefficients = _chebyshev(_FEW_NODES)
 
@@ -104,7 +109,7 @@ def integrate_between(
 
     lefts = borders[:-1]
     lengths = np.diff(borders)
-    whole = float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths)
+    whole = max(scale, float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths))
     return _refine(series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL / lefts.size * whole)
 
 
@@ -120,6 +125,7 @@ def _refine(
     ``series`` gives coefficients, sizes and tails of panels; an integral of tails that is
     ``negligible`` is resolved.
     """
+    most = _MOST_HALVED + _MOST_HALVED_AGAIN * lefts.size
     before = np.full(lefts.size, np.inf)
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
@@ -138,6 +144,8 @@ def _refine(
         )
         if np.all(converged):
             return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+        if np.count_nonzero(~converged) > most:
+            break
         halves = lengths[~converged] / 2
         lefts = (lefts[~converged][:, None] + halves[:, None] * np.array([0.0, 1.0])).ravel()
         lengths = np.repeat(halves, 2)

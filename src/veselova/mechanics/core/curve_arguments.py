@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...]
     """
     faults = Faults()
     points = faults.attempt(_branch_points, branch_points)
-    if isinstance(sign, bool) or sign not in (-1, 1):
+    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
         faults.add(("sign",), "1 or −1", show(sign))
     faults.require_none()
     assert points is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,8 @@ class ThetaArguments:
         if genus is None and points is not None:
             genus = points.shape[-1]
         halves = faults.attempt(_characteristics, characteristic, genus)
-        if isinstance(derivatives, bool) or derivatives not in (0, 1, 2):
+        is_order = isinstance(derivatives, Integral) and not isinstance(derivatives, bool)
+        if not is_order or derivatives not in (0, 1, 2):
             faults.add(("derivatives",), "0, 1 or 2", show(derivatives))
         faults.require_none()
         assert matrix is not None
