@@ -48,13 +48,13 @@ def closed(problem: Veselova) -> np.ndarray:
 
 
 def _integrated(flow: ReducedFlow, integrator: Integrator) -> np.ndarray:
-    return flow.unpack(_integrate(flow, TIMES / flow.time_unit, integrator))["frame"]
+    return flow.unpack(_integrate((flow,), TIMES / flow.time_unit, integrator)[0])["frame"]
 
 
 def dop853(tolerance: float) -> Solver:
     def frames(problem: Veselova) -> np.ndarray:
         flow = problem.flow()
-        return _integrated(flow, Dop853(flow, tolerance))
+        return _integrated(flow, Dop853((flow,), tolerance))
 
     return frames
 
@@ -118,7 +118,7 @@ def diffrax() -> Solver | None:
 def main(count: int) -> None:
     solvers: dict[str, Solver | None] = {
         "closed form": closed,
-        "DOP853, 2.3e-14": dop853(Dop853.tolerances[0]),
+        "DOP853, 2.3e-14": dop853(Dop853.tolerance),
         f"DOP853, {LOOSE:.0e}": dop853(LOOSE),
         "heyoka": heyoka,
         "heyoka, compiled anew": heyoka_compiled_anew,

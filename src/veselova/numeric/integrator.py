@@ -5,6 +5,7 @@ and at the end.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -18,27 +19,27 @@ Array = NDArray[np.float64]
 
 
 class Integrator(ABC):
-    """A back end: integrates the field of a Flow over one segment at a fixed tolerance."""
+    """A back end: integrates a flow and its neighbour side by side, over one segment at a time."""
 
-    #: Tolerance of the answer, and the looser one of the second run that measures its error.
-    tolerances: ClassVar[tuple[float, float]]
+    #: Tolerance of the answer.
+    tolerance: ClassVar[float]
     method: ClassVar[str]
 
     @abstractmethod
-    def __init__(self, flow: Flow, tolerance: float) -> None:
-        """Prepare for one flow at one tolerance; raises BackendMissing when the library is not
-        installed.
+    def __init__(self, flows: Sequence[Flow]) -> None:
+        """Prepare for B flows of one structure, the first of which is the answer; raises
+        BackendMissing when the library is not installed.
         """
 
     @abstractmethod
     def advance(
-        self, state: Array, start: float, stop: float, wanted: Array
+        self, states: Array, start: float, stop: float, wanted: Array
     ) -> tuple[Array, Array]:
-        """Return (states at the wanted times, state at stop), from the state at start; stop may lie
-        before start.
+        """Return the states at the wanted times (B, N, m) and at stop (B, m), from those at start
+        (B, m); stop may lie before start.
         """
 
     @property
     @abstractmethod
     def steps(self) -> int:
-        """Return the number of steps taken so far."""
+        """Return the number of steps that the answer has taken so far."""

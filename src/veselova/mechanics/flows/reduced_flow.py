@@ -89,27 +89,24 @@ class ReducedFlow(Flow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return the derivative of a state: (extended) for q and p, (Po) for the frame, (4.6) for
         τ₁.
+
+        ṗ = −((p,q̇)/(q,q)) q and ė_k = −(q̇,e_k) q equal these where (q,q) = 1, (q,p) = 0 and E is
+        orthogonal. Off this manifold they keep (q,q) and (q,p), and so defects of rounding and
+        truncation do not grow between two projections.
         """
         n = self.n
         p = state[:n]
         E = state[n:-1].reshape(n, n)
-        A = parameters[:n]
-        inverse = parameters[n:-1]
-        twice_energy = parameters[-1]
         q = E[:, 0]
-        Aq = A * q
-        p_inverse = inverse * p
-        qAq, qq, along, pp, pq = (
-            ops.dot(a, b) for a, b in ((q, Aq), (q, q), (p_inverse, q), (p, p_inverse), (p, q))
-        )
-        q_dot = (p_inverse - (along / qq) * q) / qAq
-        derivative = np.empty_like(state)
-        derivative[:n] = (-(pp * qq - pq * along) / (qAq * qq * qq)) * q
-        # −(q∧q̇)E = q̇(qᵀE) − q(q̇ᵀE); its first column is q̇(q,q) − q(q̇,q) = q̇ since (extended)
-        # keeps (q̇,q) = 0.
-        derivative[n:-1] = (np.outer(q_dot, ops.dot(q, E)) - np.outer(q, ops.dot(q_dot, E))).ravel()
-        derivative[-1] = ops.sqrt(twice_energy / qAq)
-        return derivative
+        p_inverse = parameters[n:-1] * p
+        qAq = ops.dot(q, parameters[:n] * q)
+        qq = ops.dot(q, q)
+        q_dot = (p_inverse - (ops.dot(p_inverse, q) / qq) * q) / qAq
+        columns = np.empty_like(E)
+        columns[:, 0] = q_dot
+        columns[:, 1:] = -np.outer(q, ops.dot(q_dot, E[:, 1:]))
+        time_rate = ops.sqrt(parameters[-1] / qAq)
+        return np.concatenate([-(ops.dot(p, q_dot) / qq) * q, columns.ravel(), [time_rate]])
 
     def project(self, state: Array) -> Array:
         """Return the state back on the manifold: frame orthonormal, (q,p) = 0, p rescaled to the
