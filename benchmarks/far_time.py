@@ -2,7 +2,7 @@
 
     python benchmarks/far_time.py      needs the extra `fast`
 
-Per n: set-up (curve, periods, modes of the clock, 30-digit frequencies), one attitude at t = 10⁶
+Per n: set-up (curve, periods, modes of the time map, 30-digit frequencies), one attitude at t = 10⁶
 after it (median of 9), heyoka's least time of five to integrate to t = 1000, called as its users
 call it, in the same run and scaled to 10⁶ (its cost is proportional to time), their ratio; then the
 reported error, the difference to the same closed form without guard digits, and the conditioning

@@ -57,7 +57,8 @@ def row(make: Callable[[], Veselova], times: np.ndarray, label: str) -> str:
 
 def main(count: int, span: float) -> None:
     print(
-        "| n | times | closed form | heyoka | ratio | clock | evaluations | difference | reported |"
+        "| n | times | closed form | heyoka | ratio | time map | evaluations | difference "
+        "| reported |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for n in range(2, 7):

@@ -1,5 +1,5 @@
-"""What a clock by panels costs for a cycle of the fastest phase, dt/dτ₁ by theta functions and in
-angles, and how both agree.
+"""What a time map by panels costs for a cycle of the fastest phase, dt/dτ₁ by theta functions and
+in angles, and how both agree.
 
     python benchmarks/panels.py [problems per n]
 

@@ -54,7 +54,7 @@ def ratios(rng: np.random.Generator, kind: str) -> dict[str, float]:
         int(rng.integers(16, 105)),
         int(rng.choice([3, 40, 320, 900])),
     )
-    # Far out, clocks near a separatrix, and those of many modes, take minutes.
+    # Far out, time maps near a separatrix, and those of many modes, take minutes.
     far = (
         rng.uniform() < 0.3
         and kind not in ("separatrix", "wide")

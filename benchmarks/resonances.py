@@ -4,7 +4,7 @@ frequencies nearly vanishes?
     python benchmarks/resonances.py [problems per n] [farthest time]      default 12 and 1000
 
 Random problems, n = 3 and 4, tuned to a relative distance of 1e-9 to 1e-2 from a resonance with
-|m_k| ≤ 4; truth by balls of 25 digits, which takes seconds for each. Prints per n and clock the
+|m_k| ≤ 4; truth by balls of 25 digits, which takes seconds for each. Prints per n and time map the
 largest true error of the frame, the largest reported one, and the largest true error over the
 reported one at the same time, at most 1.
 """
@@ -28,7 +28,7 @@ from draws import near_resonance
 
 
 def main(count: int, farthest: float) -> None:
-    print("n   clock     problems   largest error   largest reported   largest error/reported")
+    print("n   time map  problems   largest error   largest reported   largest error/reported")
     for n, far in ((3, farthest), (4, farthest / 10)):
         rng = np.random.default_rng(1000 + n)
         rows: dict[str, list[tuple[float, float, float]]] = {"fourier": [], "panels": []}
@@ -36,11 +36,11 @@ def main(count: int, farthest: float) -> None:
             _, problem = near_resonance(rng, n, 10 ** rng.uniform(-9, -2))
             times = np.sort(rng.uniform(-far, far, 5))
             truth = solve(problem, times, digits=25)
-            for clock, found in rows.items():
+            for time_map, found in rows.items():
                 try:
-                    closed = solve_analytic(problem, times, time_map=clock)
+                    closed = solve_analytic(problem, times, time_map=time_map)
                 except Unsolved as refused:
-                    print(f"{n}   {clock}: {refused}")
+                    print(f"{n}   {time_map}: {refused}")
                     continue
                 error = np.max(np.abs(closed.frame - truth.frame), axis=(1, 2))
                 found.append(
@@ -50,10 +50,10 @@ def main(count: int, farthest: float) -> None:
                         float(np.max(error / closed.error)),
                     )
                 )
-        for clock, found in rows.items():
+        for time_map, found in rows.items():
             largest, reported, ratio = np.max(found, axis=0)
             print(
-                f"{n}   {clock:7s}   {len(found):8d}   {largest:13.1e}   {reported:16.1e}   "
+                f"{n}   {time_map:8s}   {len(found):8d}   {largest:13.1e}   {reported:16.1e}   "
                 f"{ratio:13.2f}",
                 flush=True,
             )

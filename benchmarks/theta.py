@@ -89,7 +89,7 @@ def along_orbit(genus: int, count: int) -> str:
     )
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
-    clock = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
+    time_map = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
     costs = Costs(solution.curve.genus, solution.modes, solution.fastest * SPAN)
     fewest = costs.fewest_in_window(32, "panels")
 
@@ -99,7 +99,7 @@ def along_orbit(genus: int, count: int) -> str:
     began = time.process_time()
     ours = (
         Windows(times, float(np.max(np.abs(rates))), fewest)
-        .interpolate(clock, rates, evaluation)
+        .interpolate(time_map, rates, evaluation)
         .series[0][:, 0]
     )
     each = (time.process_time() - began) / times.size

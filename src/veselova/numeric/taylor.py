@@ -116,23 +116,23 @@ def _of_this_thread(flow: Flow, lanes: int) -> Any:
     """Return a compiled integrator of a field that no other thread uses; state, time and parameters
     are set at each use.
     """
+    try:
+        import heyoka as hy
+    except ImportError:
+        raise BackendMissing("heyoka", "method='taylor'", "pip install heyoka") from None
     own = _own.integrators
     key = flow.structure, lanes
     if key not in own:
         if len(own) >= _MOST_COMPILED:
             own.clear()
-        own[key] = copy.copy(_compile(flow, lanes))
+        own[key] = copy.copy(_compile(hy, flow, lanes))
     return own[key]
 
 
-def _compile(flow: Flow, lanes: int) -> Any:
+def _compile(hy: Any, flow: Flow, lanes: int) -> Any:
     """Return heyoka's compiled integrator of a field for so many lanes, its parameters left open;
     one is kept for every structure.
     """
-    try:
-        import heyoka as hy
-    except ImportError:
-        raise BackendMissing("heyoka", "method='taylor'", "pip install heyoka") from None
     if flow.structure is None:
         raise InvalidInput(("method",), "dop853 (this field has no symbolic form)", "taylor")
     key = flow.structure, lanes
