@@ -69,7 +69,7 @@ class MotionInBalls:
             field = "digits" if self.digits > FEWEST_DIGITS else "certified"
             raise InvalidInput(
                 (field,),
-                "A as n numbers (the principal axes of a matrix are no exact numbers)",
+                "A as n numbers or a diagonal matrix (other principal axes are no exact numbers)",
                 "A as a matrix",
             )
 

@@ -63,7 +63,7 @@ def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = 
 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], WideAxes | None]:
     """Return the diagonal of A as exact numbers, and the principal axes when A was given as a
-    matrix.
+    matrix that is not diagonal.
 
     Both are of the symmetric part, to 2^−256 of its largest entry: what is seen along them has no
     rounding of theirs. The axes are a rotation, determinant +1, so that vector products and
@@ -77,6 +77,10 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Wi
     matrix = symmetric_matrix(A, name)
     if not any(map(any, matrix)):
         raise InvalidInput((name,), "a positive definite matrix", "zero")
+    diagonal = tuple(matrix[i][i] for i in range(len(matrix)))
+    off = (x for i, row in enumerate(matrix) for j, x in enumerate(row) if i != j)
+    if not any(off) and min(diagonal) > 0:  # the axes are the body's, and all digits are known
+        return positive_numbers(diagonal, name), None
     axes = wide_axes(matrix)
     if axes.values[0] <= len(A) * Fraction(_EPSILON) * axes.values[-1]:
         raise InvalidInput(
