@@ -14,6 +14,7 @@ from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
     EulerPoisson,
+    InvalidInput,
     LRSystem,
     NeumannSystem,
     SeparableVeselova,
@@ -177,3 +178,20 @@ def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Ge
                 system(A[order], turn @ x, turn @ w, *more, normalize=True), TIMES
             ).series(portrait)
             assert np.max(np.abs(other - one @ turn.T)) < 1e-10, system
+
+
+@pytest.mark.parametrize("system", [Veselova, VeselovaSO3])
+def test_a_diagonal_matrix_is_as_exact_as_its_entries(system: Any) -> None:
+    """Its axes are the body's, so digits and certified errors are answered."""
+    entries = ["3", "1/3", 1]
+    matrix = [["3", 0, 0], [0, "1/3", 0], [0, 0, 1]]
+    start = ([0.6, 0, 0.8], [0.8, 1, -0.6])
+    for more in ({"digits": 30}, {"certified": True}):
+        one, other = (
+            solve(system(given, *start, normalize=True), [0, 1, 5], **more)
+            for given in (entries, matrix)
+        )
+        assert np.array_equal(one.frame, other.frame)
+        assert np.array_equal(one.error, other.error)
+    with pytest.raises(InvalidInput, match="positive definite"):
+        system([[1, 0, 0], [0, -1, 0], [0, 0, 1]], *start, normalize=True)
