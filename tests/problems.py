@@ -37,7 +37,7 @@ class Case:
     q_dot: Sequence[Any]
     tags: frozenset[str]
     frame: Any = None
-    horizon: float = 50.0
+    span: float = 50.0
     points: tuple[dict[str, Any], ...] = field(default=(), repr=False)
 
     @cache  # noqa: B019 - cases live as long as the module
@@ -46,8 +46,8 @@ class Case:
         return Veselova(self.A, self.q, self.q_dot, self.frame, normalize=True)
 
     def times(self, count: int = 6) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Return times spread over both directions up to the horizon, zero not among them."""
-        half = self.horizon * np.geomspace(1e-2, 1.0, count // 2)
+        """Return times in both directions up to the end of the span, zero not among them."""
+        half = self.span * np.geomspace(1e-2, 1.0, count // 2)
         return np.concatenate([-half[::-1], half])
 
 
@@ -66,7 +66,7 @@ def _reference_cases() -> list[Case]:
     cases = []
     for item in json.loads(REFERENCE.read_text())["problems"]:
         tags = special.get(item["name"], _tags("generic")) | {"reference"}
-        horizon = max(float(point["t"]) for point in item["points"])
+        span = max(float(point["t"]) for point in item["points"])
         cases.append(
             Case(
                 item["name"],
@@ -75,7 +75,7 @@ def _reference_cases() -> list[Case]:
                 item["q_dot"],
                 tags,
                 item["frame"],
-                horizon,
+                span,
                 tuple(item["points"]),
             )
         )
@@ -110,7 +110,7 @@ def near_separatrix(gap: float) -> Case:
         q.tolist(),
         q_dot.tolist(),
         _tags("generic", "near-degenerate"),
-        horizon=30.0,
+        span=30.0,
     )
 
 
@@ -152,7 +152,7 @@ TABLE: tuple[Case, ...] = (
         [1, 1, -1, 1, 1, -1, 1, 1],
         [1, -2, 3, -4, 3, 2, -1, 0.5],
         _tags("generic"),
-        horizon=20,
+        span=20,
     ),
     Case("ratio-100", [100, 10, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("generic")),
     Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-cut")),
@@ -169,7 +169,7 @@ TABLE: tuple[Case, ...] = (
         [0.3, 0.5, 0.8],
         [1e-6, -4e-7, 2e-7],
         _tags("generic", "scaled"),
-        horizon=5e7,
+        span=5e7,
     ),
     Case(
         "fast",
@@ -177,7 +177,7 @@ TABLE: tuple[Case, ...] = (
         [0.3, 0.5, 0.8],
         [1e9, -4e8, 2e8],
         _tags("generic", "scaled"),
-        horizon=5e-8,
+        span=5e-8,
     ),
     near_separatrix(1e-3),
     near_separatrix(1e-6),
@@ -238,9 +238,9 @@ TABLE: tuple[Case, ...] = (
         [0.5, 0.5, 0.5, 0.5, 0.3, 0.4],
         [1.1, -0.7, 0.3, -0.7, 0.2, 0.6],
         _tags("generic", "near-degenerate"),
-        horizon=20,
+        span=20,
     ),
-    Case("wide-ratio", [1e8, 1e4, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("wide"), horizon=5),
+    Case("wide-ratio", [1e8, 1e4, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("wide"), span=5),
     Case(
         "huge-units",
         [3e150, 2e150, 1e150],
@@ -262,7 +262,7 @@ TABLE: tuple[Case, ...] = (
         ["3/5", 0, "4/5"],
         ["4/5", 1, "-3/5"],
         _tags("separatrix"),
-        horizon=8,
+        span=8,
     ),
     Case(
         "near-umbilic",
@@ -270,7 +270,7 @@ TABLE: tuple[Case, ...] = (
         ["3/5", "1e-30", "4/5"],
         ["4/5", 1, "-3/5"],
         _tags("near-degenerate"),
-        horizon=8,
+        span=8,
     ),
     Case("at-rest", [3, 2, 1], [0.3, 0.5, 0.8], [0, 0, 0], _tags("at-rest")),
 )
@@ -287,7 +287,7 @@ class BodyCase:
     gamma: Sequence[Any]
     Omega: Sequence[Any]
     tags: frozenset[str] = _tags("generic")
-    horizon: float = 20.0
+    span: float = 20.0
     mass: Any = "0.7"
     radius: Any = "0.8"
 
@@ -310,8 +310,8 @@ class BodyCase:
         return VeselovaSO3(moved, **data)
 
     def times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Return times up to the horizon."""
-        return self.horizon * np.array([0, 0.01, 0.1, 0.3, 1])
+        """Return times up to the end of the span."""
+        return self.span * np.array([0, 0.01, 0.1, 0.3, 1])
 
 
 #: 0.7·0.8² = 0.448 is ma². Where K is along γ, Ω is J⁻¹γ.
@@ -325,7 +325,7 @@ _ALONG = [
 BODIES: tuple[BodyCase, ...] = (
     BodyCase("generic", _GENERIC, _GAMMA, ["0.3", "-0.7", "0.9"]),
     BodyCase("other-side", _GENERIC, _GAMMA, ["1.3", "0.2", "-0.1"]),
-    BodyCase("fast", _GENERIC, _GAMMA, ["3e8", "-7e8", "9e8"], horizon=2e-8),
+    BodyCase("fast", _GENERIC, _GAMMA, ["3e8", "-7e8", "9e8"], span=2e-8),
     BodyCase("hardly-twists", _GENERIC, [0.6, 0, 0.8], ["0.8", 1, "-0.5999999"]),
     BodyCase(
         "matrix",

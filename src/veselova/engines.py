@@ -265,7 +265,7 @@ def closed_form(
 
     ``accuracy``: the error that modes left out of the time map may make; 10^(3−digits), which is
     1e-12, when left out. ``digits`` (15 … 200): beyond 15 all numbers are decimal strings, with 15
-    digits more, for times up to 10¹²; data are taken at their word. Raises InvalidInput for a
+    digits more, for times up to 10¹²; data are exact as given. Raises InvalidInput for a
     system without a torus and for bad arguments, Unsolved where theta functions do not serve (rest,
     a separatrix, too many modes).
     """

@@ -36,8 +36,9 @@ def assert_one_motion(many: object, single: object, chosen: np.ndarray) -> None:
 
 @pytest.mark.parametrize("case", MOVING, ids=lambda case: case.name)
 def test_many_times_are_the_motion_of_each(case: Case) -> None:
-    problem, horizon = case.problem(), min(case.horizon, 20.0 / max(case.problem().turning, 1e-300))
-    times = np.unique(np.random.default_rng(1).uniform(-horizon, horizon, 1500))
+    problem = case.problem()
+    span = min(case.span, 20.0 / max(problem.turning, 1e-300))
+    times = np.unique(np.random.default_rng(1).uniform(-span, span, 1500))
     chosen = np.sort(np.random.default_rng(2).permutation(times.size)[:FEW])
     many, single = solve(problem, times), solve(problem, times[chosen])
     assert_one_motion(many, single, chosen)

@@ -85,7 +85,7 @@ class EvaluationPlan:
         return cls(
             times,
             remainders,
-            method or solution.default_method(),
+            solution.choose_method(method),
             chosen,
             in_angles,
             cycles,

@@ -38,7 +38,7 @@ class Evaluator:
     @cached_property
     def method(self) -> str:
         """Return the method."""
-        return self.given or self.solution.default_method()
+        return self.solution.choose_method(self.given)
 
     def plan(self, times: TimeGrid, time_map: str | None = None) -> EvaluationPlan:
         """Return the plan for times, with the time map given or the cheaper one."""

@@ -328,6 +328,10 @@ class Solution:
             and np.max(self.periods.cancellation) < _LARGE_CANCELLATION
         )
 
+    def choose_method(self, given: str | None) -> str:
+        """Return the method given, or the default one."""
+        return given or self.default_method()
+
     def default_method(self) -> str:
         """Return theta near a separatrix, angles for a narrow cut or wide A's, and otherwise the
         cheaper route.

@@ -1,6 +1,6 @@
 """Numbers as given: every input becomes an exact rational before anything is rounded.
 
-A decimal string ("0.7") or a ratio ("7/10") is taken at its word; a float is the dyadic rational
+A decimal string ("0.7") or a ratio ("7/10") is the number it writes; a float is the dyadic rational
 that it stores. The engines round these rationals once, to the precision they work in.
 """
 

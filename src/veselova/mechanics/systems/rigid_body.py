@@ -133,6 +133,11 @@ class RigidBody(Problem):
             potential=V.given,
         )
         self._set(given=given)
+        if frame is None:
+            self._take_natural_frame()
+
+    def _take_natural_frame(self) -> None:
+        """Replace the natural frame, rounded from doubles, where a subclass knows more digits."""
 
     @property
     def axes(self) -> Array | None:

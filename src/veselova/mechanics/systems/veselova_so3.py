@@ -86,18 +86,8 @@ class VeselovaSO3(RigidBody):
     #: What ``on_torus`` makes where (Ω,γ) ≠ 0.
     area_class: ClassVar[type[AreaVeselova]] = AreaVeselova
 
-    def __init__(
-        self,
-        inertia: Any,
-        gamma: Any,
-        Omega: Any,
-        potential: Any = None,
-        frame: Any = None,
-        *,
-        normalize: bool = False,
-    ) -> None:
-        super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
-        if frame is None and self.is_rank_one:  # one start for both engines, and all digits of it
+    def _take_natural_frame(self) -> None:
+        if self.is_rank_one:  # one start for both engines, and all digits of it
             point = self.on_torus()
             self._set(frame=point.to_body_axes(point.frame[None])[0])
 
