@@ -238,10 +238,15 @@ def test_bodies_have_tori_where_their_motion_has_one() -> None:
     found = rows(
         read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2
     )
-    assert [row["outcome"] for row in found] == ["solved", "not-rank-one"]
-    expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 0]))
-    assert np.isclose(found[0]["frequencies_t.0"], expected.frequencies_t[0], rtol=1e-15)
-    assert found[0]["regime"] == expected.regime
+    for row, spin in zip(found, (0, 0.1), strict=True):
+        expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, spin]))
+        assert np.isclose(row["frequencies_t.0"], expected.frequencies_t[0], rtol=1e-15)
+        assert (row["outcome"], row["regime"]) == ("solved", expected.regime)
+    attracted = {**body, "potential": {"clebsch": 0.1}}
+    found = rows(
+        read_request(SweepRequest, {"problem": attracted, "vary": {"/Omega/2": [0]}}), 0, 1
+    )
+    assert found[0]["outcome"] == "not-rank-one"
 
 
 def test_a_row_says_what_torus_and_solve_say() -> None:

@@ -91,6 +91,6 @@ def on_torus(problem: Problem) -> TorusProblem:
     tori.
     """
     if not isinstance(problem, _OnTorus):
-        systems = "veselova, veselova-so3, rubber-ball, neumann, ellipsoid-geodesic"
+        systems = "veselova, veselova-so3, rubber-ball, chaplygin-ball, neumann, ellipsoid-geodesic"
         raise InvalidInput(("problem",), f"a system with a torus: {systems}", problem.system)
     return problem.on_torus()
