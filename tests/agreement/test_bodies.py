@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 import veselova as vs
 from conftest import slow
 from problems import BODIES, BodyCase
-from rolling_truth import roll
+from rolling_truth import roll, roll_in_80_bits
 from veselova import InvalidInput, Unsolved
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.solve import METHODS, solve
@@ -105,6 +105,24 @@ def test_random_bodies_are_served_honestly(seed: int, system: str) -> None:
     comparison = vs.compare(problem, times)
     assert comparison.agrees
     assert np.max(comparison.analytic.error) < 1e-10
+
+
+@pytest.mark.parametrize("seed", [0, *map(slow, range(1, 20))])
+@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
+def test_to_a_thousand_the_motion_is_that_in_80_bits(seed: int, system: str) -> None:
+    pytest.importorskip("heyoka")
+    rng = np.random.default_rng([80, seed])
+    gamma, Omega = rng.normal(size=(2, 3))
+    problem = BodyCase("random", rng.uniform(1, 2, 3).tolist(), gamma, Omega).problem(system)
+    times = np.array([0, 1, 10, 100, 1000.0])
+    direction, position = roll_in_80_bits(problem, times, system == "chaplygin-ball")
+    found = vs.solve(problem, times)
+    off = np.maximum(
+        np.max(np.abs(found.gamma - direction), axis=1),
+        np.max(np.abs(found.position - position), axis=1),
+    ).astype(float)
+    assert np.all(off <= found.error)
+    assert np.all(off <= 5e-12 * np.maximum(1, times / 100))
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
