@@ -45,6 +45,7 @@ export class Explorer {
   #asksPrecise = false;
   #written = "";
   #rest = 0;
+  #tries = 0;
 
   constructor() {
     this.#gallery = new Gallery(
@@ -255,13 +256,14 @@ export class Explorer {
         this.#accept(loaded, performance.now() - began);
       } catch (error) {
         if (this.#refuse(error)) this.#wanted ??= problem;
-        if (error instanceof Unreachable) break;
+        if (this.#wanted === problem) break;
       }
     }
     this.#loading = false;
   }
 
   #accept(loaded: Loaded, milliseconds: number): void {
+    this.#tries = 0;
     elements.banner.hidden = true;
     elements.keyForm.hidden = true;
     elements.message.textContent = "";
@@ -288,6 +290,11 @@ export class Explorer {
       elements.keyForm.hidden = false;
       elements.message.textContent = apiKey.get() ? error.message : "";
       return false;
+    }
+    if (error instanceof Refusal && [503, 504].includes(error.status) && this.#tries++ < 4) {
+      elements.message.textContent = `${error.message} The page asks again.`;
+      setTimeout(() => void this.#load(), RETRY_MS);
+      return true;
     }
     const sentence = error instanceof Error ? error.message : String(error);
     const faults = error instanceof Refusal ? error.faults : [];

@@ -29,8 +29,8 @@ export class BallView extends View3D {
     super(
       "ball",
       "Rolling ball",
-      "The contact point draws its path (blue). The arrow is the mean velocity, along the momentum.",
-      [3.2, -6.4, 4.2],
+      "The contact point draws its path (blue). Green: the line of its mean velocity (arrow).",
+      [4.4, -7.6, 5.0],
     );
   }
 
@@ -48,7 +48,7 @@ export class BallView extends View3D {
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
     this.#trail = new TrailLine(10000, BLUE);
     this.#momentum = arrow(ORANGE, 1.6 * this.#radius, 0.25 * this.#radius);
-    this.#drift = line([[0, 0, 0], [1, 0, 0]], GREEN, 0.8);
+    this.#drift = line(alongDrift(0, 0, 1, 0, 1), GREEN);
     this.world.add(this.#plane, this.#ball, this.#trail.object, this.#momentum, this.#drift);
     this.#mean = meanVelocity(loaded.motion, loaded.reach);
     this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
@@ -97,12 +97,7 @@ export class BallView extends View3D {
       const ahead = size > 0 ? (1.1 * a) / size : 0;
       this.#momentum.position.set(x + ahead * u, y + ahead * v, 0.06 * a);
       this.#drift.visible = size > 0;
-      const far = (30 * a) / (size || 1);
-      const [left, right]: Point[] = [
-        [x - far * u, y - far * v, 0.01 * a],
-        [x + far * u, y + far * v, 0.01 * a],
-      ];
-      moveLine(this.#drift, [left, right]);
+      if (size > 0) moveLine(this.#drift, alongDrift(x, y, u / size, v / size, a));
     }
   }
 
@@ -115,6 +110,14 @@ export class BallView extends View3D {
       `(${Array.from(q, (entry) => short(entry)).join(", ")}).`
     );
   }
+}
+
+/** Return points of the line through the contact point along a unit vector, one each radius. */
+function alongDrift(x: number, y: number, u: number, v: number, a: number): Point[] {
+  return Array.from({ length: 31 }, (_, k): Point => {
+    const s = (k - 20) * a;
+    return [x + s * u, y + s * v, 0.03 * a];
+  });
 }
 
 /** Return the mean velocity of the contact point over a long time. */
@@ -133,19 +136,22 @@ function painted(radius: number, dark: boolean): Mesh {
   const position = geometry.getAttribute("position");
   const shades = new Float32Array(3 * position.count);
   const [even, odd] = [new Color(BLUE), new Color(dark ? "#e8eef5" : "#f4f7fa")];
-  const cap = new Color(VERMILION);
   for (let corner = 0; corner < position.count; corner += 3) {
     const centre = [0, 1, 2].map((axis) => {
       const array = [position.getX, position.getY, position.getZ][axis];
       return [0, 1, 2].reduce((sum, k) => sum + array.call(position, corner + k), 0);
     });
-    const size = Math.hypot(...centre);
-    const capped = Math.abs(centre[2]) / size > 0.96;
-    const shade = capped ? cap : centre.filter((x) => x > 0).length % 2 ? even : odd;
+    const shade = centre.filter((x) => x > 0).length % 2 ? even : odd;
     for (let k = 0; k < 3; k++) shade.toArray(shades, 3 * (corner + k));
   }
   geometry.setAttribute("color", new BufferAttribute(shades, 3));
-  return new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+  for (const turn of [1, -1]) {
+    const cap = new SphereGeometry(1.003 * radius, 48, 8, 0, 2 * Math.PI, 0, 0.27);
+    cap.rotateX((turn * Math.PI) / 2);
+    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, roughness: 0.4 })));
+  }
+  return ball;
 }
 
 function grid(radius: number, rule: string, ground: string): Group {

@@ -208,18 +208,13 @@ export class EnginesView extends View {
 
 function makeChart(plot: Plot, width: number): uPlot {
   const colours = theme();
-  const powers = (_: uPlot, values: number[]) =>
-    values.map((value) => {
-      const power = Math.log10(value);
-      return Number.isInteger(Math.round(1e6 * power) / 1e6) ? `1e${Math.round(power)}` : "";
-    });
   const axis = (side: number, logarithmic: boolean): uPlot.Axis => ({
     stroke: colours.text,
     grid: { stroke: colours.line, width: 1 },
     ticks: { stroke: colours.line, width: 1, size: 4 },
     size: side === 2 ? 26 : 46,
     font: "11px 'DejaVu Sans', system-ui, sans-serif",
-    ...(logarithmic ? { values: powers, space: side === 2 ? 34 : 18 } : {}),
+    ...(logarithmic ? { splits: decades, values: (_, all) => all.map(powerOfTen) } : {}),
   });
   const options: uPlot.Options = {
     width,
@@ -243,6 +238,20 @@ function makeChart(plot: Plot, width: number): uPlot {
     ],
   };
   return new uPlot(options, plot.data, plot.host);
+}
+
+/** Return at most seven powers of ten between two numbers. */
+function decades(_: uPlot, __: number, low: number, high: number): number[] {
+  const [first, last] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+  const step = Math.max(1, Math.ceil((last - first) / 6));
+  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, k) =>
+    Number(`1e${first + k * step}`),
+  );
+}
+
+function powerOfTen(value: number): string {
+  const digits = String(Math.round(Math.log10(value))).replace("-", "⁻");
+  return `10${digits.replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)])}`;
 }
 
 /** Return how far integrals at times from 0.1 to 10⁶ are from those at the start. */

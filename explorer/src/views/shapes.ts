@@ -21,10 +21,11 @@ export type Point = [number, number, number];
 export function line(points: Point[], colour: string, opacity = 1): Line {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new Float32BufferAttribute(points.flat(), 3));
-  const transparent = opacity < 1;
-  const material = new LineBasicMaterial({ color: colour, transparent, opacity });
-  material.depthWrite = !transparent;
+  // After the translucent surfaces, which would dim it otherwise.
+  const material = new LineBasicMaterial({ color: colour, transparent: true, opacity });
+  material.depthWrite = opacity === 1;
   const made = new Line(geometry, material);
+  made.renderOrder = 2;
   made.frustumCulled = false;
   return made;
 }
@@ -101,6 +102,10 @@ export function arrow(colour: string, length: number, head = 0.11): ArrowHelper 
     0.5 * head,
   );
   made.line.frustumCulled = made.cone.frustumCulled = false;
+  made.line.renderOrder = made.cone.renderOrder = 3;
+  for (const { material } of [made.line, made.cone]) {
+    for (const one of [material].flat()) one.transparent = true;
+  }
   return made;
 }
 
@@ -115,5 +120,7 @@ export function aim(one: ArrowHelper, x: number, y: number, z: number, length?: 
 
 export function ball(colour: string, radius: number): Mesh {
   const geometry = new SphereGeometry(radius, 20, 14);
-  return new Mesh(geometry, new MeshBasicMaterial({ color: colour }));
+  const made = new Mesh(geometry, new MeshBasicMaterial({ color: colour, transparent: true }));
+  made.renderOrder = 3;
+  return made;
 }

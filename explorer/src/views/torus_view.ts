@@ -13,7 +13,7 @@ import { list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
 /** Dots of the section z_1 = 0. */
-const SECTION = 160;
+const SECTION = 40;
 
 export class TorusView extends View3D {
   #genus = 2;
@@ -71,7 +71,7 @@ export class TorusView extends View3D {
     );
     const [z, f] = [torus.phases, torus.frequencies_tau1];
     for (let k = 0; k < SECTION; k++) {
-      const dot = ball(ORANGE, 0.009);
+      const dot = ball(ORANGE, 0.013);
       dot.position.set(...onRing(0, z[1] + ((k - z[0]) * f[1]) / f[0], 1.02));
       this.world.add(dot);
     }
