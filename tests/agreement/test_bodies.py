@@ -4,6 +4,7 @@ through their table.
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -147,6 +148,52 @@ def test_the_mean_velocity_is_that_of_a_long_run(system: str) -> None:
     assert largest(run - problem.drift.velocity) < 1e-6
     momentum = found.integrals["space_momentum"][0]
     assert abs(problem.drift.velocity @ momentum[1:]) < 1e-14 * np.linalg.norm(momentum)
+
+
+def resonant(system: str) -> dict[bool, tuple[Any, int]]:
+    """Return balls on resonant tori f_1/f_2 = p/q and their q, by whether they drift across: q is
+    even where c_2 lies on cut 2, p where it lies on cut 1.
+    """
+    found: dict[bool, tuple[Any, int]] = {}
+    for seed in range(4):
+        gamma, *turned = np.random.default_rng(seed).normal(size=(3, 3))
+
+        def at(angle: float, gamma: Any = gamma, turned: Any = turned) -> Any:
+            Omega = np.cos(angle) * turned[0] + np.sin(angle) * turned[1]
+            return BodyCase("turned", [0.8, 1.2, 2.1], gamma, Omega).problem(system)
+
+        def ratio(angle: float, at: Any = at) -> float:
+            f = AreaSolution(at(angle).on_torus()).in_tau1.rates
+            return float(f[0] / f[1])
+
+        angles = np.linspace(0.01, 3.1, 20)
+        upper = [vs.torus(at(x)).origins.index("c2") > 2 for x in angles]
+        ratios = [ratio(x) for x in angles]
+        for k, (p, q) in itertools.product(range(19), ((3, 4), (4, 5), (4, 3), (5, 3), (3, 2))):
+            drifts = (q if upper[k] else p) % 2 == 0
+            between = sorted(ratios[k : k + 2])
+            apart = between[1] - between[0] > 0.5
+            if drifts in found or upper[k] != upper[k + 1] or apart:
+                continue
+            if between[0] < p / q < between[1]:
+                angle = brentq(lambda x: ratio(x) - p / q, *angles[k : k + 2], xtol=1e-16)  # noqa: B023
+                found[drifts] = at(float(angle)), q
+    return found
+
+
+@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
+def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str) -> None:
+    found = resonant(system)
+    assert set(found) == {True, False}
+    for drifts, (problem, q) in found.items():
+        solution = AreaSolution(problem.on_torus())
+        tau1 = abs(2 * q / solution.in_tau1.rates[1])
+        time = float(solution.fourier_time_map(False).time(np.array([tau1]))[0])
+        motion = vs.solve(problem, [0.0, time])
+        assert largest(motion.frame[1] - motion.frame[0]) < 1e-12
+        measured = (motion.position[1] - motion.position[0]) / time
+        assert largest(measured - problem.drift.velocity) < 1e-13
+        assert (problem.drift.resonance is not None) == drifts
 
 
 @pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])

@@ -59,6 +59,9 @@ class Problem(ABC):
     #: Whether motions of the system run on tori that ``torus`` describes: all of them, or some.
     has_tori: ClassVar[bool] = False
 
+    #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
+    has_documents: ClassVar[bool] = False
+
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 

@@ -90,7 +90,7 @@ def _systems() -> list[dict[str, Any]]:
             "formulations": list(model.problem_class.formulations),
             "outputs": list(model.problem_class.outputs),
             "time": model.problem_class.time,
-            "closed_form": model.problem_class.has_tori,
+            "closed_form": model.problem_class.has_documents,
         }
         for name, model in SYSTEMS.items()
     ]
