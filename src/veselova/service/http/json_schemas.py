@@ -235,7 +235,11 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "certified": {"type": "boolean"},
             "radii": {
                 "type": "object",
-                "additionalProperties": {"type": "array"},
+                "additionalProperties": {
+                    "type": "array",
+                    "items": {},
+                    "description": "decimals, nested as the field is",
+                },
                 "description": "the error of every decimal, by the name of its field",
             },
         },
