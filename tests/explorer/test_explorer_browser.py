@@ -285,6 +285,7 @@ def test_far_times_come_with_more_digits(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
     visit.page.click('[data-time="1000000000000"]')
     visit.wait_for("document.getElementById('status').textContent.includes('30 digits')")
+    visit.wait_for("document.querySelector('#facts td').textContent !== ''")
     assert visit.time() == 1e12
     found = visit.text("#facts td").replace("−", "-").split(", ")
     import veselova as vs

@@ -214,7 +214,9 @@ function makeChart(plot: Plot, width: number): uPlot {
     ticks: { stroke: colours.line, width: 1, size: 4 },
     size: side === 2 ? 26 : 46,
     font: "11px 'DejaVu Sans', system-ui, sans-serif",
-    ...(logarithmic ? { splits: decades, values: (_, all) => all.map(powerOfTen) } : {}),
+    ...(logarithmic
+      ? { splits: decades, filter: (_, all) => all, values: (_, all) => all.map(powerOfTen) }
+      : {}),
   });
   const options: uPlot.Options = {
     width,

@@ -8,7 +8,7 @@ import gzip
 import hashlib
 import mimetypes
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from fastapi import FastAPI
@@ -95,19 +95,31 @@ class _File:
         return Response(content, headers=headers, media_type=self.media_type)
 
 
+def _find(path: Path) -> _File | None:
+    """Return a file as it is now, so that a bundle may be built under a server that runs."""
+    try:
+        return _file(path, path.stat().st_mtime_ns) if path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
+@lru_cache(maxsize=256)
+def _file(path: Path, _: int) -> _File:
+    return _File(path)
+
+
 def add_explorer(app: FastAPI, bundle: Path = BUNDLE) -> None:
     """Serve the explorer at ``/``, or one sentence where it was not built."""
-    folder = bundle / "explorer"
-    files = {path.name: _File(path) for path in folder.glob("*")} if folder.is_dir() else {}
-    page = _File(bundle / "index.html") if (bundle / "index.html").is_file() else None
 
     async def index(request: Request) -> Response:
+        page = _find(bundle / "index.html")
         if page is None:
             return PlainTextResponse(MISSING, status_code=404)
         return page.answer(request, "no-cache")
 
     async def file(request: Request) -> Response:
-        found = files.get(request.path_params["name"])
+        # The name is one part of a path: it leads to no other folder.
+        found = _find(bundle / "explorer" / request.path_params["name"])
         if found is None:
             return PlainTextResponse("The explorer has no such file.\n", status_code=404)
         return found.answer(request, _FOR_EVER)
