@@ -62,8 +62,8 @@ def test_true_errors_never_exceed_reported_ones(case: BodyCase, system: str) -> 
     assert np.all(off <= found.error + TRUTH)
     assert np.max(found.error) < 5e-10
     assert largest(found.Omega - true.Omega) < 1e-10 * largest(problem.Omega)
-    hardly = 1e-8 if case.name == "hardly-twists" else 0.0  # relative to (Ω,γ) = 8e-8
-    assert max(found.drift.values()) < 1e-11 + 2 * hardly
+    relative = 1e-14 * float(np.linalg.norm(problem.Omega)) / abs(problem.linear)  # to (Ω,γ)
+    assert max(found.drift.values()) < 1e-11 + relative
 
 
 @pytest.mark.parametrize("time_map", ["fourier", "panels"])

@@ -120,7 +120,8 @@ class WithAreaConstant(Displacement):
 
     @cached_property
     def _peaks(self) -> Array:
-        """Return the largest values of (q',n_2) and of the odd part at the half periods.
+        """Return the largest values of (q',n_2) and of the odd part at the half periods, or those
+        that move a ball by |Ω| where they are less: below their rounding they are noise.
 
         Where K is nearly along γ both are small, and the unit of τ₁ is large.
         """
@@ -129,7 +130,11 @@ class WithAreaConstant(Displacement):
             return np.zeros(0)
         at = solution.frame.at(np.pi * np.asarray(solution.frame.half_periods, dtype=np.float64))
         across = float(np.max(np.abs(at.components[:, 0])))
-        return np.array([across, solution.odd_peak][: 2 if solution.odd_peak else 1])
+        usual = abs(solution.problem.spin * solution.mean_rate)
+        peaks = [max(across, usual)]
+        if solution.odd_peak:
+            peaks.append(max(solution.odd_peak, usual / abs(solution.problem.across)))
+        return np.array(peaks)
 
     @property
     def count(self) -> int:
@@ -144,7 +149,10 @@ class WithAreaConstant(Displacement):
             return []
         component = NormalComponent.of(solution.frame, solution.inversion, 1)
         across = find_series(replace(component, scale=component.scale / self._peaks[0]))
-        return [across, solution.odd_series] if solution.odd_peak else [across]
+        if not solution.odd_peak:
+            return [across]
+        odd, part = solution.odd_series, solution.odd_peak / self._peaks[1]
+        return [across, replace(odd, coefficients=part * odd.coefficients, off=part * odd.off)]
 
     def integrands(self, attitude: Attitude) -> Array:
         """Return (q',n_2) and the odd part of dt/dτ₁, over their peaks."""

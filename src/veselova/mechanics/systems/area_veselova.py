@@ -88,12 +88,14 @@ class AreaData:
 class AreaVeselova(Veselova):
     """The rank-one problem of a body with an area constant, its own time t'.
 
-    told_apart: the distance of c'_2 from an I' below which both may be one, over that of the I'
+    spin |Ω| at the start · told_apart: the distance of c'_2 from an I' below which both may be
+    one, over that of the I'
     sign ς · mu2 in units in which the least A' is one, exactly · tilt L₁₀/L₀₀ · uniform μ1k_h and
     across (μ1−μ2)k_h in the units of the body · u, normal n, horizontal e_⊥: at the start, (3,)
     """
 
     body_energy: float
+    spin: float
     told_apart: Fraction
     sign: int
     mu2: Fraction
@@ -130,6 +132,7 @@ class AreaVeselova(Veselova):
             normal = _cross(found.u, found.v)
             self._set(
                 body_energy=data.energy,
+                spin=float(np.linalg.norm(_floats(data.Omega))),
                 told_apart=_TILTED_APART if momentum.angle < _LEAST_ANGLE else _TOLD_APART,
                 sign=found.sign,
                 mu2=Fraction(found.mu[1] / unit),
