@@ -42,6 +42,8 @@ def test_the_command_serves_and_prints_its_address(tmp_path: Path) -> None:
     finally:
         process.send_signal(signal.SIGTERM)
         process.wait(PATIENCE)
+        if process.stdout:
+            process.stdout.close()
 
 
 def test_a_file_without_a_problem_is_refused() -> None:
