@@ -78,11 +78,11 @@ class CurvePeriods:
 class RealHyperelliptic:
     """The curve w² = sign·Π(λ−b_j) with 2g+1 or 2g+2 distinct real branch points.
 
-    branch_points   numbers or text ("0.7", "7/10"), taken exactly, in any order; near-coincident
-        ones keep their digits
-    sign            −1 or 1
-    digits, certified   more digits than a double has (15 … 1000), or proven errors: ``decimals``,
-        ``abel_decimals``, ``invert_decimals``
+    - branch_points: numbers or text ("0.7", "7/10"), taken exactly, in any order;
+      near-coincident ones keep their digits
+    - sign: −1 or 1
+    - digits, certified: more digits than a double has (15 … 1000), or proven errors:
+      ``decimals``, ``abel_decimals``, ``invert_decimals``
 
     Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once.
     Raises InvalidInput for repeated, complex or too few branch points. Accuracy:

@@ -186,10 +186,12 @@ class _Layout:
     """Where branch points and midpoints of gaps lie as seen from intervals [b_j, b_{j+1}]; axes as
     those of their points.
 
-    rows, columns (..., 2g+1): b_i is as far from the nearer end as these two are from each other
-    on_left, nearest (..., 2g+1, 1): whether b_i is b_j or below, and whether it is an end or next
-    to one nearer_end (..., g−1), is_below (..., g−1, 1): the end nearer to the midpoint of gap l,
-    and whether that is b_j
+    - rows, columns: (..., 2g+1): b_i is as far from the nearer end as these two are from each
+      other
+    - on_left: (..., 2g+1, 1): whether b_i is b_j or below
+    - nearest: (..., 2g+1, 1): whether b_i is an end or next to one
+    - nearer_end: (..., g−1): the end nearer to the midpoint of gap l
+    - is_below: (..., g−1, 1): whether that end is b_j
     """
 
     rows: NDArray[np.intp]

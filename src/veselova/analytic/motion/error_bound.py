@@ -189,8 +189,9 @@ class ErrorBound:
 class _Moved:
     """Errors of where a state is, at each of N times.
 
-    lag: of the time over F_0 · along_flow: of τ₁, by the rate at the time · frequencies: relative
-    rounding of f times |τ₁|
+    - lag: of the time over F_0
+    - along_flow: of τ₁, by the rate at the time
+    - frequencies: relative rounding of f times |τ₁|
     """
 
     lag: Array

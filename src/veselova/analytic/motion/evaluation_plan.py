@@ -32,13 +32,14 @@ _MOST_CYCLES = 1e28
 class EvaluationPlan:
     """How one solution serves increasing times.
 
-    times (N,), remainders: the doubles, and what exact times are beyond them
-    method: ``theta`` or ``angles``, from phases to the attitude
-    time_map: ``fourier``, ``panels`` or ``uniform``
-    rate_in_angles: whether dt/dτ₁ along the orbit comes from angles, not from theta functions
-    cycles: the most that any phase makes between t = 0 and the times
-    intervals: those of the Chebyshev interpolant, none where every time is evaluated by itself
-    estimates: the seconds of each time map that were compared
+    - times, remainders: (N,) the doubles, and what exact times are beyond them
+    - method: ``theta`` or ``angles``, from phases to the attitude
+    - time_map: ``fourier``, ``panels`` or ``uniform``
+    - rate_in_angles: whether dt/dτ₁ along the orbit comes from angles, not from theta functions
+    - cycles: the most that any phase makes between t = 0 and the times
+    - intervals: those of the Chebyshev interpolant, none where every time is evaluated by
+      itself
+    - estimates: the seconds of each time map that were compared
     """
 
     times: Array

@@ -24,9 +24,9 @@ SIGNS = np.array([1.0, -1.0])
 class Family:
     """M characteristics with the same Gaussians and waves.
 
-    orders (X, |F|): 2x of the waves
-    tables (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X; without
-    waves the signs, W = 1
+    - orders: (X, |F|): 2x of the waves
+    - tables: (M·W, K): w_x (−1)^{2k·ε_G} (cos, −sin) 2πx·(Ck + δ_F) for each of M, W = 2X;
+      without waves the signs, W = 1
     """
 
     orders: NDArray[np.int64]
@@ -44,8 +44,9 @@ class Family:
 class Group:
     """The families with one δ_G, and of all their characteristics:
 
-    places  among those asked for · parities (|G|, M): 2ε_G · signs (M,): of their reduction modulo
-        one, and det T_GG^{−1/2}
+    - places: among those asked for
+    - parities: (|G|, M): 2ε_G
+    - signs: (M,): of their reduction modulo one, and det T_GG^{−1/2}
     """
 
     delta_G: Array

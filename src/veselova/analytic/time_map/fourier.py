@@ -241,8 +241,10 @@ class FourierTimeMap(TimeMap):
 class _Sum:
     """t − F_0τ₁ summed over M modes, and t's Taylor coefficients in τ₁.
 
-    orders (M, g) · highest: their largest entry · weights (2M, 4): what cos h sin h and sin² h of
-    each are multiplied with, h = πm·(z−z⁰) · at_start (3,): the coefficients at z⁰
+    - orders: (M, g)
+    - highest: their largest entry
+    - weights: (2M, 4): what cos h sin h and sin² h of each are multiplied with, h = πm·(z−z⁰)
+    - at_start: (3,): the coefficients at z⁰
     """
 
     orders: Integers

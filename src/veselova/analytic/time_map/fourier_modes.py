@@ -27,8 +27,11 @@ _MOST_MODES = 1_000_000
 class TorusSeries:
     """A function on the torus without mean, Σ 2c cos 2π(M·z/2 + turn) over one of each M and −M.
 
-    orders (K, g) the M · coefficients (K,) · turns (K,) in cycles, 0 or ¼ · edge: the M next to
-    those kept · off: what each coefficient is off by
+    - orders: (K, g) the M
+    - coefficients: (K,)
+    - turns: (K,) in cycles, 0 or ¼
+    - edge: the M next to those kept
+    - off: what each coefficient is off by
     """
 
     orders: Integers

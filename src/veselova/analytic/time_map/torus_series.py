@@ -262,8 +262,10 @@ class _ModeTable:
     """Re Σ w e^{2πi M·ζ} for doubled modes M of one parity; those of genus 2 as a product of
     matrices.
 
-    orders (K, g) · weights (K,) · parity (g,) of the orders · table: the w by (M−parity)/2, None
-    for another genus
+    - orders: (K, g)
+    - weights: (K,)
+    - parity: (g,) of the orders
+    - table: the w by (M−parity)/2, None for another genus
     """
 
     orders: Integers

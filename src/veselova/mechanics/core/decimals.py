@@ -90,11 +90,11 @@ class Later(Mapping[str, Objects]):
 class Decimals:
     """The series of a trajectory to more digits than a double has, or with certified errors.
 
-    midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its shape,
-    which may be made when they are first asked for; the exact value lies within midpoint ± radius,
-    proven where ``certified``, and otherwise up to truncations that are estimated.
-    bounded: the names of the series whose every component ``error`` (N,) bounds: the largest of
-    their radii at each time
+    - midpoints, radii: by the name of the series, object arrays of ``decimal.Decimal`` of its
+      shape, made when they are first read. The exact value lies within midpoint ± radius, proven
+      where ``certified``, and otherwise up to truncations that are estimated
+    - bounded: the names of the series whose every component ``error`` bounds
+    - error: (N,) the largest of their radii at each time
     """
 
     digits: int

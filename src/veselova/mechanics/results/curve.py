@@ -53,18 +53,22 @@ class QuasiPeriods:
 class CurveData:
     """The curve w² = sign·Π(λ−b_j), with the fields of ``veselova.curves.RealHyperelliptic``.
 
-    genus g · sign · branch_points (2g+1,) or (2g+2,), increasing · cuts, gaps (g, 2)
-    a_periods (g, g) real, b_periods (g, g) imaginary: of λ^{k−1}dλ/w over a_s and b_s, columns s;
-    None where one leaves the range of a double
-    normalized_differentials (g, g), None likewise · riemann_matrix (g, g) τ = iT, off by at most
-    riemann_matrix_error · characteristics (B, 2, g), [ε, δ] of each branch point
-    abel (N, g) images of the points that were given, None without
-    points, signs (M, g): λ on each cut and the signs of w at the points z of the real torus that
-    were given, None without
-    quasi_periods, thomae: where they were asked for, None elsewhere
-    decimals: the same numbers to the digits asked for, with radii, by the names of their fields
-    (``b_periods`` and ``abel`` as in the JSON; those of ``quasi_periods`` by themselves); None in
-    double precision
+    - genus, sign: g, and −1 or 1
+    - branch_points: (2g+1,) or (2g+2,), increasing
+    - cuts, gaps: (g, 2)
+    - a_periods: (g, g) real, of λ^{k−1}dλ/w over a_s, columns s; None where one leaves the range
+      of a double
+    - b_periods: (g, g) imaginary, over b_s, likewise
+    - normalized_differentials: (g, g), likewise
+    - riemann_matrix: (g, g) τ = iT, off by at most ``riemann_matrix_error``
+    - characteristics: (B, 2, g), [ε, δ] of each branch point
+    - abel: (N, g) images of the given points, None without
+    - points, signs: (M, g) λ on each cut and the signs of w at the given points z of the real
+      torus, None without
+    - quasi_periods, thomae: None unless requested
+    - decimals: the same numbers to the requested digits, with radii, by the names of their fields
+      (``b_periods`` and ``abel`` as in the JSON; those of ``quasi_periods`` by themselves); None in
+      double precision
     """
 
     genus: int

@@ -74,8 +74,11 @@ _APART = Decimal("1e-40")
 class AreaData:
     """What a body with an area constant gives, along its principal axes, as exact rationals.
 
-    inverse B (3,) · gamma of any length, Omega (3,) · added D, None for Veselova's body · energy
-    the energy of the body, which a torus states
+    - inverse: (3,) B
+    - gamma: (3,) of any length
+    - Omega: (3,)
+    - added: D, None for Veselova's body
+    - energy: the energy of the body, which a torus states
     """
 
     inverse: tuple[Fraction, ...]
@@ -88,10 +91,15 @@ class AreaData:
 class AreaVeselova(Veselova):
     """The rank-one problem of a body with an area constant, its own time t'.
 
-    spin |Ω| at the start · told_apart: the distance of c'_2 from an I' below which both may be
-    one, over that of the I'
-    sign ς · mu2 in units in which the least A' is one, exactly · tilt L₁₀/L₀₀ · uniform μ1k_h and
-    across (μ1−μ2)k_h in the units of the body · u, normal n, horizontal e_⊥: at the start, (3,)
+    - spin: |Ω| at the start
+    - told_apart: the distance of c'_2 from an I' below which both may be one, over that of the I'
+    - sign: ς
+    - mu2: in units in which the least A' is one, exactly
+    - tilt: L₁₀/L₀₀
+    - uniform: μ₁k_h in the units of the body
+    - across: (μ₁−μ₂)k_h in the units of the body
+    - u: (3,) n at the start
+    - normal: (3,) the horizontal e_⊥ at the start
     """
 
     body_energy: float

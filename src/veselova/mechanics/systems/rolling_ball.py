@@ -32,7 +32,8 @@ class RollingBall(RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
 
-    ball: what was given of the ball · ``inertia`` as an attribute is J
+    - ball: what was given of the ball
+    - inertia: J
     """
 
     ball: Ball

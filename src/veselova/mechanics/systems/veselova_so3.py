@@ -47,14 +47,14 @@ class VeselovaSO3(RigidBody):
     """A rigid body under (Ω,γ) = const, equations (3.1) with (la): 𝓘Ω̇ = 𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i =
     e_i×Ω, e_1 = γ.
 
-    inertia    3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no
-        triangle inequality is asked for
-    gamma      the unit vector e_1 at t = 0, seen from the body, (3,)
-    Omega      the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it
-    potential  V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of (3.5),
-        {"polynomial": […]}; None for 0
-    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of γ
-        and γ̇
+    - inertia: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no
+      triangle inequality is asked for
+    - gamma: the unit vector e_1 at t = 0, seen from the body, (3,)
+    - Omega: the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it
+    - potential: V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of
+      (3.5), {"polynomial": […]}; None for 0
+    - frame: [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of
+      γ and γ̇
 
     γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made
     orthonormal. Raises InvalidInput, which names the field.
