@@ -140,9 +140,11 @@ class RealHyperelliptic:
     ) -> CurveData:
         """Return the curve as data.
 
-        points, w: those whose images are given · z: points of the real torus whose places on the
-        cuts are given · outputs: further ones, ``quasi_periods`` and ``thomae``. Raises
-        InvalidInput for bad ones, and what the properties raise.
+        - points, w: those whose images are given
+        - z: points of the real torus whose places on the cuts are given
+        - outputs: further ones, ``quasi_periods`` and ``thomae``
+
+        Raises InvalidInput for bad ones, and what the properties raise.
         """
         outputs = curve_outputs(outputs)
         periods: CurvePeriods | None = None
@@ -240,13 +242,16 @@ class RealHyperelliptic:
         """Return the numbers of the curve to so many digits, ``midpoints`` and ``radii`` by name,
         proven where ``certified``; None in double precision.
 
-        ``riemann_matrix`` T of τ = iT · ``a_periods``, ``b_periods`` (without i) ·
-        ``normalized_differentials`` · ``omega``, ``eta`` (without i), ``omega_prime``,
-        ``eta_prime`` of ``quasi_periods``, all (g, g) · ``thomae`` (S,), in the order of
-        ``thomae()``. Each is computed when it is first asked for. A radius is below 10^−digits: of
-        T absolutely, or of its largest entry where that is above 1; of periods by the largest of
-        their row, of coefficients by that of their column, of Thomae's values by themselves.
-        Raises Unsolved where a gap is too narrow for the digits (``narrow-gap``).
+        - riemann_matrix: (g, g) T of τ = iT
+        - a_periods, b_periods: (g, g), those over b_s without i
+        - normalized_differentials: (g, g)
+        - omega, eta, omega_prime, eta_prime: (g, g) the ``quasi_periods``, the first two without i
+        - thomae: (S,) in the order of ``thomae()``
+
+        Each is computed when it is first read. A radius is below 10^−digits of its size: the
+        largest entry of T or 1, the largest entry of a row of periods, of a column of coefficients,
+        one of Thomae's values itself. Raises Unsolved where a gap is too narrow for the digits
+        (``narrow-gap``).
         """
         known = self._in_digits
         return None if known is None else known.of_curve(lambda: self._subsets)
@@ -302,10 +307,14 @@ class RealHyperelliptic:
         """Return ∫ of the normalised differentials from the last branch point to (λ, w), (N, g).
 
         The last branch point is infinity where there are 2g+1, and the largest one where there are
-        2g+2. The image is known modulo the lattice Z^g + τZ^g. points: N numbers, real ones exact
-        where text · w: N numbers; their signs (of imaginary parts over gaps, the nearer root for
-        complex λ) name the sheets. Raises InvalidInput for bad numbers, Unsolved where a path
-        passes too near a branch point. Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
+        2g+2. The image is known modulo the lattice Z^g + τZ^g.
+
+        - points: N numbers, real ones exact where text
+        - w: N numbers whose signs name the sheets: those of imaginary parts over gaps, the nearer
+          root for complex λ
+
+        Raises InvalidInput for bad numbers, Unsolved where a path passes too near a branch point.
+        Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
         """
         places, sheets = points_with_sheets(points, w)
         curve = self._curve

@@ -236,11 +236,13 @@ def from_torus(
     """Return the Veselova problem whose motion has these constants and phases, as ``torus`` gives
     them.
 
-    A       n distinct positive numbers · energy  h > 0 · constants (n−2,) c_2 … c_{n−1}, with c_1 =
-            0 and the sorted I_i interlacing as max(c_s, I_s) < min(c_{s+1}, I_{s+1}) · phases
-            (n−1,) z⁰ of the start, modulo 1
-    signs   n times 1 or −1: of q_i at the start, or of q̇_i where q_i = 0 · frame as a Veselova
-        problem takes it
+    - A: n distinct positive numbers
+    - energy: h > 0
+    - constants: (n−2,) c_2 … c_{n−1}, with c_1 = 0 and the sorted I_i interlacing as
+      max(c_s, I_s) < min(c_{s+1}, I_{s+1})
+    - phases: (n−1,) z⁰ of the start, modulo 1
+    - signs: n times 1 or −1, of q_i at the start, or of q̇_i where q_i = 0
+    - frame: as a Veselova problem takes it
 
     Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A
     up to 100.

@@ -44,7 +44,7 @@ class Attitude:
 
     - q: (N, n)
     - normals: (N, n, g) columns n_2 … n_{n−1}, γ
-    - components: (N, g) of q' along them ·
+    - components: (N, g) of q' along them
     - spheroconic: (N, g)
     """
 

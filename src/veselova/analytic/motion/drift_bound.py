@@ -45,10 +45,10 @@ class PerturbationBound:
     - matrix: δT, how far A⁻¹ on q⊥ less q'q'ᵀ is moved, whose eigenvectors natural frames are
     - frames: how far the frames are from each other at t = 0
     - growth: μ
-    - speed: a bound of |q'| ·
+    - speed: a bound of |q'|
     - bend: one of |q''|
     - time_maps, time_slope: |ρ₀−ρ₁| ≤ time maps + clock_slope·|u|
-    - slowest: the least d(time)/dτ₁ ·
+    - slowest: the least d(time)/dτ₁
     - inverses: δ
     - highest: max a
     """

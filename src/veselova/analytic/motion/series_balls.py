@@ -23,7 +23,7 @@ class States:
 
     - tau1: (N,)
     - velocity: (N, n): dq/d(time) in the problem's own time
-    - frame: (N, n, n) ·
+    - frame: (N, n, n)
     - spheroconic: (N, n−1)
     """
 

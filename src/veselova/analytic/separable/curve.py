@@ -65,7 +65,7 @@ class SeparableStart:
 
     - inverse: (n,) distinct I's, increasing
     - q, q_dot: (n,) along these axes
-    - polynomial: the v_m ·
+    - polynomial: the v_m
     - centrifugal: (n,) the β_i, none of them at q_i = 0
     - size: 1 where q̇ is scaled as q is, (q,q) where it is the velocity of the unit vector
     """

@@ -72,7 +72,7 @@ class SiegelReduction:
     """A reduced matrix τ' and the way there: θ[ε;δ](z|τ) = e^{c} e^{πi zᵀQz} θ[ε';δ'](Lz|τ').
 
     - tau: (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1
-    - linear: L (g, g) ·
+    - linear: L (g, g)
     - quadratic: Q (g, g)
     - symplectic: (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
     - rounding: (g, g), bounds of the error of the entries of τ'

@@ -26,7 +26,7 @@ class RollingFlow(Flow):
     """A flow of the attitude, and the contact point by ẋ_k = −a(e_k, γ̇).
 
     - attitude: a flow whose state is three numbers and the frame, row-major, (12,)
-    - radius: a ·
+    - radius: a
     - contact: (2,) the contact point at the start A state is that of the attitude and
       (x−x(0))/a, of length 14.
     """
@@ -159,7 +159,7 @@ class ContactForceFlow(Flow):
 
     - inertia: (3, 3) about the centre
     - added: ma²
-    - Omega, frame: the start, all in scaled units ·
+    - Omega, frame: the start, all in scaled units
     - radius, contact: in the problem's units
     - twists: whether the ball is free to twist
 

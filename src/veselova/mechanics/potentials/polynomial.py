@@ -55,10 +55,13 @@ class Potential:
     The companion makes F_2 + F an integral of the Veselova system on (Ω,γ) = 0 (duality lemma); for
     the Euler–Poisson equations it makes f_2 + F one on (𝒥Ω,γ) = 0. None: not known.
     ``unconditional``: it is one for any value of these constants.
-    Data: {"clebsch": α} α(𝓘γ,γ) · {"family": [α₁ … α₅]} equation (3.5); for the Euler–Poisson
-    equations its dual · {"polynomial": [{"coefficient": c, "powers": [a, b, c]}, …]}, powers any
-    integers, with {"companion": […]} in the same form where the user knows it (it is checked) · a
-    sum of these, as one mapping · None for V = 0.
+
+    Data, None for V = 0, or a sum of these as one mapping:
+
+    - {"clebsch": α}: α(𝓘γ,γ)
+    - {"family": [α₁ … α₅]}: equation (3.5); for the Euler–Poisson equations its dual
+    - {"polynomial": [{"coefficient": c, "powers": [a, b, c]}, …]}: powers any integers, with
+      {"companion": […]} in the same form where the user knows it (it is checked)
     """
 
     terms: LaurentPolynomial

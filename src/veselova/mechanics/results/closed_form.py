@@ -190,9 +190,10 @@ class ClosedForm:
         """Return the explicit formulas as SymPy expressions, by name; raises BackendMissing without
         sympy.
 
-        ``theta_k``: the theta functions as finite sums in z_1 … z_g · ``q_i``, ``normal_i_k``,
-        ``gamma_i``: their quotients along the directions that move · ``time``: t as a function of
-        the Neumann time ``tau_1`` · ``z_s``: the phases there
+        - theta_k: the theta functions as finite sums in z_1 … z_g
+        - q_i, normal_i_k, gamma_i: their quotients along the directions that move
+        - time: t as a function of the Neumann time ``tau_1``
+        - z_s: the phases there
         """
         from veselova.mechanics.results.closed_form_formulas import expressions
 

@@ -135,10 +135,10 @@ class LRSystem(Problem):
     ) -> LRSystem:
         """Return an LR system on any compact group.
 
-        inertia  symmetric positive definite, (D, D), on coordinates in ``group.basis`` · h
-            matrices that span 𝔥, any subspace
-        g, omega  matrices of the group and of its algebra, as the group's basis was given; entries
-            of v are those of the real g
+        - inertia: (D, D) symmetric positive definite, on coordinates in ``group.basis``
+        - h: matrices that span 𝔥, any subspace
+        - g, omega: matrices of the group and of its algebra, as the group's basis was given;
+          entries of v are those of the real g
         """
         if not isinstance(group, MatrixGroup):
             raise InvalidInput(

@@ -199,8 +199,8 @@ def curve_call(
     ``veselova.curves.RealHyperelliptic``), with the images of points (λ, w), and the places of
     points z of the real torus, where they are given.
 
-    outputs: ``quasi_periods``, ``thomae`` · digits, certified: ``decimals`` of the answer has the
-    numbers with radii.
+    - outputs: ``quasi_periods``, ``thomae``
+    - digits, certified: ``decimals`` of the answer has the numbers with radii
     """
     exact, sign = curve_arguments(branch_points, sign)
     body = {
