@@ -112,7 +112,7 @@ ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
 @pytest.mark.parametrize(
     ("fields", "outcome"),
     [
-        ({"Omega": [0.3, 0.1, 0.2]}, "not-separable"),
+        ({"Omega": [0.3, 0.1, 0.2], "potential": {"clebsch": 0.5}}, "not-separable"),
         ({"potential": {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0]}]}}, "not-separable"),
         ({"potential": {"family": [0, 0, -0.1, 0, 0]}}, "collision"),  # before t = 20
         (

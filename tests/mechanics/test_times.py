@@ -22,7 +22,7 @@ from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.remainders import split, split_grid
 from veselova.mechanics.core.times import TimeGrid, as_request
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.answers.cache_entry import pack, unpack
+from veselova.service.answers.cache_entry import Entry, read_entry
 from veselova.service.cli.main import app
 
 #: γ, q … at 10⁹ + 3/10, which is 4.8e-8 beyond the nearest double.
@@ -219,7 +219,7 @@ def test_a_single_number_is_one_time(time: Any) -> None:
     assert as_request(time) in ([2], ["2"])
 
 
-def test_an_answer_says_what_its_doubles_leave() -> None:
+def test_an_answer_says_what_its_doubles_leave(tmp_path: Path) -> None:
     found = vs.solve(body(), [FAR, "1"])
     rest = float(Fraction(FAR) - Fraction(1000000000.3))
     assert found.remainders is not None
@@ -235,9 +235,9 @@ def test_an_answer_says_what_its_doubles_leave() -> None:
     read = Trajectory.from_arrays(found.problem, np.load(io.BytesIO(stream.getvalue())))
     assert read.remainders is not None
     assert read.remainders.tolist() == [rest, 0]
-    content = pack({"problem": body().as_dict()}, found, 10**6)
-    assert content is not None
-    kept = unpack(content)[1]
+    entry = Entry(str(tmp_path / "entry"), str(tmp_path / "part"), 10**6)
+    assert entry.write({"problem": body().as_dict()}, found)
+    kept = read_entry(entry.path)[1]
     assert kept.remainders is not None
     assert kept.remainders.tolist() == [rest, 0]
 

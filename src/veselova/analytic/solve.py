@@ -141,9 +141,7 @@ def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> N
         required += "more: system veselova-so3 with inertia I + ma²)"
         raise InvalidInput((field,), required, given)
     if problem.axes is not None and beyond_double(digits, certified):
-        required = (
-            "inertia as 3 moments or a diagonal matrix (those of others are no exact numbers)"
-        )
+        required = "inertia as 3 principal moments or a diagonal matrix (others have no exact axes)"
         raise InvalidInput((field,), required, "inertia as a matrix")
 
 
