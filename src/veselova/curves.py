@@ -60,7 +60,6 @@ Complex = NDArray[np.complex128]
 #: random curves: 6.
 _ENTRY_ROUNDING = 16 * float(np.finfo(float).eps)
 
-
 #: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
 _MOST_SUBSETS = 400_000
 
@@ -140,11 +139,8 @@ class RealHyperelliptic:
     ) -> CurveData:
         """Return the curve as data.
 
-        - points, w: those whose images are given
-        - z: points of the real torus whose places on the cuts are given
-        - outputs: further ones, ``quasi_periods`` and ``thomae``
-
-        Raises InvalidInput for bad ones, and what the properties raise.
+        It has images of ``points``, w, places of points z of the real torus, and the ``outputs``
+        ``quasi_periods``, ``thomae``. Raises InvalidInput, and what the properties raise.
         """
         outputs = curve_outputs(outputs)
         periods: CurvePeriods | None = None
@@ -309,12 +305,10 @@ class RealHyperelliptic:
         The last branch point is infinity where there are 2g+1, and the largest one where there are
         2g+2. The image is known modulo the lattice Z^g + τZ^g.
 
-        - points: N numbers, real ones exact where text
-        - w: N numbers whose signs name the sheets: those of imaginary parts over gaps, the nearer
-          root for complex λ
-
-        Raises InvalidInput for bad numbers, Unsolved where a path passes too near a branch point.
-        Accuracy: 1e-13 on cuts and gaps, 1e-12 elsewhere.
+        ``points``: N numbers, real ones exact where text. w: N numbers whose signs name the sheets,
+        those of imaginary parts over gaps, the nearer root for complex λ. Raises InvalidInput for
+        bad numbers, Unsolved where a path passes too near a branch point. Accuracy: 1e-13 on cuts
+        and gaps, 1e-12 elsewhere.
         """
         places, sheets = points_with_sheets(points, w)
         curve = self._curve

@@ -240,16 +240,17 @@ def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
     visit.page.keyboard.press("Enter")
     visit.wait_for("document.getElementById('story').textContent === 'A start of your own.'")
     visit.page.click('[data-view="ball"] button:has-text("⤢")')
-    visit.page.wait_for_timeout(500)
+    visit.wait_for("location.hash.includes('view=ball') && location.hash.includes('12345')")
+    visit.wait_for("document.querySelector('#facts td').textContent !== ''")
     wanted = visit.state()
     assert wanted["t"] == "12345.6789"
     assert wanted["view"] == "ball"
+    shown = visit.text("#facts td")
     with visiting(browser, visit.origin) as other:
         other.open(f"#{urlsplit(visit.page.url).fragment}")
-        other.page.wait_for_timeout(500)
+        other.wait_for(f"document.querySelector('#facts td').textContent === {shown!r}")
         assert other.state() == wanted
         assert other.page.input_value("#text-gamma-1") == "1/7"
-        assert other.text("#facts td") == visit.text("#facts td")
 
 
 @pytest.mark.parametrize(
