@@ -44,6 +44,18 @@ def times_between(ends: tuple[float, float], parts: Array = PARTS) -> Array:
     return np.sort(np.concatenate([ends[0] * parts, [0.0], ends[1] * parts]))
 
 
+def solve_up_to(problem: Any, ends: tuple[float, float]) -> Any:
+    """Return the motion up to both collisions. The last time before one, 1e-13 of the way from it,
+    may be nearer than the error of its time: then it is refused by name.
+    """
+    try:
+        return solve(problem, times_between(ends))
+    except Unsolved as refused:
+        if refused.outcome != "collision":
+            raise
+        return solve(problem, times_between(ends, PARTS[1:]))
+
+
 def time_named(problem: Any, time: float, engine: str | None = None) -> tuple[str, float]:
     """Return the plane and the time in the refusal of a time."""
     with pytest.raises(Unsolved, match=r"^collision: the motion runs into ") as caught:
@@ -64,7 +76,7 @@ def test_the_error_holds_up_to_the_collision(n: int, seed: int) -> None:
         ends = collisions_of(problem)
         if ends is None:
             continue
-        closed = solve(problem, times_between(ends))
+        closed = solve_up_to(problem, ends)
         exact = problem.exact
         q, _ = true_motion_in_potential(
             exact.A, exact.q, exact.tangent, problem.potential, closed.times
@@ -178,7 +190,7 @@ def test_frames_of_bodies_are_right_up_to_the_collision(seed: int) -> None:
     assert body.linear == 0
     ends = collisions_of(body)
     assert ends is not None
-    closed = solve(body, times_between(ends))
+    closed = solve_up_to(body, ends)
     velocity = [
         gamma[i - 2] * Omega_exact[i - 1] - gamma[i - 1] * Omega_exact[i - 2] for i in range(3)
     ]
