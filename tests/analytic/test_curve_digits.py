@@ -44,6 +44,15 @@ def places(points: list[str]) -> list[Any]:
     return [*between, *beyond, points[0], points[-1], points[1], 0.3 + 0.7j, -50 + 3j, 2 - 1j]
 
 
+def three_ways(points: Any, sign: int, certified: bool) -> list[curves.RealHyperelliptic]:
+    """Return one curve in doubles, with 25 digits, and with 60."""
+    return [
+        curves.RealHyperelliptic(points, sign),
+        curves.RealHyperelliptic(points, sign, digits=25, certified=certified),
+        curves.RealHyperelliptic(points, sign, digits=60),
+    ]
+
+
 def enclosed(coarse: Decimals | None, fine: Decimals | None, name: str) -> Any:
     """Return the midpoints, after a look at the radii."""
     assert coarse is not None
@@ -59,9 +68,7 @@ def test_every_number_of_a_curve_has_the_digits_asked_for(
     count: int, sign: int, certified: bool
 ) -> None:
     points = branch_points(count)
-    plain = curves.RealHyperelliptic(points, sign)
-    coarse = curves.RealHyperelliptic(points, sign, digits=25, certified=certified)
-    fine = curves.RealHyperelliptic(points, sign, digits=60)
+    plain, coarse, fine = three_ways(points, sign, certified)
     quasi = plain.quasi_periods
     expected = {
         "riemann_matrix": plain.riemann_matrix.imag,
@@ -89,9 +96,7 @@ def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
     count: int, sign: int, certified: bool
 ) -> None:
     points = branch_points(count)
-    plain = curves.RealHyperelliptic(points, sign)
-    coarse = curves.RealHyperelliptic(points, sign, digits=25, certified=certified)
-    fine = curves.RealHyperelliptic(points, sign, digits=60)
+    plain, coarse, fine = three_ways(points, sign, certified)
     given = places(points)
     sheets = [1 + 1j] * len(given)
     found = enclosed(coarse.abel_decimals(given, sheets), fine.abel_decimals(given, sheets), "abel")

@@ -124,23 +124,27 @@ def solve(
 def _require_doubles(problem: AreaBody, digits: int, certified: bool) -> None:
     """Raise InvalidInput where more than doubles are asked for with an area constant."""
     if beyond_double(digits, certified):
-        field, given = ("digits", str(digits)) if digits > FEWEST_DIGITS else ("certified", "true")
-        required = f"{FEWEST_DIGITS}, not certified, for system {problem.system}"
-        required += "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
-        raise InvalidInput((field,), required, given)
+        of = "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
+        raise _needs_doubles(digits, f"system {problem.system}{of}")
+
+
+def _needs_doubles(digits: int, what: str) -> InvalidInput:
+    """Return the refusal of more than doubles for something."""
+    field, given = ("digits", str(digits)) if digits > FEWEST_DIGITS else ("certified", "true")
+    return InvalidInput((field,), f"{FEWEST_DIGITS}, not certified, for {what}", given)
 
 
 def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
     """Raise InvalidInput where more than doubles are asked for along axes that are known in double
     precision.
     """
-    field = "digits" if digits > FEWEST_DIGITS else "certified"
-    if isinstance(problem, RubberBall) and beyond_double(digits, certified):
-        given = str(digits) if field == "digits" else "true"
-        required = f"{FEWEST_DIGITS}, not certified, for the contact point (the attitude alone has "
-        required += "more: system veselova-so3 with inertia I + ma²)"
-        raise InvalidInput((field,), required, given)
-    if problem.axes is not None and beyond_double(digits, certified):
+    if not beyond_double(digits, certified):
+        return
+    if isinstance(problem, RubberBall):
+        further = "the attitude alone has more: system veselova-so3 with inertia I + ma²"
+        raise _needs_doubles(digits, f"the contact point ({further})")
+    if problem.axes is not None:
+        field = "digits" if digits > FEWEST_DIGITS else "certified"
         required = "inertia as 3 principal moments or a diagonal matrix (others have no exact axes)"
         raise InvalidInput((field,), required, "inertia as a matrix")
 

@@ -74,9 +74,10 @@ def solve(
     ``error`` bounds the true error of every bounded series: true ≤ error. It is measured by a
     second integration, from a start a few roundings away; that of DOP853 has a looser tolerance.
     The bound is eight times the running maximum of the difference in the bounded series, plus twice
-    the rounding that both may share. Tested for n =
-    2…8, |ω t| ≤ 10⁴. Raises InvalidInput for bad times or names, BackendMissing without the
-    library, Unsolved when the integrator gives up.
+    the rounding that both may share. Tested for n = 2…8, |ω t| ≤ 10⁴.
+
+    Raises InvalidInput for bad times or names, BackendMissing without the library, Unsolved when
+    the integrator gives up.
     """
     grid = TimeGrid.of(times)
     if not isinstance(method, str) or method not in METHODS:

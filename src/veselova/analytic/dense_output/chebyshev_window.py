@@ -92,9 +92,8 @@ class WindowBatch:
     """W windows in Neumann time: Chebyshev coefficients of dt/dτ₁ (W, NODES) and of the series (W,
     NODES, C).
 
-    - starts: (W,) and stretch: where they start and how long they are, in τ₁
-    - sizes: (C,) of the
-    - series, of: the ``shapes``
+    - starts, length_tau1: (W,) where they start, and how long they are, in τ₁
+    - sizes: (C,) of the series, of the ``shapes``
     - before: (W,) tails of longer windows
     """
 

@@ -68,8 +68,7 @@ class PiecewisePolynomial:
     - borders: (W, count+1) in time since the window's start
     - tables: (W, count, C, ORDER) of powers; the first row is the part of the window's Neumann
       time that has passed
-    - tails: (W,) the largest
-    - of: the last Chebyshev coefficients, against their sizes
+    - tails: (W,) the largest of the last Chebyshev coefficients, against their sizes
     """
 
     borders: Array

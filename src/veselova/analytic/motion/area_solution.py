@@ -20,7 +20,6 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.cross_component import CrossComponent
-from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.analytic.time_map.guard_digits import extended_precision_flows
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -159,26 +158,27 @@ class AreaSolution(Solution):
         return max(super().rate_variation, spread)
 
     @cached_property
-    def _odd_at_half_periods(self) -> tuple[Array, Array]:
-        """Return the half periods in angles, (N, g), and the odd part of dt/dτ₁ there."""
+    def at_half_periods(self) -> tuple[Array, Attitude]:
+        """Return the half periods in angles, (N, g), and the attitudes there."""
         psi = np.pi * np.asarray(self.frame.half_periods, dtype=np.float64)
-        return psi, self.odd_rate_of(self.frame.at(psi))
+        return psi, self.frame.at(psi)
 
     @cached_property
     def odd_peak(self) -> float:
         """Return the largest odd part of dt/dτ₁ at the half periods; zero where there is none."""
-        return float(np.max(np.abs(self._odd_at_half_periods[1])))
+        return float(np.max(np.abs(self.odd_rate_of(self.at_half_periods[1]))))
 
     @cached_property
     def odd_series(self) -> TorusSeries:
         """Return the Fourier series of the odd part of dt/dτ₁ over ``odd_peak``, not zero."""
-        psi, values = self._odd_at_half_periods
+        psi, attitude = self.at_half_periods
+        values = self.odd_rate_of(attitude)
         best = int(np.argmax(np.abs(values)))
         component = CrossComponent.of(self.frame, self.inversion)
         scale = self._unit_of_odd_part(component) / self.odd_peak
         series = find_series(replace(component, scale=scale))
         if float(series.at(psi[best : best + 1] / (2 * np.pi))[0]) * values[best] < 0:
-            series = replace(series, coefficients=-series.coefficients)
+            series = series.scaled(-1.0)
         return series
 
     def _unit_of_odd_part(self, component: CrossComponent) -> float:
@@ -194,22 +194,10 @@ class AreaSolution(Solution):
         determinant = float(np.linalg.det(self.periods.cycles))
         return float(abs(self.problem.tilt * unit * np.prod(component.row_sizes) / determinant))
 
-    def fourier_time_map(self, precise_flows: bool) -> FourierTimeMap:
-        """Return the Fourier time map, with guard digits or without."""
-        self.require_narrow_rate()
-        if precise_flows not in self._fourier_time_maps:
-            flows = (
-                self.precise_flows
-                if precise_flows
-                else (self.in_tau1, self.in_time, self.mean_rate)
-            )
-            odd = None
-            if peak := self.odd_peak:
-                series = self.odd_series
-                coefficients = peak * series.coefficients
-                odd = replace(series, coefficients=coefficients, off=peak * series.off)
-            self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows, odd)
-        return self._fourier_time_maps[precise_flows]
+    @property
+    def odd_part_of_rate(self) -> TorusSeries | None:
+        """Return the series of the odd part of dt/dτ₁, None where there is none."""
+        return self.odd_series.scaled(self.odd_peak) if self.odd_peak else None
 
 
 def solution_of(problem: TorusProblem, distance: Fraction | None = None) -> Solution:

@@ -56,9 +56,27 @@ class Displacement(ABC):
     def bounds(self) -> Array:
         """Return how large they may be, (K,)."""
 
+    @property
     @abstractmethod
+    def speed(self) -> float:
+        """Return the speed of the uniform part."""
+
     def at(self, times: Array, remainders: Array | None, integrals: Array) -> Array:
         """Return the displacement at times, from the integrals (N, K)."""
+        along = self.speed * times
+        if remainders is not None:
+            along = along + self.speed * remainders
+        return self._combine(along, integrals)
+
+    @abstractmethod
+    def _combine(self, along: Array, integrals: Array) -> Array:
+        """Return the displacement from the lengths of the uniform part and the integrals."""
+
+    @staticmethod
+    def _rounding(displacement: Array) -> Array:
+        """Return the rounding of the products and sums that a displacement is made of."""
+        size = np.max(np.abs(displacement), axis=1)
+        return np.asarray(_ROUNDINGS * np.finfo(float).eps * size)
 
     @abstractmethod
     def error(self, displacement: Array, errors: Array) -> Array:
@@ -94,20 +112,22 @@ class AlongMomentum(Displacement):
         """Return ones: |q'| ≤ 1 in these units."""
         return np.ones(self.count)
 
-    def at(self, times: Array, remainders: Array | None, integrals: Array) -> Array:
-        """Return ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk, y_γ growing with the speed along the momentum."""
+    @property
+    def speed(self) -> float:
+        """Return the speed along the momentum."""
         problem = self.solution.problem
         assert isinstance(problem, RollingVeselova)
-        along = problem.speed * times
-        if remainders is not None:
-            along = along + problem.speed * remainders
+        return problem.speed
+
+    def _combine(self, along: Array, integrals: Array) -> Array:
+        """Return ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk, y_γ growing with the speed."""
         return np.concatenate([integrals, along[:, None]], axis=1) @ self.solution.rotation
 
     def error(self, displacement: Array, errors: Array) -> Array:
         """Return √g of the largest error, and the rounding of the products with ℜ and the speed."""
-        rounding = _ROUNDINGS * np.finfo(float).eps * np.max(np.abs(displacement), axis=1)
         across = np.max(errors, axis=1, initial=0.0)
-        return np.asarray(math.sqrt(self.solution.curve.genus) * across + rounding)
+        scale = math.sqrt(self.solution.curve.genus)
+        return np.asarray(scale * across + self._rounding(displacement))
 
 
 class WithAreaConstant(Displacement):
@@ -128,8 +148,7 @@ class WithAreaConstant(Displacement):
         solution = self.solution
         if not solution.side:
             return np.zeros(0)
-        at = solution.frame.at(np.pi * np.asarray(solution.frame.half_periods, dtype=np.float64))
-        across = float(np.max(np.abs(at.components[:, 0])))
+        across = float(np.max(np.abs(solution.at_half_periods[1].components[:, 0])))
         usual = abs(solution.problem.spin * solution.mean_rate)
         peaks = [max(across, usual)]
         if solution.odd_peak:
@@ -151,8 +170,7 @@ class WithAreaConstant(Displacement):
         across = find_series(replace(component, scale=component.scale / self._peaks[0]))
         if not solution.odd_peak:
             return [across]
-        odd, part = solution.odd_series, solution.odd_peak / self._peaks[1]
-        return [across, replace(odd, coefficients=part * odd.coefficients, off=part * odd.off)]
+        return [across, solution.odd_series.scaled(solution.odd_peak / float(self._peaks[1]))]
 
     def integrands(self, attitude: Attitude) -> Array:
         """Return (q',n_2) and the odd part of dt/dτ₁, over their peaks."""
@@ -171,12 +189,13 @@ class WithAreaConstant(Displacement):
         factors = np.array([problem.sign * self.solution.side, -problem.across])
         return factors[: self.count] * self._peaks
 
-    def at(self, times: Array, remainders: Array | None, integrals: Array) -> Array:
+    @property
+    def speed(self) -> float:
+        """Return μ1k_h."""
+        return self.solution.problem.uniform
+
+    def _combine(self, along: Array, integrals: Array) -> Array:
         """Return the coefficients of n and e_⊥."""
-        speed = self.solution.problem.uniform
-        along = speed * times
-        if remainders is not None:
-            along = along + speed * remainders
         result = np.stack([along, np.zeros_like(along)], axis=1)
         for k, factor in enumerate(self._factors):
             result[:, 1 - k] += factor * integrals[:, k]
@@ -184,8 +203,7 @@ class WithAreaConstant(Displacement):
 
     def error(self, displacement: Array, errors: Array) -> Array:
         """Return the errors of the integrals with their factors, and the rounding of the sums."""
-        rounding = _ROUNDINGS * np.finfo(float).eps * np.max(np.abs(displacement), axis=1)
-        return np.asarray(errors @ np.abs(self._factors) + rounding)
+        return np.asarray(errors @ np.abs(self._factors) + self._rounding(displacement))
 
 
 def displacement_of(solution: Solution) -> Displacement | None:

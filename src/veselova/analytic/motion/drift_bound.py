@@ -47,7 +47,7 @@ class PerturbationBound:
     - growth: μ
     - speed: a bound of |q'|
     - bend: one of |q''|
-    - time_maps, time_slope: |ρ₀−ρ₁| ≤ time maps + clock_slope·|u|
+    - time_maps, time_slope: |ρ₀−ρ₁| ≤ time_maps + time_slope·|u|
     - slowest: the least d(time)/dτ₁
     - inverses: δ
     - highest: max a

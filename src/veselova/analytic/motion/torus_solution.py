@@ -28,8 +28,9 @@ from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
-from veselova.analytic.time_map.cost_model import estimate_modes
+from veselova.analytic.time_map.cost_model import RATE_GENUS, THETA_GENUS, estimate_modes
 from veselova.analytic.time_map.fourier import FourierTimeMap
+from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate, time_rate
 from veselova.mechanics.core.errors import Unsolved
@@ -40,14 +41,8 @@ __all__ = ["WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
 
-#: Largest genus at which theta quotients cost less than inversion in angles: 4 µs a point, and 10;
-#: for g = 5 it is 24 and 8.
-_THETA_GENUS = 4
-
-#: Largest genus at which panels take dt/dτ₁, of two functions, from them; the cycles from which
-#: that pays for what is made once where the attitude has no use for it; and the terms of a sum that
-#: cost as much as an inversion.
-_RATE_GENUS = 6
+#: Cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude has no
+#: use for it; and the terms of a sum that cost as much as an inversion.
 _RATE_CYCLES = {5: 10.0, 6: 40.0}
 _RATE_TERMS = 6e4
 
@@ -57,7 +52,7 @@ _LARGE_PERIOD = 8.0
 #: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
 _LARGE_CANCELLATION = 10.0
 
-#: Above _THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at
+#: Above THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at
 #: 1e-12 angles still give 1e-12; and the largest genus at which theta sums are taken there.
 _NARROW_GAP_HIGH_GENUS = 1e-12
 _SEPARATRIX_GENUS = 7
@@ -129,10 +124,10 @@ class Solution:
         if not self.is_even:
             return True
         genus = self.curve.genus
-        if method is not None or genus <= _THETA_GENUS:
+        if method is not None or genus <= THETA_GENUS:
             return method == "angles"
         return (
-            genus > _RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
+            genus > RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
         )
 
     @cached_property
@@ -153,7 +148,7 @@ class Solution:
         """Return whether a gap is so narrow that angles near its ends say little of the body, and
         theta functions serve.
         """
-        narrow = NARROW_GAP if self.curve.genus <= _THETA_GENUS else _NARROW_GAP_HIGH_GENUS
+        narrow = NARROW_GAP if self.curve.genus <= THETA_GENUS else _NARROW_GAP_HIGH_GENUS
         return self.curve.narrowest_gap < narrow and self.curve.genus <= _SEPARATRIX_GENUS
 
     @cached_property
@@ -208,8 +203,16 @@ class Solution:
                 if precise_flows
                 else (self.in_tau1, self.in_time, self.mean_rate)
             )
-            self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows)
+            odd = self.odd_part_of_rate
+            self._fourier_time_maps[precise_flows] = FourierTimeMap(self.rate, *flows, odd)
         return self._fourier_time_maps[precise_flows]
+
+    @property
+    def odd_part_of_rate(self) -> TorusSeries | None:
+        """Return the part of dt/dτ₁ that changes sign with a period of one phase, None where there
+        is none.
+        """
+        return None
 
     @cached_property
     def rate_variation(self) -> float:
@@ -338,7 +341,7 @@ class Solution:
         """
         if self.near_separatrix:
             return "theta"
-        return "theta" if self.curve.genus <= _THETA_GENUS and self.is_even else "angles"
+        return "theta" if self.curve.genus <= THETA_GENUS and self.is_even else "angles"
 
     def attitude(self, z: Array, method: str) -> Attitude:
         """Return the attitude at phases z (N, g), along sorted axes, by theta quotients or by

@@ -190,8 +190,8 @@ class SeparatedCut:
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
     roots of R next to them.
 
-    - ends: a, b, exact: lower a
-    - width: b−a
+    - ends: a and b, exact
+    - lower, width: a and b−a
     - left: (…) a−r of the real roots r < a, the nearest last
     - right: (…) r−b of those above, the nearest first
     - pairs: (…, 2) a−Re r, Im r of complex ones

@@ -35,16 +35,15 @@ class OpenInterval:
     around it: its ends where λ_s turns, and beyond a plane the next real root of R, or a point at
     the distance of a width where that is nearer.
 
-    - ends: a, b, exact: lower a
-    - width: b−a
+    - ends: a and b, exact
+    - lower, width: a and b−a
     - planes: whether a and b lie in planes
     - points: the four points
     - margins: a−p_1 and p_2−b for the inner two of them, zero at turning points
     - left: (…) a−r of the real roots r ≤ a but a turning point
     - right: (…) r−b of those r ≥ b
     - rest_left, rest_right: those of them that are none of the four points
-    - extra_left: ,
-    - extra_right: a−p and p−b of the points p that are no roots
+    - extra_left, extra_right: a−p and p−b of the points p that are no roots
     - pairs: (…, 2) a−Re r, Im r of complex ones
     - leading: |leading coefficient of R|
     - below, above: λ_s−a and b−λ_s at the start

@@ -41,7 +41,7 @@ class Moving:
     - axes: (m,) the principal axis of each, or the first of its group
     - unit: the A that counts as 1
     - frozen: the A's of the directions that do not move, in the problem's units
-    - turned: whether a group of equal A's has two moving directions
+    - rotated: whether a group of equal A's has two moving directions
     - time: the time of the problem: t, s (arc length), or tau1, in which q̇ is q' itself and
       c_1 need not be zero
     """

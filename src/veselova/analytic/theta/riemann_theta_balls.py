@@ -216,8 +216,8 @@ class _Sums:
     k by class, at N points.
 
     - orders: (X, |F|): 2x
-    - real, imaginary: (classes, X, N): R and I · waves (X, N) each: cos and sin 2πx·y_F, None
-      without F
+    - real, imaginary: (classes, X, N) R and I
+    - waves: cos and sin 2πx·y_F, (X, N) each, None without F
     """
 
     def __init__(

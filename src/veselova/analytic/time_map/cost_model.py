@@ -24,7 +24,15 @@ from veselova.analytic.time_map.tuned_costs import (
     grow,
 )
 
-__all__ = ["GUARDED_FROM", "GUARD_DIGITS", "PANEL_CYCLES", "Costs", "estimate_modes"]
+__all__ = [
+    "GUARDED_FROM",
+    "GUARD_DIGITS",
+    "PANEL_CYCLES",
+    "RATE_GENUS",
+    "THETA_GENUS",
+    "Costs",
+    "estimate_modes",
+]
 
 #: Derived: cycles of the fastest phase from which frequencies are computed with guard digits;
 #: before, one rounding of them is below 1e-13.
@@ -54,10 +62,10 @@ _LARGEST_EXPONENT = 70.0
 #: every inversion.
 _FIRST_MODES = 60
 
-#: Largest genera at which a state, and dt/dτ₁, come from theta functions as a rule
-#: (analytic.motion.torus_solution).
-_THETA_GENUS = 4
-_RATE_GENUS = 6
+#: Tuning: largest genus at which theta quotients cost less than inversion in angles, 4 µs a point
+#: and 10 (24 and 8 at the next); and at which dt/dτ₁, of two functions, comes from them.
+THETA_GENUS = 4
+RATE_GENUS = 6
 
 #: Tuning: beyond 80 cycles, where panels are longer, what finding their length takes in cycles, and
 #: the part of the evaluations that is left.
@@ -90,7 +98,7 @@ class Costs:
 
     def fewest_in_window(self, nodes: int, time_map: str) -> int:
         """Return the times from which a window with so many nodes is cheaper than single times."""
-        by_theta = self.genus <= _THETA_GENUS
+        by_theta = self.genus <= THETA_GENUS
         evaluation = grow(EVALUATION, self.genus) if by_theta else EVALUATION_IN_ANGLES * self.genus
         inversion = PANEL_INVERSION
         if time_map == "fourier":
@@ -108,7 +116,7 @@ class Costs:
         if self.cycles > PANEL_CYCLES:
             return math.inf
         cycles = min(self.cycles, _PROBES + _LONGER_PANELS * self.cycles) + 1
-        by_theta = self.genus <= _RATE_GENUS and not self.in_angles
+        by_theta = self.genus <= RATE_GENUS and not self.in_angles
         cycle = grow(PANEL_CYCLE, self.genus) if by_theta else PANEL_CYCLE_IN_ANGLES * self.genus
         return cycles * cycle + inversions * PANEL_INVERSION
 

@@ -5,7 +5,7 @@ grown from zero.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,10 @@ class TorusSeries:
     turns: Array
     edge: Integers
     off: float
+
+    def scaled(self, factor: float) -> TorusSeries:
+        """Return the series of a multiple of the function."""
+        return replace(self, coefficients=factor * self.coefficients, off=abs(factor) * self.off)
 
     def at(self, z: Array) -> Array:
         """Return the function at phases (N, g)."""

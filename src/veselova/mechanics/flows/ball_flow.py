@@ -27,8 +27,9 @@ class RollingFlow(Flow):
 
     - attitude: a flow whose state is three numbers and the frame, row-major, (12,)
     - radius: a
-    - contact: (2,) the contact point at the start A state is that of the attitude and
-      (x−x(0))/a, of length 14.
+    - contact: (2,) the contact point at the start
+
+    A state is that of the attitude and (x−x(0))/a, of length 14.
     """
 
     attitude: Any
@@ -87,8 +88,9 @@ class ChaplyginFlow(Flow):
     - inertia, inverse: I and B, (3, 3)
     - added: D = ma²
     - momentum: EᵀK
-    - frame: the start; all of them in scaled units A state is the momentum and the frame,
-      row-major, of length 12.
+    - frame: the start
+
+    All of them are in scaled units. A state is the momentum and the frame, row-major, of length 12.
     """
 
     inertia: Array
@@ -132,14 +134,9 @@ class ChaplyginFlow(Flow):
 
     def neighbour(self, distance: float) -> ChaplyginFlow:
         """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
-        turn = np.stack([np.cross(e, direction[:3]) for e in self.frame.T], axis=1)
+        frame, direction = _moved(self.frame, distance)
         size = float(np.linalg.norm(self.momentum))
-        return replace(
-            self,
-            momentum=self.momentum + distance * size * direction[3:],
-            frame=orthonormalize(self.frame + distance * turn),
-        )
+        return replace(self, momentum=self.momentum + distance * size * direction, frame=frame)
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return Omega and frame of states put back on the manifold."""
@@ -241,11 +238,9 @@ class ContactForceFlow(Flow):
 
     def neighbour(self, distance: float) -> ContactForceFlow:
         """Return the flow of a start moved by about ``distance``; (Ω,γ) keeps its value."""
-        direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
-        turn = np.stack([np.cross(e, direction[:3]) for e in self.frame.T], axis=1)
-        E = orthonormalize(self.frame + distance * turn)
+        E, direction = _moved(self.frame, distance)
         size = max(1.0, float(np.linalg.norm(self.Omega)))
-        Omega = self._on_constraint(self.Omega + distance * size * direction[3:], E[:, 0])
+        Omega = self._on_constraint(self.Omega + distance * size * direction, E[:, 0])
         return replace(self, Omega=Omega, frame=E)
 
     def unpack(self, states: Array) -> dict[str, Array]:
@@ -256,3 +251,10 @@ class ContactForceFlow(Flow):
             "frame": states[:, 5:14].reshape(-1, 3, 3),
             "position": self.contact + self.radius * states[:, 14:],
         }
+
+
+def _moved(frame: Array, distance: float) -> tuple[Array, Array]:
+    """Return a frame turned by about ``distance``, and a direction in which a vector is moved."""
+    direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
+    turn = np.stack([np.cross(e, direction[:3]) for e in frame.T], axis=1)
+    return orthonormalize(frame + distance * turn), direction[3:]

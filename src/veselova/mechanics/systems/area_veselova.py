@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.problem import Series
+from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["AreaData", "AreaVeselova", "RollingAreaVeselova"]
@@ -86,6 +87,14 @@ class AreaData:
     Omega: tuple[Fraction, ...]
     added: Fraction | None
     energy: float
+
+    @classmethod
+    def of(cls, body: RigidBody, added: Fraction | None = None) -> AreaData:
+        """Return what a body gives; ``added`` is D."""
+        gamma, Omega = body.to_axes()
+        inverse = tuple(1 / moment for moment in body.moments)
+        energy = float(body.integrals(body.start)["energy"][0])
+        return cls(inverse, gamma, Omega, added, energy)
 
 
 class AreaVeselova(Veselova):

@@ -74,20 +74,21 @@ class ChaplyginBall(RollingBall):
     def _with_area(self) -> AreaVeselova:
         if not self.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        gamma, Omega = self.to_axes()
-        inverse = tuple(1 / moment for moment in self.moments)
-        energy = float(self.integrals(self.start)["energy"][0])
-        return RollingAreaVeselova(AreaData(inverse, gamma, Omega, self.ball.added, energy))
+        return RollingAreaVeselova(AreaData.of(self, self.ball.added))
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
         D(BK,γ)/(Bγ,Iγ).
         """
         K = frame @ (self.frame.T @ self.derive("momentum", self.start)[0])
-        gamma = frame[..., 0]
-        free = K @ self.inverse
+        return self._solve(K, frame[..., 0])
+
+    def _solve(self, vector: Array, gamma: Array) -> Array:
+        """Return (J − Dγγᵀ)⁻¹x = Bx + D(Bx,γ)/(Bγ,Iγ) Bγ, for x and γ (..., 3)."""
+        free = vector @ self.inverse
         across = gamma @ self.inverse
         share = float(self.ball.added) * np.sum(free * gamma, axis=-1)
+        # 1 − D(Bγ,γ), without cancellation where I is small beside D
         share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
         return np.asarray(free + share[..., None] * across)
 
@@ -110,14 +111,7 @@ class ChaplyginBall(RollingBall):
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""
-        added = float(self.ball.added)
-        torque = np.cross(Omega @ self.ball.tensor, Omega)
-        free = torque @ self.inverse
-        across = gamma @ self.inverse
-        share = added * np.sum(free * gamma, axis=-1)
-        # 1 − D(Bγ,γ), without cancellation where I is small beside D
-        share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
-        return np.asarray(free + share[..., None] * across)
+        return self._solve(np.cross(Omega @ self.ball.tensor, Omega), gamma)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, velocity, force or momentum."""

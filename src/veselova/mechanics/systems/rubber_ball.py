@@ -27,15 +27,15 @@ class RubberBall(RollingBall, VeselovaSO3):
     """A ball of mass m and radius a that rolls on a plane without slipping, with constant spin
     (Ω,γ) about the vertical γ, zero for no twist: ``VeselovaSO3`` with inertia J = I + ma².
 
-    inertia    3 principal moments I about the centre, or a symmetric positive definite 3 × 3 matrix
-    mass, radius  positive numbers
-    gamma      the unit normal e_1 of the plane, from the contact point to the centre, seen from the
-        body, (3,)
-    Omega      the angular velocity in the body, (3,)
-    frame      [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ, e_2 and e_3 in the plane; None
-        for the natural frame
-    position   the contact point at t = 0, along e_2 and e_3, (2,)
-    strict     whether moments that no body has, larger than the sum of the others, are refused
+    - inertia: 3 principal moments I about the centre, or a symmetric positive definite 3 × 3 matrix
+    - mass, radius: positive numbers
+    - gamma: (3,) the unit normal e_1 of the plane, from the contact point to the centre, seen from
+      the body
+    - Omega: (3,) the angular velocity in the body
+    - frame: (3, 3) [e_1 e_2 e_3] at t = 0, columns e_i, e_1 = γ, e_2 and e_3 in the plane; None
+      for the natural frame
+    - position: (2,) the contact point at t = 0, along e_2 and e_3
+    - strict: whether moments that no body has, larger than the sum of the others, are refused
 
     The centre is at distance a above the contact point, and has no offset from the middle of the
     ball. Outputs: those of ``VeselovaSO3`` for J, and the contact point ``position`` (N, 2), its

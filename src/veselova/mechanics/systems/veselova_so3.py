@@ -138,10 +138,7 @@ class VeselovaSO3(RigidBody):
     def _with_area(self) -> AreaVeselova:
         if self.potential.terms:
             self._require_geodesic()
-        gamma, Omega = self.to_axes()
-        inverse = tuple(1 / moment for moment in self.moments)
-        energy = float(self.integrals(self.start)["energy"][0])
-        return self.area_class(AreaData(inverse, gamma, Omega, None, energy))
+        return self.area_class(AreaData.of(self))
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0."""

@@ -15,6 +15,8 @@ from fastapi import FastAPI
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
+from veselova.service.answers.etag import matches
+
 __all__ = ["BUNDLE", "FILES", "MISSING", "add_explorer"]
 
 #: Where the build puts the bundle (``explorer/build.py``); no commit has it.
@@ -85,7 +87,7 @@ class _File:
         """Return the file, compressed where the client takes that; 304 where the client has it."""
         headers = {"ETag": self.etag, "Cache-Control": cache_control, "Vary": "Accept-Encoding"}
         headers["Content-Security-Policy"] = _POLICY
-        if request.headers.get("if-none-match") == self.etag:
+        if matches(request.headers.get("if-none-match"), self.etag, exists=True):
             return Response(status_code=304, headers=headers)
         content = self.content
         takes = request.headers.get("accept-encoding", "")

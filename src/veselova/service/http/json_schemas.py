@@ -13,6 +13,7 @@ from pydantic.json_schema import models_json_schema
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
+from veselova.mechanics.results.curve import QUASI_PERIODS
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_document import JobDocument, JobList
@@ -214,9 +215,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             },
             "signs": {**_MATRIX, "description": "the signs of w there"},
             "quasi_periods": {
-                **_object(
-                    dict.fromkeys(("omega", "omega_prime", "eta", "eta_prime"), _MATRIX_OR_DECIMALS)
-                ),
+                **_object(dict.fromkeys(QUASI_PERIODS, _MATRIX_OR_DECIMALS)),
                 "description": "half the periods of the first and second kind over a_s and b_s, "
                 "omega and eta without the factor i; where outputs names them",
             },
