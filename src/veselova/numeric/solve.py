@@ -58,7 +58,7 @@ _EVERY = 2
 _PARTED = "two integrations whose starts differ by a few roundings part by as much"
 
 #: What the estimate may still miss: with it the true error is at most the reported one. Largest
-#: true error over an estimate without it, in all draws of ``benchmarks/honesty.py``: 0.95.
+#: true error over an estimate without it, in all draws of ``benchmarks/honesty.py``: 0.66.
 _SAFETY = 2.0
 
 
