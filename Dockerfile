@@ -1,9 +1,8 @@
 # The service. Build: docker build -t veselova .      Run: docker run --rm -p 127.0.0.1:8000:8000 veselova
 # It then asks clients for an API key; docs/container.md makes one, or does without.
 # Any base with Python 3.11 or newer as python3 and its venv module will do (docs/container.md builds on a plain Debian).
-# A tag may move. A release pins both stages by digest, as printed by `docker buildx imagetools inspect python:3.11-slim-bookworm`:
-#   docker build --build-arg BASE=python:3.11-slim-bookworm@sha256:… -t veselova .
-ARG BASE=python:3.11-slim-bookworm
+# Both stages are pinned by digest: a tag may move. docs/container.md says where it is from and how to renew it.
+ARG BASE=python:3.11.16-slim-bookworm@sha256:0bee7276f83efd4a1ee05bbbf4281d95ed28e079220a9457f25a93e3f1e3c31b
 
 FROM ${BASE} AS build
 WORKDIR /src

@@ -373,4 +373,4 @@ def test_licences_of_all_locked_packages_are_listed() -> None:
 def test_both_stages_of_the_container_take_a_base_by_digest() -> None:
     source = (ROOT / "Dockerfile").read_text()
     assert re.findall(r"^FROM (\S+)", source, re.MULTILINE) == ["${BASE}", "${BASE}"]
-    assert "@sha256:" in source
+    assert re.search(r"^ARG BASE=python:[\w.-]+@sha256:[0-9a-f]{64}$", source, re.MULTILINE)
