@@ -85,6 +85,31 @@ PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
         },
         ["did you mean clebsch?", "did you mean powers?"],
     ),
+    **{
+        name: (
+            kind,
+            {
+                "inertia": "x",
+                "mass": -1,
+                "radius": "r",
+                "gamma": [0, 0, 2],
+                "Omega": [1, "w", 0],
+                "frame": [[1], 2, "z"],
+                "position": [0],
+                "strict": 1,
+            },
+            {"/inertia", "/mass", "/radius", "/gamma", "/Omega/1", "/frame/0", "/frame/1"}
+            | {"/frame/2", "/position", "/strict"},
+            ["length 2"],
+        )
+        for name, kind in (("rubber", vs.RubberBall), ("chaplygin", vs.ChaplyginBall))
+    },
+    "lr-size": (
+        vs.LRSystem,
+        {"n": "x", "rank": 1, "inertia": {"special": [1, 2, 3]}, "homogeneous": 2},
+        {"/n", "/homogeneous"},
+        [],
+    ),
     "lr": (
         vs.LRSystem,
         {
@@ -156,6 +181,17 @@ def test_solve_reports_options_and_times_together() -> None:
     }
 
 
+#: A ball whose state is wrong as well as its body.
+BAD_BALL = {
+    "system": "rubber-ball",
+    "inertia": "x",
+    "mass": -1,
+    "radius": 1,
+    "gamma": [0, 0, 2],
+    "Omega": [0, "w", 1],
+}
+OF_BALL = {f"/problem/{name}" for name in ("inertia", "mass", "gamma", "Omega/1")}
+
 BAD_PROBLEM = {"system": "veselova", "A": [-1, 2, "x"], "q": [1, 0], "q_dot": [0, 1, 0]}
 OF_PROBLEM = {"/problem/A/0", "/problem/A/2", "/problem/q"}
 
@@ -215,6 +251,12 @@ BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
         },
         {"/digits", "/problem/inertia/2", "/problem/Omega"},
     ),
+    "trajectory-ball": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": BAD_BALL, "times": [0, "x"]},
+        OF_BALL | {"/times/1"},
+    ),
     "comparison": (
         ComparisonRequest,
         compare_request,
@@ -269,7 +311,10 @@ def test_a_request_reports_all_faults_of_its_body(case: str) -> None:
     assert found == places
 
 
-@pytest.mark.parametrize("case", ["trajectory", "trajectory-plain", "comparison", "torus", "sweep"])
+@pytest.mark.parametrize(
+    "case",
+    ["trajectory", "trajectory-plain", "trajectory-ball", "comparison", "torus", "sweep"],
+)
 def test_the_service_reports_them_all(server: Server, case: str) -> None:
     path = {"trajectory": "trajectories", "comparison": "comparisons", "torus": "tori"}.get(
         case.partition("-")[0], "sweeps"
@@ -286,17 +331,34 @@ def test_limits_of_the_server_come_with_the_other_faults(server: Server) -> None
     assert found == OF_PROBLEM | {"/times/1", "/budget_s"}
 
 
+@pytest.mark.parametrize(
+    ("case", "named"),
+    [
+        (
+            "trajectory",
+            ("problem.A[0]", "problem.A[2]", "problem.q:", "times[1]", "engine", "budget_s"),
+        ),
+        (
+            "trajectory-ball",
+            ("problem.inertia", "problem.mass", "problem.gamma", "problem.Omega[1]", "times[1]"),
+        ),
+    ],
+)
 def test_the_command_line_reports_them_all(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any
+    case: str,
+    named: tuple[str, ...],
+    tmp_path: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Any,
 ) -> None:
     path = tmp_path / "request.json"
-    path.write_text(json.dumps(BODIES["trajectory"][2]))
+    path.write_text(json.dumps(BODIES[case][2]))
     monkeypatch.setattr("sys.argv", ["veselova", "solve", str(path)])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
     text = capsys.readouterr().err
-    for place in ("problem.A[0]", "problem.A[2]", "problem.q:", "times[1]", "engine", "budget_s"):
+    for place in named:
         assert place in text
 
 

@@ -109,6 +109,8 @@ class LRSystem(Problem):
             operator = faults.attempt(Inertia.of, inertia, size)
             group = Distribution.of_rank(size, r or 1).group
             state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
+        else:
+            faults.attempt(require_truth_value, homogeneous, "homogeneous")
         faults.require_none()
         assert r is not None
         assert operator is not None

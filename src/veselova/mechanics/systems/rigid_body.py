@@ -36,7 +36,7 @@ from veselova.mechanics.geometry.natural_frame import natural_frame
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, over_largest, unit
 from veselova.mechanics.potentials.polynomial import Potential, without_companion
 
-__all__ = ["RigidBody", "exact_inverse"]
+__all__ = ["RigidBody", "exact_inverse", "read_fields"]
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class RigidBody(Problem):
         normalize: bool = False,
     ) -> None:
         dual = not self.constrained
-        body, point, exact_Omega, V, exact_frame = _read_fields(
+        body, point, exact_Omega, V, exact_frame = read_fields(
             inertia, gamma, Omega, potential, frame, normalize, dual
         )
         moments, axes, tensor, inverse = body
@@ -220,7 +220,7 @@ class RigidBody(Problem):
 _Body = tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]
 
 
-def _read_fields(
+def read_fields(
     inertia: Any, gamma: Any, Omega: Any, potential: Any, frame: Any, normalize: Any, dual: bool
 ) -> tuple[
     _Body,

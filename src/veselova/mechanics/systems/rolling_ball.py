@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import Ball
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import given_arguments
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
-from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
 
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
@@ -65,7 +66,14 @@ class RollingBall(RigidBody):
         strict: bool = True,
         normalize: bool = False,
     ) -> None:
-        ball = Ball.of(inertia, mass, radius, position, strict)
+        faults = Faults()
+        ball = faults.attempt(Ball.of, inertia, mass, radius, position, strict)
+        if ball is None:  # the other fields do not depend on the moments
+            stand_in = (1, 1, 1)
+            dual = not self.constrained
+            faults.attempt(read_fields, stand_in, gamma, Omega, None, frame, normalize, dual)
+        faults.require_none()
+        assert ball is not None
         self._set(ball=ball)
         super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
         given = given_arguments(
