@@ -1,0 +1,205 @@
+"""A motion at given times: its series by name, its integrals, and the tables and files of
+both.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show, unknown_name
+from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
+from veselova.mechanics.results.npz import decimal_arrays, write_archive
+from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.table import Table, Target, flat_columns, open_target, row_blocks
+
+__all__ = ["SampledMotion"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledMotion:
+    """The series of a motion at N times, and what is written from them. ``Trajectory`` lists the
+    fields.
+    """
+
+    problem: Problem
+    times: Array
+    error: Array
+    arrays: Series
+    provenance: Provenance
+    dense: Callable[[Any], Any] | None = field(default=None, repr=False)
+    decimals: Decimals | None = None
+    remainders: Array | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "arrays", dict(self.arrays))
+        for array in (self.times, self.error, self.remainders, *self.arrays.values()):
+            if array is not None:
+                array.setflags(write=False)
+
+    def series(self, name: str) -> Array:
+        """Return one of the problem's outputs, or ``conditioning``, by name; raises InvalidInput
+        for another.
+        """
+        if name == CONDITIONING:
+            return self.conditioning
+        if name not in self.arrays:
+            self._choose([name])
+            values = self.problem.derive(name, self.arrays)
+            values.setflags(write=False)
+            self.arrays[name] = values  # type: ignore[index]
+        return self.arrays[name]
+
+    @property
+    def conditioning(self) -> Array:
+        """Return how far one rounding of the data moves the motion by each time, (N,)."""
+        raise NotImplementedError
+
+    @cached_property
+    def integrals(self) -> Mapping[str, Array]:
+        """Return the integrals of motion at each time, by name (see the problem's
+        ``integrals``).
+        """
+        width = sum(values[:1].size for values in self.arrays.values())
+        blocks = [
+            self.problem.integrals({name: values[rows] for name, values in self.arrays.items()})
+            for rows in row_blocks(self.times.size, width)
+        ]
+        return (
+            blocks[0]
+            if len(blocks) == 1
+            else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        )
+
+    def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
+        """Return the flat table of all or the chosen series: time, error, every component, named
+        like ``frame_1_2`` (from 1), and every integral of motion, like ``integral_energy``.
+        """
+        return self._table(self.error, {name: self.series(name) for name in self._choose(outputs)})
+
+    def _choose(self, outputs: Iterable[str] | None) -> tuple[str, ...]:
+        """Return the names of the chosen series, all of the problem's where none are named; raises
+        InvalidInput for others, and for none.
+        """
+        names = self.problem.output_names()
+        chosen = tuple(self.problem.outputs if outputs is None else outputs)
+        if isinstance(outputs, str) or not chosen:
+            raise InvalidInput(
+                ("outputs",), f"a list of one or more of {', '.join(names)}", show(outputs)
+            )
+        for i, name in enumerate(chosen):
+            if name not in names:
+                raise unknown_name(("outputs", i), name, names)
+        return chosen
+
+    def _table(
+        self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]
+    ) -> dict[str, NDArray[Any]]:
+        table: dict[str, NDArray[Any]] = {self.problem.time: self.times}
+        if self.remainders is not None:
+            table[f"{self.problem.time}_remainder"] = self.remainders
+        table["error"] = error
+        for name, values in series.items():
+            table |= flat_columns(name, values)
+        for name, values in self.integrals.items():
+            table |= flat_columns(f"integral_{name}", values)
+        return table
+
+    def to_npz(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal,
+        q_radius …).
+        """
+        chosen = self._choose(outputs)
+        with open_target(target) as stream:
+            write_archive(stream, self._archive(chosen))
+
+    def _archive(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+        yield "provenance", np.array(json.dumps(self.provenance.as_dict()))
+        yield from self.named_arrays(outputs)
+        for name, values in self.integrals.items():
+            yield f"integral_{name}", values
+
+    def named_arrays(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Yield times, error and the chosen series by the names that an archive has for them,
+        decimals as texts.
+        """
+        yield "times", self.times
+        if self.remainders is not None:
+            yield "remainders", self.remainders
+        yield "error", self.error
+        for name in outputs:
+            yield name, self.series(name)
+            if self.decimals is not None and name in self.problem.outputs:
+                yield from decimal_arrays(name, self.decimals).items()
+
+    def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table as comma-separated values, one row per time: doubles to the last
+        bit, or all of the decimals.
+        """
+        chosen = self._choose(outputs)
+        table: Mapping[str, NDArray[Any]] = self.columns(chosen)
+        if self.decimals is not None:
+            known = self.decimals.midpoints
+            series = {
+                name: known[name] if name in self.problem.outputs else self.series(name)
+                for name in chosen
+            }
+            table = self._table(self.decimals.error, series)
+        Table(table, self.provenance.as_dict()).to_csv(target)
+
+    def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table and the provenance as Parquet, doubles only; raises BackendMissing
+        without pyarrow.
+        """
+        Table(self.columns(outputs), self.provenance.as_dict()).to_parquet(target)
+
+    def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table and the provenance as an Arrow IPC stream, doubles only; raises
+        BackendMissing without pyarrow.
+        """
+        Table(self.columns(outputs), self.provenance.as_dict()).to_arrow(target)
+
+    def to_xarray(self, outputs: Iterable[str] | None = None) -> Any:
+        """Return an xarray Dataset of all or the chosen series, doubles, with the time as its
+        coordinate; raises BackendMissing without xarray.
+
+        Its attributes are the provenance. Texts and numbers stand as they are, anything else as
+        JSON, as NetCDF asks: ``to_netcdf(path)`` writes it.
+        """
+        try:
+            from xarray import Dataset
+        except ImportError:
+            raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
+        axes = self.problem.outputs
+        variables: dict[str, Any] = {
+            name: (("time", *axes.get(name, ())), self.series(name))
+            for name in self._choose(outputs)
+        }
+        variables["error"] = (("time",), self.error)
+        if self.remainders is not None:
+            variables["time_remainder"] = (("time",), self.remainders)
+        return Dataset(
+            variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict())
+        )
+
+
+def _attributes(facts: Mapping[str, Any]) -> dict[str, str | int | float]:
+    """Return facts as attributes that a file can hold; a truth value is JSON too, though Python
+    counts it as a number.
+    """
+    plain_kinds = (str, int, float)
+    return {
+        name: value
+        if isinstance(value, plain_kinds) and not isinstance(value, bool)
+        else json.dumps(value)
+        for name, value in facts.items()
+    }
