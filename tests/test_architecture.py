@@ -38,6 +38,7 @@ ALLOWED_LATER = {
     "mechanics": {
         "matplotlib",
         "orjson",
+        "pandas",
         "pyarrow",
         "sympy",
         "xarray",

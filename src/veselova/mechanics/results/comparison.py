@@ -68,6 +68,11 @@ class Comparison:
         )
 
     @property
+    def drift(self) -> dict[str, dict[str, float]]:
+        """Return the largest change of each integral of motion, by engine and name."""
+        return {"analytic": self.analytic.drift, "numeric": self.numeric.drift}
+
+    @property
     def seconds(self) -> dict[str, float]:
         """Return the time that each engine took."""
         return {
@@ -85,7 +90,7 @@ class Comparison:
             "error": {
                 name: float(np.max(trajectory.error)) for name, trajectory in engines.items()
             },
-            "drift": {name: trajectory.drift for name, trajectory in engines.items()},
+            "drift": self.drift,
             "seconds": self.seconds,
             "provenance": {
                 name: trajectory.provenance.as_dict() for name, trajectory in engines.items()

@@ -59,6 +59,19 @@ class SampledMotion:
             self.arrays[name] = values  # type: ignore[index]
         return self.arrays[name]
 
+    def __getitem__(self, name: str) -> Array:
+        return self.series(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.problem.outputs
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.problem.outputs)
+
+    def keys(self) -> Iterable[str]:
+        """Return the names of the series: ``dict(trajectory)`` is a dictionary of them."""
+        return self.problem.outputs.keys()
+
     @property
     def conditioning(self) -> Array:
         """Return how far one rounding of the data moves the motion by each time, (N,)."""
@@ -115,8 +128,8 @@ class SampledMotion:
         return table
 
     def to_npz(self, target: Target, outputs: Iterable[str] | None = None) -> None:
-        """Write series, integrals and provenance to a NumPy archive; decimals as texts (q_decimal,
-        q_radius …).
+        """Write series, integrals, provenance and problem to a NumPy archive; decimals as texts
+        (q_decimal, q_radius …).
         """
         chosen = self._choose(outputs)
         with open_target(target) as stream:
@@ -124,9 +137,18 @@ class SampledMotion:
 
     def _archive(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
         yield "provenance", np.array(json.dumps(self.provenance.as_dict()))
+        for name, fact in self._stated_problem().items():
+            yield name, np.array(json.dumps(fact))
         yield from self.named_arrays(outputs)
         for name, values in self.integrals.items():
             yield f"integral_{name}", values
+
+    def _stated_problem(self) -> dict[str, Any]:
+        """Return the problem's document by its name; nothing where no document states it."""
+        try:
+            return {"problem": self.problem.as_request()}
+        except InvalidInput:
+            return {}
 
     def named_arrays(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
         """Yield times, error and the chosen series by the names that an archive has for them,
@@ -154,19 +176,35 @@ class SampledMotion:
                 for name in chosen
             }
             table = self._table(self.decimals.error, series)
-        Table(table, self.provenance.as_dict()).to_csv(target)
+        Table(table, {}).to_csv(target)
 
     def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:
-        """Write the flat table and the provenance as Parquet, doubles only; raises BackendMissing
-        without pyarrow.
-        """
-        Table(self.columns(outputs), self.provenance.as_dict()).to_parquet(target)
-
-    def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
-        """Write the flat table and the provenance as an Arrow IPC stream, doubles only; raises
+        """Write the flat table, the provenance and the problem as Parquet, doubles only; raises
         BackendMissing without pyarrow.
         """
-        Table(self.columns(outputs), self.provenance.as_dict()).to_arrow(target)
+        facts = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
+        Table(self.columns(outputs), facts).to_parquet(target)
+
+    def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
+        """Write the flat table, the provenance and the problem as an Arrow IPC stream, doubles
+        only; raises BackendMissing without pyarrow.
+        """
+        facts = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
+        Table(self.columns(outputs), facts).to_arrow(target)
+
+    def to_dataframe(self, outputs: Iterable[str] | None = None) -> Any:
+        """Return a pandas DataFrame of the flat table, doubles, with the time as its index; raises
+        BackendMissing without pandas. ``attrs`` has the provenance and the problem.
+        """
+        try:
+            from pandas import DataFrame, Index
+        except ImportError:
+            raise BackendMissing("pandas", "DataFrame output", "pip install pandas") from None
+        columns = self.columns(outputs)
+        index = Index(columns.pop(self.problem.time), name=self.problem.time)
+        table = DataFrame(columns, index=index)
+        table.attrs = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
+        return table
 
     def to_xarray(self, outputs: Iterable[str] | None = None) -> Any:
         """Return an xarray Dataset of all or the chosen series, doubles, with the time as its

@@ -5,6 +5,7 @@ Arrow.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,14 +15,26 @@ from typing import Any, BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing, InternalContradiction
+from veselova.mechanics.core.errors import BackendMissing, InternalContradiction, InvalidInput, show
 
-__all__ = ["Table", "Target", "flat_columns", "open_target", "row_blocks"]
+__all__ = [
+    "Source",
+    "Table",
+    "Target",
+    "flat_columns",
+    "open_target",
+    "read_parquet",
+    "row_blocks",
+    "stack_columns",
+]
 
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
 #: Where a file is written to: its path, or a binary stream that is open.
 Target: TypeAlias = "str | Path | BinaryIO"
+
+#: Where a file is read from, in the same ways.
+Source: TypeAlias = Target
 
 #: Numbers that are turned into text, and into rows of a binary table, at a time.
 _TEXT_BLOCK = 1 << 19
@@ -58,12 +71,12 @@ def open_target(target: Target) -> Iterator[BinaryIO]:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length, doubles or decimals, and the provenance that goes with them. Written
-    block by block.
+    """Columns of one length, doubles or decimals, and facts that go with them by name, JSON-ready.
+    Written block by block.
     """
 
     columns: Columns
-    provenance: Mapping[str, Any]
+    facts: Mapping[str, Any]
 
     def _blocks(self, numbers: int) -> Iterator[dict[str, NDArray[Any]]]:
         rows = len(next(iter(self.columns.values())))
@@ -82,7 +95,7 @@ class Table:
                 stream.write(_lines(np.column_stack(list(block.values()))))
 
     def to_parquet(self, target: Target) -> None:
-        """Write Parquet, the provenance as JSON in the schema's metadata; raises BackendMissing
+        """Write Parquet, the facts as JSON in the schema's metadata; raises BackendMissing
         without pyarrow.
         """
         try:
@@ -99,7 +112,7 @@ class Table:
                 writer.write_table(table)
 
     def to_arrow(self, target: Target) -> None:
-        """Write an Arrow IPC stream, the provenance as JSON in the schema's metadata; raises
+        """Write an Arrow IPC stream, the facts as JSON in the schema's metadata; raises
         BackendMissing without pyarrow.
         """
         try:
@@ -114,7 +127,8 @@ class Table:
         import pyarrow
 
         fields = [pyarrow.field(name, pyarrow.float64()) for name in self.columns]
-        return pyarrow.schema(fields, {"provenance": json.dumps(self.provenance)})
+        metadata = {name: json.dumps(fact) for name, fact in self.facts.items()}
+        return pyarrow.schema(fields, metadata)
 
     def _tables(self) -> Iterator[Any]:
         import pyarrow
@@ -122,6 +136,50 @@ class Table:
         schema = self._schema()
         for block in self._blocks(_BINARY_BLOCK):
             yield pyarrow.table(list(block.values()), schema=schema)
+
+
+def read_parquet(source: Source) -> tuple[dict[str, NDArray[np.float64]], dict[str, Any]]:
+    """Return the columns of a Parquet file as doubles, and the facts in its metadata. Raises
+    InvalidInput for what is no such file, BackendMissing without pyarrow.
+    """
+    try:
+        from pyarrow import ArrowInvalid, parquet
+    except ImportError:
+        raise _pyarrow_missing("Parquet") from None
+    try:
+        table = parquet.read_table(source)
+    except (ArrowInvalid, OSError) as error:
+        given = f"{show(str(source))} ({type(error).__name__})"
+        raise InvalidInput(("source",), "a Parquet file that can be read", given) from None
+    metadata = table.schema.metadata or {}
+    facts = {
+        name: json.loads(metadata[name.encode()])
+        for name in ("provenance", "problem")
+        if name.encode() in metadata
+    }
+    columns = {name: np.asarray(table[name], dtype=np.float64) for name in table.column_names}
+    return columns, facts
+
+
+def stack_columns(name: str, columns: Columns) -> NDArray[Any] | None:
+    """Return the series whose components are columns named as by ``flat_columns``, None where
+    there are none, or some are missing.
+    """
+    if name in columns:
+        return columns[name]
+    pattern = re.compile(re.escape(name) + r"((?:_[1-9]\d*)+)")
+    found = {
+        tuple(int(part) - 1 for part in match[1].split("_")[1:]): column
+        for column in columns
+        if (match := pattern.fullmatch(column))
+    }
+    if not found or len({len(index) for index in found}) > 1:
+        return None
+    shape = tuple(np.max(list(found), axis=0) + 1)
+    if len(found) != np.prod(shape):
+        return None
+    values = np.stack([columns[found[index]] for index in np.ndindex(shape)], axis=1)
+    return values.reshape(-1, *shape)
 
 
 def _lines(rows: NDArray[Any]) -> bytes:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +16,22 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
+    InvalidInput,
     Unsolved,
     did_you_mean,
+    show,
 )
 from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
 from veselova.mechanics.results.npz import read_decimals
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
+from veselova.mechanics.results.table import Source, read_parquet, stack_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from scipy.spatial.transform import Rotation
 
 __all__ = ["Trajectory"]
 
@@ -197,6 +203,80 @@ class Trajectory(SampledMotion):
             remainders,
         ).with_conditioning(known)
 
+    @classmethod
+    def from_npz(cls, source: Source, problem: Problem | None = None) -> Trajectory:
+        """Return the trajectory that ``to_npz`` wrote, to the last bit, decimals included.
+
+        ``problem``: None takes the problem that the file states. Raises InvalidInput for a file
+        that is no such archive, or lacks a series that does not follow from others.
+        """
+        try:
+            with np.load(source, allow_pickle=False) as archive:
+                arrays = dict(archive.items())
+        except (OSError, ValueError, EOFError, BadZipFile) as error:
+            given = f"{show(str(source))} ({type(error).__name__})"
+            raise InvalidInput(("source",), "an archive that to_npz wrote", given) from None
+        stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
+        return cls._read(arrays, problem, stated)
+
+    @classmethod
+    def from_parquet(cls, source: Source, problem: Problem | None = None) -> Trajectory:
+        """Return the trajectory that ``to_parquet`` wrote, its doubles to the last bit.
+
+        Takes and raises what ``from_npz`` does, and BackendMissing without pyarrow.
+        """
+        columns, facts = read_parquet(source)
+        problem = problem or _problem_of(facts.get("problem"))
+        arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
+        names = {"times": problem.time, "remainders": f"{problem.time}_remainder"}
+        for name in (*names, "error", *problem.stored, CONDITIONING):
+            values = stack_columns(names.get(name, name), columns)
+            if values is not None:
+                arrays[name] = values
+        return cls._read(arrays, problem, None)
+
+    @classmethod
+    def _read(cls, arrays: Mapping[str, Any], problem: Problem | None, stated: Any) -> Trajectory:
+        problem = problem or _problem_of(stated)
+        needed = ("times", "error", "provenance", *problem.stored)
+        missing = [name for name in needed if name not in arrays]
+        if missing:
+            required = f"a file with {', '.join(needed)}"
+            raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
+        return cls.from_arrays(problem, arrays)
+
+    @property
+    def rotations(self) -> Rotation:
+        """Return the N rotations from body to space, g = Eᵀ, as a ``scipy`` Rotation, for n = 3.
+
+        Space has the axes e_1, e_2, e_3 of ``frame``. Raises InvalidInput for another n, for a
+        system without a frame, and for a reflected frame. ``error`` bounds the entries of the
+        matrices.
+        """
+        return rotations(self._frame)
+
+    def quaternions(self, *, scalar_first: bool = False) -> Array:
+        """Return the unit quaternions of ``rotations``, (N, 4), scalar last; of the two signs, the
+        one nearer to the time before. Raises as ``rotations`` does.
+        """
+        return quaternions(self._frame, scalar_first)
+
+    def euler_angles(self, sequence: str, *, degrees: bool = False) -> Array:
+        """Return the Euler angles of ``rotations``, (N, 3), in radians, or in degrees.
+
+        ``sequence``: three letters as in SciPy, capitals for rotations about the moving axes, such
+        as ``XZX``: its second angle is that between e_1 and the first body axis. Raises
+        InvalidInput for other sequences, and as ``rotations`` does. SciPy warns where two of the
+        axes coincide.
+        """
+        return euler_angles(self._frame, sequence, degrees)
+
+    @property
+    def _frame(self) -> Array:
+        if "frame" not in self.problem.outputs:
+            raise InvalidInput(("problem",), "a system with a frame", self.problem.system)
+        return self.series("frame")
+
     def in_order_of_time(self) -> Trajectory:
         """Return the trajectory with its times in increasing order: itself, or its
         doubles alone.
@@ -238,6 +318,17 @@ class Trajectory(SampledMotion):
             for key, value in rows.items()
         )
         return f"<table>{body}</table>"
+
+
+def _problem_of(stated: Any) -> Problem:
+    """Return the problem that a file states."""
+    if stated is None:
+        required = "the problem of the motion, which the file does not state"
+        raise InvalidInput(("problem",), required, "none")
+    # By name: systems stand above results.
+    read = import_module("veselova.mechanics.systems.catalogue").read_problem
+    problem: Problem = read(stated)
+    return problem
 
 
 def _drift(values: Array, vanishes: bool) -> float:

@@ -1,0 +1,185 @@
+"""Series by name, files that are read again, data frames, and the attitude as rotations."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from veselova import InvalidInput, Trajectory, solve
+from veselova.mechanics.systems.catalogue import SYSTEMS, read_problem
+from veselova.service.api.problem_models import SYSTEMS as MODELS
+
+START: Any = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
+PROBLEMS: dict[str, vs.Veselova | Any] = {
+    "veselova": vs.Veselova([3, "2", "1/3"], *START),
+    "veselova-so3": vs.VeselovaSO3([1, 2, 3], *START, {"clebsch": 0.5}),
+    "rubber-ball": vs.RubberBall([1, 2, 3], 1.5, 0.5, *START, position=[1, 2]),
+    "chaplygin-ball": vs.ChaplyginBall([1, 2, 3], 1.5, 0.5, *START),
+    "neumann": vs.NeumannSystem([3, 2, 1], *START),
+    "ellipsoid-geodesic": vs.EllipsoidGeodesic([3, 2, 1], [1, 1, 1], [1, -1, 0.2], normalize=True),
+    "separable": vs.SeparableVeselova([3, 2, 1], *START, {"quadratic": 0.5}),
+    "euler-poisson": vs.EulerPoisson(
+        [1, 2, 3], *START, {"polynomial": [{"coefficient": 1, "powers": [0, 0, 1]}]}
+    ),
+    "lr": vs.LRSystem(
+        3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]]
+    ),
+    "stiefel": vs.StiefelFlow({"special": [1, 2, 3]}, [[1], [0], [0]], [[0], [1], [0.5]]),
+}
+
+
+@pytest.fixture(scope="module")
+def motion() -> Trajectory:
+    return solve(vs.Veselova([3, 2, 1], *START), np.linspace(-30, 30, 400))
+
+
+def test_the_catalogue_has_every_system_of_the_service() -> None:
+    assert {name: model.problem_class for name, model in MODELS.items()} == {
+        name: type(read_problem(PROBLEMS[name].as_request())) for name in SYSTEMS
+    }
+
+
+def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None:
+    assert motion["q"] is motion.q
+    assert np.array_equal(motion["conditioning"], motion.conditioning)
+    assert dict(motion).keys() == motion.problem.outputs.keys() == set(motion)
+    assert "frame" in motion
+    assert "gamma" not in motion
+    with pytest.raises(InvalidInput, match="required one of q, q_dot"):
+        motion["qq"]
+
+
+def test_one_time_and_times_in_any_order_are_answered_as_they_are_given() -> None:
+    problem = vs.Veselova([3, 2, 1], *START)
+    several = solve(problem, [5, -2.5, 0, 5])
+    assert several.times.tolist() == [5, -2.5, 0, 5]
+    assert np.array_equal(several.q[0], several.q[3])
+    for one in (solve(problem, -2.5), solve(problem, np.float64(-2.5)), several.at("-2.5")):
+        assert one.times.tolist() == [-2.5]
+        assert one.q.shape == (1, 3)
+        assert np.allclose(one.q[0], several.q[1], atol=1e-14)
+    grid = several.at({"start": -1, "stop": 2, "count": 7})
+    assert np.array_equal(grid.times, np.linspace(-1, 2, 7))
+
+
+@pytest.mark.parametrize("system", sorted(PROBLEMS))
+@pytest.mark.parametrize("kind", ["npz", "parquet"])
+def test_files_say_all_that_makes_the_motion_again(system: str, kind: str, tmp_path: Path) -> None:
+    found = solve(PROBLEMS[system], [0.5, "1/3", -1])
+    getattr(found, f"to_{kind}")(tmp_path / "motion")
+    again = getattr(Trajectory, f"from_{kind}")(tmp_path / "motion")
+    assert again.problem.as_dict() == found.problem.as_dict()
+    assert again.provenance == found.provenance
+    for name, values in found.columns().items():
+        assert np.array_equal(again.columns()[name], values), name
+
+
+def test_decimals_are_read_from_an_archive_and_left_out_of_parquet() -> None:
+    found = solve(PROBLEMS["veselova"], ["0.1"], digits=40)
+    archive, table = io.BytesIO(), io.BytesIO()
+    found.to_npz(archive)
+    found.to_parquet(table)
+    for stream in (archive, table):
+        stream.seek(0)
+    again = Trajectory.from_npz(archive)
+    assert again.decimals is not None
+    assert found.decimals is not None
+    assert again.decimals.strings("q") == found.decimals.strings("q")
+    assert Trajectory.from_parquet(table).decimals is None
+
+
+@pytest.mark.parametrize("kind", ["npz", "parquet"])
+def test_files_that_do_not_hold_a_motion_are_refused_in_a_sentence(
+    kind: str, motion: Trajectory, tmp_path: Path
+) -> None:
+    read = getattr(Trajectory, f"from_{kind}")
+    (tmp_path / "text").write_text("no such file")
+    with pytest.raises(InvalidInput, match=r"^source: required a.*given /"):
+        read(tmp_path / "text")
+    getattr(motion, f"to_{kind}")(tmp_path / "part", ["q"])
+    with pytest.raises(InvalidInput, match=r"given one without q_dot, frame, "):
+        read(tmp_path / "part")
+
+
+def test_a_problem_that_no_document_states_is_given_to_the_reader(tmp_path: Path) -> None:
+    group = vs.MatrixGroup.so(3)
+    basis = np.asarray(group.basis)
+    problem = vs.LRSystem.on(group, np.eye(3), [], None, basis[1])
+    found = solve(problem, [0, 1])
+    found.to_npz(tmp_path / "motion.npz")
+    assert np.array_equal(Trajectory.from_npz(tmp_path / "motion.npz", problem).frame, found.frame)
+    with pytest.raises(InvalidInput, match="problem: required the problem of the motion"):
+        Trajectory.from_npz(tmp_path / "motion.npz")
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"system": "veselov"}, "did you mean veselova"),
+        ({"system": "veselova", "A": [1, 2], "q": [1, 0]}, "problem.q_dot: required this field"),
+        ({"system": "neumann", "B": 1}, "problem.B: required no field but A, q, q_prime"),
+        ([], "problem: required an object"),
+        (
+            {"system": "veselova", "A": [1, -2], "q": [1, 0], "q_dot": [0, 1]},
+            r"problem\.A\[1\]: required",
+        ),
+    ],
+)
+def test_documents_of_no_problem_are_refused_by_field(document: Any, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        read_problem(document)
+
+
+def test_a_data_frame_is_the_flat_table_by_time(motion: Trajectory) -> None:
+    pytest.importorskip("pandas")
+    table = motion.to_dataframe(["q"])
+    assert list(table.columns[:4]) == ["error", "q_1", "q_2", "q_3"]
+    assert table.index.name == "t"
+    assert np.array_equal(table.index, motion.times)
+    assert np.array_equal(table[["q_1", "q_2", "q_3"]], motion.q)
+    assert table.attrs["problem"] == motion.problem.as_dict()
+
+
+def test_rotations_carry_the_body_into_space(motion: Trajectory, rng: np.random.Generator) -> None:
+    space = motion.rotations.apply(motion.q.copy())
+    assert np.allclose(space, [1, 0, 0], atol=1e-13)
+    vector = rng.normal(size=3)
+    assert np.allclose(motion.rotations.apply(vector), vector @ motion.frame, atol=1e-13)
+    # ω is in the body: ġ = gω, so that a fixed vector of the body moves in space by g(ωx).
+    ahead = motion.at(motion.times + 1e-5).rotations.apply(vector)
+    behind = motion.at(motion.times - 1e-5).rotations.apply(vector)
+    velocity = motion.rotations.apply(motion.omega @ vector)
+    assert np.allclose((ahead - behind) / 2e-5, velocity, atol=1e-8)
+
+
+def test_quaternions_and_euler_angles_are_those_of_the_frame(motion: Trajectory) -> None:
+    p = motion.quaternions(scalar_first=True)
+    assert np.allclose(np.linalg.norm(p, axis=1), 1, atol=1e-14)
+    assert np.max(np.abs(np.diff(p, axis=0))) < 0.2  # no jump of sign in 60 units of time
+    assert np.array_equal(motion.quaternions(), np.roll(p, -1, axis=1))
+    w, x, y, z = p.T
+    assert np.allclose(motion.frame[:, 0, 0], 1 - 2 * (y * y + z * z), atol=1e-14)
+    assert np.allclose(motion.frame[:, 2, 1], 2 * (y * z - w * x), atol=1e-14)
+    angles = motion.euler_angles("XZX", degrees=True)
+    assert np.allclose(np.cos(np.radians(angles[:, 1])), motion.q[:, 0], atol=1e-13)
+
+
+def test_attitudes_of_other_bodies_are_refused() -> None:
+    reflected = vs.Veselova([3, 2, 1], *START, frame=solve(PROBLEMS["veselova"], 0).frame[0])
+    flipped = vs.Veselova([3, 2, 1], *START, frame=reflected.frame * [1, 1, -1])
+    body4 = vs.Veselova([4, 3, 2, 1], [1, 0, 0, 0], [0, 1, 0.5, 0])
+    for problem, message in (
+        (flipped, "frame: required a frame of determinant 1"),
+        (body4, "3 × 3 numbers; given 4 × 4"),
+        (PROBLEMS["stiefel"], "a system with a frame; given stiefel"),
+    ):
+        with pytest.raises(InvalidInput, match=message):
+            solve(problem, [0, 1]).quaternions()
+    for sequence in ("ZZX", "XY", "XyZ", "ABC", 3, "xzxz"):
+        with pytest.raises(InvalidInput, match="sequence: required three of the letters"):
+            solve(PROBLEMS["veselova"], 0).euler_angles(sequence)  # type: ignore[arg-type]
