@@ -30,7 +30,7 @@ STAMP = "built-from"
 OLDEST_NODE = 22
 
 #: Files that the bundle is made of.
-_INGREDIENTS = ("package.json", "package-lock.json", "tsconfig.json", "vite.config.ts", "*.html")
+_INGREDIENTS = ("package.json", "package-lock.json", "tsconfig.json", "vite*.ts", "*.html")
 
 #: Seconds that installing the packages, and building, may take.
 _PATIENCE_S = 600.0

@@ -21,8 +21,6 @@ export const STRETCH_COUNT = 401;
 /** Stretches that are kept. */
 const MOST_STRETCHES = 24;
 
-const STEP = STRETCH_LENGTH / (STRETCH_COUNT - 1);
-
 export class SeriesMotion implements Motion {
   readonly n: number;
   readonly genus = 0;
@@ -30,10 +28,19 @@ export class SeriesMotion implements Motion {
   readonly #order: number[];
   readonly #stretches = new Map<number, Stretch>();
   readonly #ask: (index: number) => void;
+  /** The times of a stretch: its first, less index·length, its length and its samples. */
+  readonly #first: number;
+  readonly #length: number;
+  readonly #count: number;
+  readonly #step: number;
 
-  /** `A` are the inertia data whose spheroconic coordinates are shown; empty where there are none. */
+  /** All stretches have as many samples as the first. `A` are the inertia data whose spheroconic coordinates are shown; empty where there are none. */
   constructor(first: Stretch, A: number[], ask: (index: number) => void) {
     this.#ask = ask;
+    this.#count = first.times.length;
+    this.#first = first.times[0];
+    this.#length = first.times[this.#count - 1] - this.#first;
+    this.#step = this.#length / (this.#count - 1);
     const I = A.map((entry) => 1 / entry);
     this.#order = I.map((_, i) => i).sort((i, j) => I[i] - I[j]);
     this.moments = this.#order.map((i) => I[i]);
@@ -41,7 +48,7 @@ export class SeriesMotion implements Motion {
     this.n = rowOf(first, 0).q.length;
   }
 
-  /** Take the stretch that begins at index·STRETCH_LENGTH. */
+  /** Take the stretch that begins index lengths after the first. */
   add(index: number, stretch: Stretch): void {
     this.#stretches.set(index, stretch);
     while (this.#stretches.size > MOST_STRETCHES) {
@@ -52,22 +59,18 @@ export class SeriesMotion implements Motion {
     }
   }
 
-  has(t: number): boolean {
-    return this.#stretches.has(Math.floor(t / STRETCH_LENGTH));
-  }
-
   at(time: DoubleDouble | number): Sample {
     const t = typeof time === "number" ? time : time[0];
-    let index = Math.floor(t / STRETCH_LENGTH);
-    let place = (t - index * STRETCH_LENGTH) / STEP;
+    let index = Math.floor((t - this.#first) / this.#length);
+    let place = (t - this.#first - index * this.#length) / this.#step;
     if (!this.#stretches.has(index)) {
       this.#ask(index);
       const nearest = [...this.#stretches.keys()].reduce((a, b) =>
         Math.abs(a - index) < Math.abs(b - index) ? a : b,
       );
-      place = nearest < index ? STRETCH_COUNT - 1 : 0;
+      place = nearest < index ? this.#count - 1 : 0;
       index = nearest;
-    } else if (place > 0.6 * STRETCH_COUNT && !this.#stretches.has(index + 1)) {
+    } else if (place > 0.6 * this.#count && !this.#stretches.has(index + 1)) {
       this.#ask(index + 1);
     }
     return this.#sample(this.#stretches.get(index)!, place, t);
@@ -75,9 +78,9 @@ export class SeriesMotion implements Motion {
 
   /** Return the sample at a place of a stretch, by cubic interpolation. */
   #sample(stretch: Stretch, place: number, t: number): Sample {
-    const base = Math.min(Math.max(Math.floor(place) - 1, 0), STRETCH_COUNT - 4);
+    const base = Math.min(Math.max(Math.floor(place) - 1, 0), this.#count - 4);
     const weights = lagrange(place - base);
-    const slopes = lagrange(place - base + 1e-4).map((w, i) => (w - weights[i]) / (1e-4 * STEP));
+    const slopes = lagrange(place - base + 1e-4).map((w, i) => (w - weights[i]) / (1e-4 * this.#step));
     const rows = [0, 1, 2, 3].map((k) => rowOf(stretch, base + k));
     const mix = (name: keyof Row, w: number[]) =>
       Float64Array.from(rows[0][name], (_, i) =>

@@ -15,12 +15,14 @@ import type { Field, Problem } from "./systems.ts";
 
 export class Controls {
   readonly #host: HTMLElement;
+  readonly #editable: boolean;
   readonly #change: (problem: Problem) => void;
   #problem: Problem = { system: "veselova" };
   #shape = "";
 
-  constructor(host: HTMLElement, change: (problem: Problem) => void) {
+  constructor(host: HTMLElement, editable: boolean, change: (problem: Problem) => void) {
     this.#host = host;
+    this.#editable = editable;
     this.#change = change;
   }
 
@@ -36,6 +38,10 @@ export class Controls {
       this.#host.replaceChildren(...fields.map((field) => this.#fieldset(field)));
       if (ANY_DIMENSION.has(problem.system)) this.#host.append(this.#dimension());
       this.#host.append(this.#source());
+      if (!this.#editable) {
+        const texts = this.#host.querySelectorAll<HTMLInputElement>("input, textarea");
+        for (const text of texts) text.readOnly = true;
+      }
     }
     for (const field of fields) {
       entriesOf(problem, field).forEach((text, i) => this.#fill(field, i, text));

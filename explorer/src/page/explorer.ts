@@ -9,12 +9,13 @@ import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { EVALUATION, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
-import { FAR, load, loadEngines, loadPrecise } from "./loader.ts";
+import { FAR } from "./loader.ts";
+import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
-import type { State } from "./state.ts";
+import type { Only, State } from "./state.ts";
 import { SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
 import { Trail } from "./trail.ts";
@@ -28,12 +29,22 @@ const SLOW_MS = 24;
 /** Milliseconds between looks for a server that has gone. */
 const RETRY_MS = 3000;
 
+/** What a page shows of its motion. */
+export interface Position {
+  t: string;
+  speed: number;
+  playing: boolean;
+}
+
 export class Explorer {
   readonly #player = new Player();
-  readonly #controls = new Controls(elements.fields, (problem) => this.#set(problem));
+  readonly #controls: Controls;
   readonly #facts = new Facts(elements.facts);
   readonly #gallery: Gallery;
-  #state: State = stateOf(location.hash);
+  readonly #source: Source;
+  /** The problem of a page that shows one motion only. */
+  readonly #only: Only | null;
+  #state: State;
   #loaded: Loaded | null = null;
   #sampler: Sampler | null = null;
   #trail: Trail | null = null;
@@ -47,7 +58,13 @@ export class Explorer {
   #rest = 0;
   #tries = 0;
 
-  constructor() {
+  constructor(source: Source, only: Only | null = null) {
+    this.#source = source;
+    this.#only = only;
+    const change = (problem: Problem) => this.#set(problem);
+    this.#controls = new Controls(elements.fields, source.editable, change);
+    this.#state = this.#stateOf(location.hash);
+    document.documentElement.dataset.editable = String(source.editable);
     this.#gallery = new Gallery(
       elements.views,
       (choice) => this.#start(choice),
@@ -65,6 +82,12 @@ export class Explorer {
       void typeset(tex, line, true);
     }
     requestAnimationFrame((instant) => this.#picture(instant));
+  }
+
+  #stateOf(fragment: string): State {
+    const only = this.#only;
+    const state = stateOf(fragment, only?.t);
+    return only ? { ...state, problem: only.problem } : state;
   }
 
   #fillChoosers(): void {
@@ -118,7 +141,7 @@ export class Explorer {
     elements.theme.addEventListener("click", () => this.#switchTheme());
     document.addEventListener("keydown", (event) => this.#key(event));
     window.addEventListener("hashchange", () => {
-      if (location.hash !== this.#written) this.#adopt(stateOf(location.hash));
+      if (location.hash !== this.#written) this.#adopt(this.#stateOf(location.hash));
     });
     this.#listenToExports();
   }
@@ -164,8 +187,21 @@ export class Explorer {
     this.#toggle();
   }
 
+  /** What is shown at the moment. */
+  get position(): Position {
+    const { playing, speed } = this.#player;
+    return { t: this.#player.text(), speed: Number(speed.toPrecision(4)), playing };
+  }
+
+  /** Show another time, at another speed, or pause. */
+  place({ t, speed, playing }: Partial<Position>): void {
+    if (t !== undefined && t !== this.#player.text()) this.#go(t);
+    if (speed !== undefined && speed > 0) this.#setSpeed(speed);
+    if (playing !== undefined && playing !== this.#player.playing) this.#toggle();
+  }
+
   #toggle(): void {
-    this.#player.playing = !this.#player.playing;
+    this.#player.toggle();
     elements.time.value = this.#player.text();
     this.#showPlaying();
     this.#writeAddress();
@@ -197,7 +233,7 @@ export class Explorer {
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
     const loaded = this.#loaded;
-    if (!loaded || loaded.A.length !== loaded.motion.n) return;
+    if (!loaded || !this.#source.editable || loaded.A.length !== loaded.motion.n) return;
     const { motion, A, problem } = loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
@@ -234,7 +270,7 @@ export class Explorer {
     const text = JSON.stringify(problem);
     const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
     elements.preset.value = preset?.name ?? "";
-    elements.story.textContent = preset?.text ?? "A start of your own.";
+    elements.story.textContent = this.#source.story || (preset?.text ?? "A start of your own.");
     this.#wanted = problem;
     void this.#load();
     this.#writeAddress();
@@ -250,7 +286,7 @@ export class Explorer {
       const abort = new AbortController();
       const began = performance.now();
       try {
-        const loaded = await load(problem, abort.signal);
+        const loaded = await this.#source.load(problem, abort.signal);
         this.#abort.abort();
         this.#abort = abort;
         this.#accept(loaded, performance.now() - began);
@@ -269,10 +305,7 @@ export class Explorer {
     elements.message.textContent = "";
     this.#controls.mark([]);
     this.#show(loaded);
-    const origin = loaded.document
-      ? `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`
-      : "Series of the service, in stretches of time.";
-    elements.status.textContent = origin;
+    elements.status.textContent = originOf(loaded, milliseconds);
     clearTimeout(this.#compareTimer);
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
@@ -312,6 +345,12 @@ export class Explorer {
     this.#sampler?.close();
     this.#loaded = loaded;
     this.#asksPrecise = false;
+    this.#player.limit(loaded.range);
+    const [first, last] = this.#player.range;
+    for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
+      const time = Number(jump.dataset.time);
+      jump.hidden = time < first || time > last;
+    }
     elements.letter.textContent = loaded.time;
     this.#gallery.build(loaded);
     this.#facts.build(loaded);
@@ -324,7 +363,7 @@ export class Explorer {
   async #compare(loaded: Loaded): Promise<void> {
     if (loaded !== this.#loaded || !loaded.document) return;
     try {
-      const found = await loadEngines(loaded, this.#abort.signal);
+      const found = await this.#source.loadEngines(loaded, this.#abort.signal);
       if (loaded === this.#loaded) this.#gallery.compare(found);
     } catch {
       // The plot is left out; what the server refuses is said where the problem is changed.
@@ -336,7 +375,7 @@ export class Explorer {
     if (this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
     this.#asksPrecise = true;
     try {
-      const precise = await loadPrecise(loaded, this.#abort.signal);
+      const precise = await this.#source.loadPrecise(loaded, this.#abort.signal);
       if (!precise || loaded !== this.#loaded) return;
       this.#show(precise);
       this.#asksPrecise = true;
@@ -368,16 +407,23 @@ export class Explorer {
   #writeAddress(now = false): void {
     clearTimeout(this.#addressTimer);
     const write = () => {
-      this.#state.t = this.#player.text();
-      this.#state.speed = Number(this.#player.speed.toPrecision(4));
-      this.#state.playing = this.#player.playing;
-      this.#written = fragmentOf(this.#state);
+      Object.assign(this.#state, this.position);
+      this.#written = fragmentOf(this.#state, this.#only === null);
+      // A page inside a notebook has no address of its own.
+      if (location.protocol === "about:") return;
       history.replaceState(null, "", this.#written);
       this.#written = location.hash;
     };
     if (now) write();
     else this.#addressTimer = window.setTimeout(write, 300);
   }
+}
+
+/** Return where the motion comes from, in a sentence. */
+function originOf({ document, range, time }: Loaded, milliseconds: number): string {
+  if (range) return `Series of the engine, from ${time} = ${range[0]} to ${range[1]}.`;
+  if (!document) return "Series of the service, in stretches of time.";
+  return `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`;
 }
 
 /** Make the page light or dark. */

@@ -21,8 +21,24 @@ const MORE_DIGITS = 30;
 
 const LETTERS: Record<string, string> = { t: "t", s: "s", tau1: "τ₁" };
 
-/** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
-export async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
+/** Where the motions of a page come from. */
+export interface Source {
+  /** Whether it gives the motions of other problems too. */
+  readonly editable: boolean;
+  /** What is said of the motion beside the problem; empty where the page knows better. */
+  readonly story: string;
+  /** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
+  load(problem: Problem, signal: AbortSignal): Promise<Loaded>;
+  /** Return the document of a motion in digits that hold at far times; null where there is none. */
+  loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null>;
+  /** Return series of the engines, for the plot of differences. */
+  loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences>;
+}
+
+/** The service that served the page. */
+export const SERVICE: Source = { editable: true, story: "", load, loadPrecise, loadEngines };
+
+async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
   const closed = !system || system.closedForm;
   if (closed && dimensionOf(problem) <= 4) {
@@ -59,7 +75,12 @@ function dimensionOf(problem: Problem): number {
   return Array.isArray(A) ? A.length : 3;
 }
 
-function ofDocument(problem: Problem, document: ClosedFormDocument, torus: Torus): Loaded {
+/** Return what the views show of a closed form. */
+export function ofDocument(
+  problem: Problem,
+  document: ClosedFormDocument,
+  torus: Torus,
+): Loaded {
   const motion = new ClosedFormMotion(document);
   const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
   return {
@@ -70,9 +91,11 @@ function ofDocument(problem: Problem, document: ClosedFormDocument, torus: Torus
     A: document.axes ? [] : document.A.map(number),
     time: LETTERS[document.time] ?? "t",
     reach: Number.isFinite(slowest) ? CYCLES / slowest : 60,
+    range: null,
   };
 }
 
+/** The series of the service, in stretches of time that are asked for as they are needed. */
 async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const first = await stretchOf(problem, 0, signal);
   const waiting = new Set<number>();
@@ -84,10 +107,15 @@ async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> 
       .catch(() => undefined)
       .finally(() => setTimeout(() => waiting.delete(index), 2000));
   });
+  return ofMotion(problem, motion, 2 * STRETCH_LENGTH);
+}
+
+/** Return what the views show of a motion that is known by its series. */
+export function ofMotion(problem: Problem, motion: SeriesMotion, reach: number): Loaded {
   const letter = problem.system === "ellipsoid-geodesic" ? "s" : "t";
-  const time = problem.system === "neumann" ? "τ₁" : letter;
+  const time = problem.system === "neumann" ? LETTERS.tau1 : letter;
   const A = inertiaOf(problem);
-  return { problem, motion, document: null, torus: null, A, time, reach: 2 * STRETCH_LENGTH };
+  return { problem, motion, document: null, torus: null, A, time, reach, range: null };
 }
 
 function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promise<Stretch> {
@@ -97,7 +125,7 @@ function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promis
 }
 
 /** Return A of a problem along its axes; empty where it has none. */
-function inertiaOf(problem: Problem): number[] {
+export function inertiaOf(problem: Problem): number[] {
   const field = SYSTEMS[problem.system]?.fields[0];
   if (!field) return [];
   const values = entriesOf(problem, field).map(numberOf);
@@ -107,8 +135,7 @@ function inertiaOf(problem: Problem): number[] {
   return values.map((value) => 1 / (value + ball));
 }
 
-/** Return the document of a motion in digits that hold at far times; null where there is none. */
-export async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
+async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
   const { document, problem, torus } = loaded;
   if (!document || !torus || document.path || document.axes || document.digits > 15) return null;
   const asked = { problem, digits: MORE_DIGITS };
@@ -117,8 +144,7 @@ export async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<
   return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
 }
 
-/** Return the series of the server's engines, for the plot of differences. */
-export async function loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences> {
+async function loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences> {
   const count = 241;
   const stop = Math.min(60, Math.max(1, loaded.reach / 4));
   const ask = async (engine: string): Promise<EngineSeries> => {

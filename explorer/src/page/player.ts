@@ -9,6 +9,8 @@ export class Player {
   time: DoubleDouble = [0, 0];
   playing = true;
   speed = 1;
+  /** The first and last time that can be shown. */
+  range: [number, number] = [-LATEST, LATEST];
   #before = 0;
   /** The text of a time that was asked for, until it is played on. */
   #exact: string | null = null;
@@ -21,8 +23,26 @@ export class Player {
     if (!this.playing) return;
     this.#exact = null;
     const moved = dd.add(this.time, [seconds * this.speed, 0]);
-    if (Math.abs(moved[0]) <= LATEST) this.time = moved;
+    if (moved[0] <= this.range[1]) this.time = moved;
     else this.playing = false;
+  }
+
+  /** Play or pause; at the last time, play from the first one. */
+  toggle(): void {
+    this.playing = !this.playing;
+    const step = 0.05 * this.speed;
+    if (!this.playing || this.range[1] >= LATEST || this.time[0] + step < this.range[1]) return;
+    this.time = [this.range[0], 0];
+    this.#exact = null;
+  }
+
+  /** Keep to the times that are known. */
+  limit(range: [number, number] | null): void {
+    this.range = range ?? [-LATEST, LATEST];
+    const kept = Math.min(Math.max(this.time[0], this.range[0]), this.range[1]);
+    if (kept === this.time[0]) return;
+    this.time = [kept, 0];
+    this.#exact = null;
   }
 
   /** Go to the time that a text states; return why it cannot. */
@@ -32,6 +52,10 @@ export class Player {
       return `t: required a number such as 12.5, 1e12 or 7/10; given ${text.trim() || "nothing"}.`;
     }
     if (Math.abs(time[0]) > LATEST) return `t: required at most 10¹² in size; given ${text.trim()}.`;
+    const [first, last] = this.range;
+    if (time[0] < first || time[0] > last) {
+      return `t: this motion is known from ${first} to ${last}; given ${text.trim()}.`;
+    }
     this.time = time;
     this.#exact = text.trim().replace("−", "-");
     return null;

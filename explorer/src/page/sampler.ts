@@ -3,11 +3,12 @@ import { ClosedFormMotion } from "../evaluator/motion.ts";
 import type { Motion } from "../evaluator/motion.ts";
 import { samplesOf } from "../evaluator/samples.ts";
 import type { Samples } from "../evaluator/samples.ts";
+import { startWorker } from "./worker_thread.ts";
 
 export class Sampler {
   readonly #motion: Motion;
-  readonly #worker: Worker | null;
-  readonly #waiting = new Map<number, (samples: Samples) => void>();
+  #worker: Worker | null;
+  readonly #waiting = new Map<number, { times: Float64Array; take: (samples: Samples) => void }>();
   #next = 0;
 
   constructor(motion: Motion) {
@@ -16,8 +17,14 @@ export class Sampler {
     if (this.#worker && motion instanceof ClosedFormMotion) {
       this.#worker.postMessage({ kind: "document", document: motion.document });
       this.#worker.onmessage = ({ data }) => {
-        this.#waiting.get(data.id)?.(data.samples);
+        this.#waiting.get(data.id)?.take(data.samples);
         this.#waiting.delete(data.id);
+      };
+      // Where the thread does not start, the page computes by itself.
+      this.#worker.onerror = () => {
+        this.#worker = null;
+        for (const { times, take } of this.#waiting.values()) take(samplesOf(motion, times));
+        this.#waiting.clear();
       };
     }
   }
@@ -27,20 +34,11 @@ export class Sampler {
     if (!worker) return Promise.resolve(samplesOf(this.#motion, times));
     const id = this.#next++;
     worker.postMessage({ kind: "samples", id, times });
-    return new Promise((resolve) => this.#waiting.set(id, resolve));
+    return new Promise((take) => this.#waiting.set(id, { times, take }));
   }
 
   close(): void {
     this.#worker?.terminate();
     this.#waiting.clear();
-  }
-}
-
-/** Return the worker, null where a page may have none (one read from a file, for instance). */
-function startWorker(): Worker | null {
-  try {
-    return new Worker(new URL("../worker.ts", import.meta.url), { type: "module" });
-  } catch {
-    return null;
   }
 }

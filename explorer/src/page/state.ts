@@ -13,6 +13,9 @@ export interface State {
   large: string;
 }
 
+/** What a page shows that has one motion only, and the time at which it opens. */
+export type Only = Pick<State, "problem" | "t">;
+
 export interface Preset {
   name: string;
   title: string;
@@ -31,10 +34,10 @@ export const FIRST: State = {
   large: "",
 };
 
-/** Return the fragment of an address for a state. */
-export function fragmentOf(state: State): string {
+/** Return the fragment of an address for a state, with its problem or without. */
+export function fragmentOf(state: State, withProblem: boolean): string {
   const fields = new URLSearchParams();
-  fields.set("problem", JSON.stringify(state.problem));
+  if (withProblem) fields.set("problem", JSON.stringify(state.problem));
   fields.set("t", state.t);
   fields.set("speed", String(state.speed));
   if (!state.playing) fields.set("play", "0");
@@ -43,7 +46,7 @@ export function fragmentOf(state: State): string {
 }
 
 /** Return the state of a fragment; what it does not say, or says wrongly, is as at first. */
-export function stateOf(fragment: string): State {
+export function stateOf(fragment: string, t = FIRST.t): State {
   const fields = new URLSearchParams(fragment.replace(/^#/, ""));
   const state = { ...FIRST };
   const preset = PRESETS.find(({ name }) => name === fields.get("preset"));
@@ -61,7 +64,7 @@ export function stateOf(fragment: string): State {
   }
   const speed = Number(fields.get("speed") ?? NaN);
   if (speed > 0 && speed <= 1e9) state.speed = speed;
-  state.t = fields.get("t") ?? state.t;
+  state.t = fields.get("t") ?? t;
   state.playing = fields.get("play") !== "0";
   state.large = fields.get("view") ?? "";
   return state;

@@ -2,8 +2,9 @@
 import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import { BufferAttribute, Color } from "three";
 import type { ArrowHelper, Line } from "three";
-import type { Motion, Sample } from "../evaluator/motion.ts";
+import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
+import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import { aim, arrow, line, moveLine } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
@@ -50,7 +51,7 @@ export class BallView extends View3D {
     this.#momentum = arrow(ORANGE, 1.6 * this.#radius, 0.25 * this.#radius);
     this.#drift = line(alongDrift(0, 0, 1, 0, 1), GREEN);
     this.world.add(this.#plane, this.#ball, this.#trail.object, this.#momentum, this.#drift);
-    this.#mean = meanVelocity(loaded.motion, loaded.reach);
+    this.#mean = meanVelocity(loaded);
     this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
     this.camera.position.add(this.controls.target);
   }
@@ -121,13 +122,12 @@ function alongDrift(x: number, y: number, u: number, v: number, a: number): Poin
 }
 
 /** Return the mean velocity of the contact point over a long time. */
-function meanVelocity(motion: Motion, reach: number): [number, number] {
-  const [far, near] = [motion.at(4 * reach).position, motion.at(0).position];
-  if (!far || !near || motion.genus === 0) {
-    const [a, b] = [motion.at(38).position, motion.at(0).position];
-    return a && b ? [(a[0] - b[0]) / 38, (a[1] - b[1]) / 38] : [0, 0];
-  }
-  return [(far[0] - near[0]) / (4 * reach), (far[1] - near[1]) / (4 * reach)];
+function meanVelocity({ motion, reach, range }: Loaded): [number, number] {
+  const known: [number, number] = motion.genus ? [0, 4 * reach] : [0, STRETCH_LENGTH];
+  const [first, last] = range ?? known;
+  const [far, near] = [motion.at(last - 1e-9).position, motion.at(first).position];
+  if (!far || !near) return [0, 0];
+  return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];
 }
 
 /** Return a ball whose octants have two colours in turn, and a cap at the end of each axis. */

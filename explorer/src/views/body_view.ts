@@ -12,11 +12,14 @@ import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short } from "./view.ts";
+import { keepsHorizontal, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
 const CAPTION =
   "The body in space; e₁ points upwards. ω (orange) stays horizontal. Blue: path of a body axis.";
+
+const TWISTING =
+  "The body in space; e₁ points upwards. ω (orange) need not be horizontal. Blue: path of a body axis.";
 
 const SIZE = 0.78;
 
@@ -47,14 +50,16 @@ export class BodyView extends View3D {
     return some.frame.length ? null : "This system has no attitude of a body.";
   }
 
-  build({ motion, A, reach }: Loaded): void {
+  build({ motion, problem, A, reach }: Loaded): void {
     this.clear();
     const colours = theme();
     this.#n = motion.n;
     this.caption.textContent =
       this.#n > 3
         ? `Shadow of a box in ${this.#n} dimensions; blue edges are near along e₄, red ones far.`
-        : CAPTION;
+        : keepsHorizontal({ motion, problem })
+          ? CAPTION
+          : TWISTING;
     const biggest = Math.sqrt(Math.max(...A, 0));
     this.#axes = A.map((entry) => (SIZE * Math.sqrt(entry)) / biggest);
     // A system without axes of its own gets a cube, and a plane body a thin box.

@@ -11,7 +11,7 @@ import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import { BLUE, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short } from "./view.ts";
+import { keepsHorizontal, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
 const CAPTION =
@@ -35,8 +35,9 @@ export class EllipsoidView extends View3D {
     );
   }
 
-  refusal({ A, motion }: Loaded): string | null {
-    if (A.length !== motion.n || motion.moments.length === 0) {
+  refusal({ A, motion, problem }: Loaded): string | null {
+    const geodesic = motion.n > 3 || keepsHorizontal({ motion, problem });
+    if (A.length !== motion.n || motion.moments.length === 0 || !geodesic) {
       return "No geodesic on an ellipsoid goes with this system.";
     }
     return motion.n >= 3 ? null : "In two dimensions the ellipsoid is an ellipse.";

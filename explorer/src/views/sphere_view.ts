@@ -11,8 +11,9 @@ import { TrailLine } from "./trail_line.ts";
 import { list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
-const CAPTION =
-  "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
+const CAPTION = "q = e₁ seen from the body, with lines of spheroconic coordinates.";
+
+const ZONE = "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
 
 export class SphereView extends View3D {
   #n = 3;
@@ -44,6 +45,7 @@ export class SphereView extends View3D {
         : CAPTION;
     const c2 = torus && motion.n === 3 ? torus.constants[0] : null;
     const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
+    if (I && c2 !== null) this.caption.textContent = ZONE;
     const unit = [1, 1, 1];
     const [plain, shaded] = colours.dark ? ["#243042", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
     const inside = I && c2 !== null ? zoneOf(I, c2) : null;

@@ -31,6 +31,18 @@ export interface Loaded {
   time: string;
   /** The time that trails and plots reach back. */
   reach: number;
+  /** The first and last time that are known; null where any is. */
+  range: [number, number] | null;
+}
+
+/** Systems of three dimensions in which (Ω,γ) changes. */
+const TWISTING = new Set(["chaplygin-ball", "euler-poisson"]);
+
+/** Return whether ω keeps to the horizontal plane, (Ω,γ) = 0, at the start and so for ever. */
+export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
+  const { Omega, q } = motion.at(0);
+  const along = Omega.reduce((sum, entry, i) => sum + entry * q[i], 0);
+  return !TWISTING.has(problem.system) && Math.abs(along) < 1e-6 * (1 + Math.hypot(...Omega));
 }
 
 /** One plot as numbers, for export as a picture of lines. */

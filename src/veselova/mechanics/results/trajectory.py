@@ -27,7 +27,7 @@ from veselova.mechanics.results.attitude import euler_angles, quaternions, rotat
 from veselova.mechanics.results.npz import read_decimals
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
-from veselova.mechanics.results.table import Source, read_parquet, stack_columns
+from veselova.mechanics.results.table import Source, Target, read_parquet, stack_columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -296,6 +296,15 @@ class Trajectory(SampledMotion):
         from veselova.mechanics.results.plot import picture
 
         return picture(self.in_order_of_time())
+
+    def to_html(self, target: Target) -> None:
+        """Write the motion as one page that plays in a browser, without a server or a network.
+
+        A motion with a closed form of genus 1 … 3 plays at any time up to 10¹², others play
+        between their first and last times. Raises BackendMissing where the explorer was not built
+        with this installation, and InvalidInput where times without closed form are too far apart.
+        """
+        import_module("veselova.motion_page").write_page(self, target)
 
     def __repr__(self) -> str:
         span = f"{self.times.size} times from {self.times.min():g} to {self.times.max():g}"

@@ -1,0 +1,174 @@
+"""Chromium for the tests of the explorer, driven by playwright.
+
+Every page reports its errors, breaches of its policy and requests to other origins; each test
+fails for any of them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from explorer_bundle import build_or_skip
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+CHROMIUM = shutil.which("chromium")
+
+#: The mark of tests that need it.
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium in PATH")
+
+#: Seconds that a page may take for what must come; only a failure takes them.
+PATIENCE_S = 60.0
+
+#: Graphics are drawn by the processor, and the browser asks nothing of any network.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+
+#: The origin of pages that are files: they ask nothing of any server.
+FILE = "file://"
+
+#: Breaches of the policy, collected in the page.
+_WATCH = """
+window.breaches = [];
+document.addEventListener("securitypolicyviolation", (event) =>
+  window.breaches.push(`${event.violatedDirective} ${event.blockedURI}`));
+"""
+
+#: How many different colours a canvas shows, and the part that is not the commonest.
+_INK = """(canvas) => {
+  const { width, height } = canvas;
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [width, height];
+  const context = copy.getContext("2d");
+  context.drawImage(canvas, 0, 0);
+  const data = context.getImageData(0, 0, width, height).data;
+  const counts = new Map();
+  for (let k = 0; k < data.length; k += 4) {
+    const colour = (data[k] << 16) | (data[k + 1] << 8) | data[k + 2];
+    counts.set(colour, (counts.get(colour) ?? 0) + 1);
+  }
+  return [counts.size, 1 - Math.max(...counts.values()) / (data.length / 4)];
+}"""
+
+
+@dataclass
+class Visit:
+    """A page, and what went wrong in it."""
+
+    page: Any
+    origin: str
+    faults: list[str] = field(default_factory=list)
+
+    def open(self, address: str = "") -> None:
+        """Go to an address of the server, and wait until a motion is shown."""
+        self.page.goto(f"{self.origin}/{address}")
+        self.wait_for("document.getElementById('status').textContent !== ''")
+
+    def wait_for(self, condition: str) -> None:
+        """Wait until an expression of JavaScript is true."""
+        # By asking again: the policy of the page forbids what playwright would evaluate in it.
+        deadline = time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(f"Boolean({condition})"):
+            assert time.monotonic() < deadline, f"{condition} did not come"
+            self.page.wait_for_timeout(30)
+
+    def text(self, selector: str) -> str:
+        """Return the text of an element."""
+        return str(self.page.text_content(selector))
+
+    def time(self) -> float:
+        """Return the time that is shown."""
+        return float(Fraction(self.page.input_value("#time")))
+
+    def state(self) -> dict[str, str]:
+        """Return the state in the address."""
+        fragment = urlsplit(self.page.url).fragment
+        return {name: values[0] for name, values in parse_qs(fragment).items()}
+
+    def download(self, selector: str, folder: Path) -> Path:
+        """Press a button, and return the file that it gives."""
+        with self.page.expect_download() as waiting:
+            self.page.click(selector)
+        target = folder / waiting.value.suggested_filename
+        waiting.value.save_as(target)
+        return target
+
+    def ink(self, view: str) -> tuple[int, float]:
+        """Return how many colours a view shows, and how much of it is drawn on."""
+        canvas = self.page.locator(f'[data-view="{view}"] canvas').first
+        canvas.scroll_into_view_if_needed()
+        colours, part = canvas.evaluate(_INK)
+        return int(colours), float(part)
+
+    def wait_for_ink(self, view: str, colours: int, part: float) -> None:
+        """Wait until a view shows so many colours on so much of it."""
+        for _ in range(200):
+            found = self.ink(view)
+            if found[0] >= colours and found[1] >= part:
+                return
+            self.page.wait_for_timeout(100)
+        raise AssertionError(f"{view} shows {found}")
+
+
+@contextmanager
+def running_browser() -> Iterator[Any]:
+    """Run chromium, without a window, beside a bundle that is as the sources are."""
+    build_or_skip()
+    with playwright.sync_playwright() as tool:
+        running = tool.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield running
+        running.close()
+
+
+@contextmanager
+def visiting(browser: Any, origin: str, allowed: tuple[str, ...] = (), **options: Any) -> Any:
+    """Open a page in a context of its own; what went wrong in it fails the test."""
+    options.setdefault("viewport", {"width": 1000, "height": 640})
+    context = browser.new_context(**options)
+    context.add_init_script(_WATCH)
+    page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE_S)
+    visit = Visit(page, origin)
+    page.on("console", lambda message: _note(visit, message, allowed))
+    page.on("pageerror", lambda error: visit.faults.append(f"uncaught {error}"))
+    page.on("request", lambda request: _check_origin(visit, request.url))
+    try:
+        yield visit
+        visit.faults += page.evaluate("window.breaches")
+        assert not visit.faults
+    finally:
+        context.close()
+
+
+def _note(visit: Visit, message: Any, allowed: tuple[str, ...]) -> None:
+    if message.type == "error" and not any(text in message.text for text in allowed):
+        visit.faults.append(f"console: {message.text}")
+
+
+def _check_origin(visit: Visit, address: str) -> None:
+    parts = urlsplit(address)
+    if visit.origin == FILE:
+        if parts.scheme not in ("blob", "data", "file"):
+            visit.faults.append(f"request to {address}")
+    elif (
+        parts.scheme not in ("blob", "data") and f"{parts.scheme}://{parts.netloc}" != visit.origin
+    ):
+        visit.faults.append(f"request to {address}")
