@@ -24,7 +24,7 @@ function theta(T, epsilon, delta, z)
 end
 "The time map t(τ₁) and its slope."
 function time(d, tau)
-    pace, turn = π .* (d.modes * d.f), 2π .* (d.modes * d.z0)
+    pace, turn = π .* (d.modes * d.f), 2π .* (d.modes * d.z0 .+ d.turns)
     h = pace .* tau
     d.mean * tau + sum(2 .* d.F ./ pace .* cos.(turn .+ h) .* sin.(h)), d.mean + sum(2 .* d.F .* cos.(turn .+ 2 .* h))
 end
@@ -40,14 +40,20 @@ function frame(d, t)
     values = [theta(d.T, c[1:g], c[(g + 1):end], z) for c in eachrow(d.c)]
     entries(pairs) = [pairs[i, 2] * values[Int(pairs[i, 1]) + 1] / values[1] for i in 1:size(pairs, 1)]
     normals = hcat((entries(d.normals[(1 + k * (g + 1)):((k + 1) * (g + 1)), :]) for k in 0:(g - 2))..., entries(d.gamma))
-    hcat(d.D * entries(d.q), d.D * normals * d.rotation .+ d.frozen)
+    hcat(d.D * entries(d.q), d.D * normals * d.rotation .+ d.frozen) * d.attitude
 end
 files = length(ARGS) > 1 ? ARGS : ["body3.json", "body3.values.json"]
 text, stored = read(files[1], String), read(files[2], String)
 g, n = length(numbers(text, "phases")), length(numbers(text, "A"))
 field(key, width) = rows(numbers(text, key), width)
+area = occursin("\"area\":", text) ? split(text, "\"area\":"; limit = 2)[2] : "" # of a body with an area constant: modes doubled
+odd = isempty(area) ? Float64[] : numbers(area, "coefficients")
 d = (; T = field("riemann_matrix", g), f = numbers(text, "frequencies"), z0 = numbers(text, "phases"),
-    mean = numbers(text, "mean_rate")[1], modes = field("modes", g), F = numbers(text, "coefficients"),
+    mean = numbers(text, "mean_rate")[1],
+    modes = isempty(odd) ? field("modes", g) : vcat(field("modes", g), rows(numbers(area, "modes"), g) ./ 2),
+    F = vcat(numbers(text, "coefficients"), odd), turns = vcat(zeros(length(numbers(text, "coefficients"))),
+        isempty(odd) ? Float64[] : fill(numbers(area, "turn")[1], length(odd))),
+    attitude = isempty(area) ? Matrix(1.0I, n, n) : rows(numbers(area, "attitude"), n),
     c = field("characteristics", 2g), q = field("q", 2), normals = field("normals", 2), gamma = field("gamma", 2),
     D = field("directions", g + 1), rotation = field("rotation", n - 1), frozen = field("frozen", n - 1))
 times, frames = numbers(stored, "times"), numbers(stored, "frame")

@@ -28,9 +28,10 @@ function leastEigenvalue(T) { // by power iteration on trace·1 − T
   return trace - size;
 }
 
-function frame(document, terms, t) { // rows of [e_1 … e_n]; e_1 = q
-  const { frequencies: f, phases: z0, modes, coefficients: F, mean_rate: mean } = document;
-  const pace = modes.map((m) => PI * dot(m, f)), turn = modes.map((m) => 2 * PI * dot(m, z0));
+function frame(document, terms, t) { // rows of [e_1 … e_n]
+  const { frequencies: f, phases: z0, mean_rate: mean, area } = document, odd = area?.odd ?? { modes: [], coefficients: [], turn: 0 };
+  const modes = [...document.modes, ...odd.modes.map((m) => m.map((x) => x / 2))], F = [...document.coefficients, ...odd.coefficients];
+  const pace = modes.map((m) => PI * dot(m, f)), turn = modes.map((m, j) => 2 * PI * (dot(m, z0) + (j < document.modes.length ? 0 : odd.turn)));
   let tau = t / mean;
   for (let k = 0, step = 1; k < 100 && abs(step) > 1e-15 * (1 + abs(tau)); k++) { // Newton's method for t(tau) = t
     let time = mean * tau, slope = mean;
@@ -49,8 +50,9 @@ function frame(document, terms, t) { // rows of [e_1 … e_n]; e_1 = q
   });
   const entries = (pairs) => pairs.map(([place, constant]) => (constant * theta[place]) / theta[0]);
   const q = entries(document.q), normals = [...document.normals, document.gamma].map(entries);
-  return document.directions.map((D, i) => [dot(D, q), ...document.frozen[i].map((rest, j) =>
+  const rows = document.directions.map((D, i) => [dot(D, q), ...document.frozen[i].map((rest, j) =>
     rest + normals.reduce((sum, n, k) => sum + dot(D, n) * document.rotation[k][j], 0))]);
+  return area ? rows.map((row) => row.map((_, j) => row.reduce((sum, x, k) => sum + x * area.attitude[k][j], 0))) : rows;
 }
 
 const [document, stored] = (process.argv.length > 3 ? process.argv.slice(2) : ["body3.json", "body3.values.json"])

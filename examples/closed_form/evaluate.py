@@ -36,10 +36,14 @@ def theta(document, z):
     return np.array(values)
 
 def frame(document, t):
-    """The matrix [e_1 ... e_n] at time t, columns along the principal axes; e_1 = q."""
+    """The matrix [e_1 ... e_n] at time t, columns along the principal axes."""
     f, z0, mean = np.array(document["frequencies"]), np.array(document["phases"]), document["mean_rate"]
-    m = np.array(document["modes"], float).reshape(-1, len(f))
-    F, pace, turn = np.array(document["coefficients"]), np.pi * m @ f, 2 * np.pi * m @ z0
+    m, F = np.array(document["modes"], float).reshape(-1, len(f)), np.array(document["coefficients"])
+    pace, turn, last = np.pi * m @ f, 2 * np.pi * m @ z0, np.eye(len(document["A"]))
+    if area := document.get("area"):  # half-integer modes, and a rotation
+        odd, last = np.reshape(area["odd"]["modes"], (-1, len(f))) / 2, area["attitude"]
+        turn = np.append(turn, 2 * np.pi * (odd @ z0 + area["odd"]["turn"]))
+        pace, F = np.append(pace, np.pi * odd @ f), np.append(F, area["odd"]["coefficients"])
     tau = t / mean
     for _ in range(100):  # Newton's method for t(tau) = t
         h = pace * tau
@@ -52,7 +56,7 @@ def frame(document, t):
     entries = lambda pairs: np.array([constant * values[place] / values[0] for place, constant in pairs])  # noqa: E731
     normals = np.column_stack([entries(column) for column in [*document["normals"], document["gamma"]]])
     D, rotation = np.array(document["directions"]), np.array(document["rotation"])
-    return np.column_stack([D @ entries(document["q"]), D @ normals @ rotation + np.array(document["frozen"])])
+    return np.column_stack([D @ entries(document["q"]), D @ normals @ rotation + np.array(document["frozen"])]) @ last
 
 files = sys.argv[1:] or ["body3.json", "body3.values.json"]
 document, stored = (json.load(open(file)) for file in files)

@@ -266,5 +266,38 @@ def test_what_is_not_served_is_refused_by_name(system: str) -> None:
         vs.solve(problem, [1.0], digits=30)
     with pytest.raises(InvalidInput, match=f"certified: required 15, .*{system}"):
         vs.solve(problem, [1.0], certified=True)
-    with pytest.raises(Unsolved, match="no-closed-form: a document has no area constant"):
-        vs.closed_form(problem)
+    with pytest.raises(InvalidInput, match="digits: required 15"):
+        vs.closed_form(problem, digits=20)
+
+
+@pytest.mark.parametrize(("case", "system"), rows(MOVING))
+def test_states_from_the_document_alone_are_those_of_the_engine(
+    case: BodyCase, system: str
+) -> None:
+    problem = case.problem(system)
+    times = np.array([-1000.0, -2.5, 0.0, 0.125, 37.0, 1e4]) / max(1.0, problem.turning)
+    made = vs.closed_form(problem)
+    found, wanted = vs.ClosedForm.from_json(made.to_json()).at(times), vs.solve(problem, times)
+    allowed = found.error + wanted.error
+    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
+    assert (off <= allowed).all()
+    cycles = np.abs(times) * max(1.0, problem.turning)
+    assert (off <= 1e-12 * np.maximum(1, cycles / 100)).all()
+    if system != "veselova-so3":
+        assert (np.max(np.abs(found.position - wanted.position), axis=1) <= allowed).all()
+    for name in found.series:
+        other = wanted.series(name)
+        assert largest(found.series[name] - other) <= 1e-11 * max(1.0, largest(other)), name
+    assert made.document["problem"] == problem.as_dict()
+
+
+def test_a_document_is_honest_against_the_ball_itself() -> None:
+    for system in ("rubber-ball", "chaplygin-ball"):
+        problem, times = CASES["generic"].problem(system), CASES["generic"].times()
+        true = truth(CASES["generic"], system == "chaplygin-ball")
+        found = vs.closed_form(problem, accuracy=1e-6).at(times)
+        off = np.max(np.abs(found.frame - true.frame @ true.frame[0].T @ problem.frame))
+        assert 1e-10 < off <= np.max(found.error)
+        moved = (true.position - true.position[0]) @ (true.frame[0].T @ problem.frame)[1:, 1:]
+        off = largest(found.position - problem.start["position"] - moved)
+        assert off <= np.max(found.error)

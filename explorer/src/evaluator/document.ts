@@ -2,6 +2,9 @@
 
 export const FORMAT = "veselova.closed-form/1";
 
+/** The format of a body with an area constant, which this evaluator does not have. */
+export const AREA_FORMAT = "veselova.closed-form/2";
+
 export type Decimal = number | string;
 export type Pair = [number, Decimal];
 

@@ -1,5 +1,5 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { number, requireDocument } from "../evaluator/document.ts";
+import { AREA_FORMAT, number, requireDocument } from "../evaluator/document.ts";
 import type { ClosedFormDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
 import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -55,6 +55,8 @@ async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Load
     const torus = await post<Torus>("v1/tori", { problem }, signal);
     if (torus.regime === "separatrix") return null;
     const document = await post<ClosedFormDocument>("v1/closed-forms", { problem }, signal);
+    // a body with an area constant: the page shows its series
+    if (document.format === AREA_FORMAT) return null;
     requireDocument(document);
     return document.genus <= 3 ? ofDocument(problem, document, torus) : null;
   } catch (error) {

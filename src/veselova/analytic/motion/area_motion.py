@@ -16,7 +16,7 @@ from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["AreaBody", "motion_with_area", "roll"]
+__all__ = ["AreaBody", "motion_with_area", "plane_of_path", "roll"]
 
 Array = NDArray[np.float64]
 
@@ -59,9 +59,14 @@ def roll(ball: RollingBall, torus: TorusProblem, displacement: Array) -> Array:
     radius = float(ball.ball.radius)
     if not isinstance(torus, AreaVeselova):
         return -radius * displacement
+    return np.asarray(radius * displacement @ plane_of_path(ball, torus))
+
+
+def plane_of_path(ball: RollingBall, torus: AreaVeselova) -> Array:
+    """Return n and e_⊥ along e_2 and e_3, as rows, (2, 2)."""
     axes = np.eye(3) if ball.axes is None else ball.axes
-    plane = np.stack([torus.normal, torus.horizontal]) @ (axes.T @ ball.frame[:, 1:])
-    return np.asarray(radius * displacement @ plane)
+    rows = np.stack([torus.normal, torus.horizontal])
+    return np.asarray(rows @ (axes.T @ ball.frame[:, 1:]))
 
 
 def _motion_at(problem: AreaBody, dense: Callable[[Any], Trajectory], times: Any) -> Trajectory:

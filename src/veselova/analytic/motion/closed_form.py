@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.motion.area_solution import AreaSolution, solution_of
+from veselova.analytic.motion.closed_form_area import area_fields, error_of_body
 from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
 from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
@@ -27,10 +29,13 @@ from veselova.mechanics.results.closed_form import (
     ClosedForm,
     require_accuracy,
 )
-from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 from veselova.version import __version__
 
 __all__ = ["closed_form"]
@@ -64,14 +69,14 @@ def closed_form(
     """
     digits = whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_CLOSED_FORM_DIGITS)
     accuracy = require_accuracy(accuracy, digits)
-    if digits > FEWEST_DIGITS and isinstance(given, RubberBall):
+    if digits > FEWEST_DIGITS and isinstance(given, RollingBall):
         required = f"{FEWEST_DIGITS} (the path of the contact point is in double precision)"
         raise InvalidInput(("digits",), required, str(digits))
     problem = on_torus(given)
-    if isinstance(problem, AreaVeselova):
-        reason = "a document has no area constant ((Ω,γ) ≠ 0, or a ball that twists); "
-        raise Unsolved("no-closed-form", reason + "solve at times instead")
-    solution = Solution(problem)
+    solution = solution_of(problem)
+    if digits > FEWEST_DIGITS and isinstance(solution, AreaSolution):
+        required = f"{FEWEST_DIGITS} for a document of system {given.system} with (Ω,γ) ≠ 0"
+        raise InvalidInput(("digits",), required, str(digits))
     if solution.separatrices:
         reason = (
             "the start lies on a separatrix, which no torus describes for long; solve at "
@@ -79,7 +84,7 @@ def closed_form(
         )
         raise Unsolved("no-closed-form", reason)
     head = {
-        "format": ClosedForm.format,
+        "format": AREA_FORMAT if isinstance(solution, AreaSolution) else ClosedForm.format,
         "version": __version__,
         "time": problem.time,
         "digits": digits,
@@ -95,7 +100,12 @@ def closed_form(
             "units": _units(problem.time),
             "error": _error_of_decimals(solution, accuracy, digits),
         }
-    if isinstance(given, RubberBall):
+    if isinstance(solution, AreaSolution):
+        assert isinstance(given, (VeselovaSO3, ChaplyginBall))
+        parts |= area_fields(solution, given, accuracy)
+        parts["error"] = error_of_body(parts["error"], given)
+        parts["axes"] = None if given.axes is None else given.axes.tolist()
+    elif isinstance(given, RubberBall):
         parts |= {"path": _path(solution, given, accuracy)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
     return ClosedForm({**head, **parts, "problem": given.as_dict()})

@@ -18,7 +18,7 @@ from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.systems.area_veselova import RollingAreaVeselova
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
-__all__ = ["Displacement", "displacement_of"]
+__all__ = ["Displacement", "WithAreaConstant", "displacement_of"]
 
 Array = NDArray[np.float64]
 
@@ -139,7 +139,7 @@ class WithAreaConstant(Displacement):
     solution: AreaSolution
 
     @cached_property
-    def _peaks(self) -> Array:
+    def peaks(self) -> Array:
         """Return the largest values of (q',n_2) and of the odd part at the half periods, or those
         that move a ball by |Ω| where they are less: below their rounding they are noise.
 
@@ -158,7 +158,7 @@ class WithAreaConstant(Displacement):
     @property
     def count(self) -> int:
         """Return 2, or fewer where u is frozen or the time has no odd part."""
-        return self._peaks.size
+        return self.peaks.size
 
     @property
     def series(self) -> list[TorusSeries]:
@@ -167,15 +167,15 @@ class WithAreaConstant(Displacement):
         if not self.count:
             return []
         component = NormalComponent.of(solution.frame, solution.inversion, 1)
-        across = find_series(replace(component, scale=component.scale / self._peaks[0]))
+        across = find_series(replace(component, scale=component.scale / self.peaks[0]))
         if not solution.odd_peak:
             return [across]
-        return [across, solution.odd_series.scaled(solution.odd_peak / float(self._peaks[1]))]
+        return [across, solution.odd_series.scaled(solution.odd_peak / float(self.peaks[1]))]
 
     def integrands(self, attitude: Attitude) -> Array:
         """Return (q',n_2) and the odd part of dt/dτ₁, over their peaks."""
         found = [attitude.components[:, 0], self.solution.odd_rate_of(attitude)]
-        return np.stack(found[: self.count], axis=-1) / self._peaks
+        return np.stack(found[: self.count], axis=-1) / self.peaks
 
     @property
     def bounds(self) -> Array:
@@ -187,7 +187,7 @@ class WithAreaConstant(Displacement):
         """Return what the integrals are multiplied with, (K,)."""
         problem = self.solution.problem
         factors = np.array([problem.sign * self.solution.side, -problem.across])
-        return factors[: self.count] * self._peaks
+        return factors[: self.count] * self.peaks
 
     @property
     def speed(self) -> float:

@@ -85,7 +85,7 @@ class ClosedForm:
 
     document: Mapping[str, Any] = field(repr=False)
 
-    #: The name of the format in a document, and its version.
+    #: The name of the format in a document, and its version; with an area constant it is another.
     format: ClassVar[str] = FORMAT
 
     def __post_init__(self) -> None:

@@ -71,6 +71,15 @@ class DecimalEvaluator:
         )
         return {name: self._numbers(self._document[name]) for name in names}
 
+    @cached_property
+    def _area(self) -> dict[str, Any]:
+        """Return the field ``area`` with its numbers, where the document has it."""
+        if "area" not in self._document:
+            return {}
+        area = self._document["area"]
+        names = ("attitude", "momentum", "inverse", "form", "constant")
+        return {"area": {name: self._numbers(area[name]) for name in names}}
+
     def _state(self, time: Fraction) -> dict[str, Objects]:
         mpf = self._context.mpf
         tau1, z = self._phases(time)
@@ -82,7 +91,7 @@ class DecimalEvaluator:
                 [mpf(constant) * quotients[place] for place, constant in pairs], dtype=object
             )
 
-        document = self._document
+        document = {**self._document, **self._area}
         fields = self._fields
         normals = np.stack(
             [entries(column) for column in [*document["normals"], document["gamma"]]], axis=1
@@ -113,7 +122,7 @@ class DecimalEvaluator:
             uniform = t / mean
             z = np.array([x % 2 for x in fields["phases"] + uniform * f], dtype=object)
         delta = ctx.mpf(0)
-        if len(self._document["modes"]):
+        if len(self._modes[1]):
             near = float(time)
             rest = np.array([float(time - Fraction(near))])
             tau1 = neumann_time(self._document, self._arrays, np.array([near]), rest)
@@ -124,10 +133,9 @@ class DecimalEvaluator:
         """Return δ with F_0 δ + Σ F_m/(π m·f) [sin 2πm·(z + δf) − sin 2πm·z⁰] = 0."""
         ctx = self._context
         mean = self._fields["mean_rate"][()]
-        coefficients = self._fields["coefficients"]
+        doubled, coefficients, _ = self._modes
         f = self._fields["frequencies"]
-        modes = np.array(self._document["modes"], dtype=object)
-        amplitudes = coefficients / (ctx.pi * (modes @ f))
+        amplitudes = 2 * coefficients / (ctx.pi * (doubled.astype(object) @ f))
         begin = amplitudes @ self._sinusoids(self._fields["phases"])[1]
         smallest = ctx.mpf(10) ** (5 - ctx.dps)
         for _ in range(_MOST_STEPS):
@@ -138,10 +146,28 @@ class DecimalEvaluator:
                 return delta
         raise InternalContradiction("Newton's method for the time map does not converge")
 
+    @cached_property
+    def _modes(self) -> tuple[NDArray[np.int64], Objects, Objects]:
+        """Return the doubled modes M of the time map, their coefficients, and e^{2πi turn}."""
+        genus = int(self._document["genus"])
+        even = np.array(self._document["modes"], dtype=np.int64).reshape(-1, genus)
+        coefficients = self._fields["coefficients"]
+        ones = np.full(len(even), self._context.mpc(1), dtype=object)
+        if "area" not in self._document:
+            return 2 * even, coefficients, ones
+        odd = self._document["area"]["odd"]
+        modes = np.array(odd["modes"], dtype=np.int64).reshape(-1, genus)
+        factor = self._context.expjpi(2 * self._context.mpf(odd["turn"]))
+        return (
+            np.concatenate([2 * even, modes]),
+            np.concatenate([coefficients, self._numbers(odd["coefficients"]).reshape(-1)]),
+            np.concatenate([ones, np.full(len(modes), factor, dtype=object)]),
+        )
+
     def _sinusoids(self, z: Objects) -> tuple[Objects, Objects]:
-        """Return cos 2πm·z and sin 2πm·z of all modes."""
-        modes = np.array(self._document["modes"], dtype=np.int64)
-        found = self._powers(2 * z, modes)
+        """Return cos 2π(M·z/2 + turn) and sin 2π(M·z/2 + turn) of all modes."""
+        doubled, _, factors = self._modes
+        found = self._powers(z, doubled) * factors
         parts = np.frompyfunc(lambda x: (x.real, x.imag), 1, 2)(found)
         return np.asarray(parts[0]), np.asarray(parts[1])
 

@@ -60,36 +60,50 @@ def evaluate(
     if "path" not in document:
         return series
     elapsed = times if remainders is None else times + remainders
-    return {**series, "position": _contact_point(document["path"], arrays, tau1, z, elapsed)}
+    return {**series, "position": _contact_point(document, arrays, tau1, z, elapsed)}
 
 
 def _contact_point(
-    path: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array, times: Array
+    document: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array, times: Array
 ) -> Array:
     """Return x(0) − a ℜᵀ(y_2, …, y_g, y_γ), y_k the integral of (q',n_k) over τ₁, y_γ = speed·t.
 
-    A mode of y_k is c/(π m·f) [sin 2π(m·z + turn) − sin 2π(m·z⁰ + turn)], m = M/2. It is made as a
-    product, so that nothing cancels where m·f is small.
+    With an area constant ``plane`` stands in the place of ℜ, and to y_γ comes ``odd`` times the odd
+    part of t.
+    """
+    path = document["path"]
+    columns = [_integral(series, arrays, tau1, z) for series in path["transverse"]]
+    along = float(path["speed"]) * times
+    plane = arrays["rotation"]
+    if "area" in document:
+        plane = np.array(path["plane"], dtype=np.float64)
+        along = along + float(path["odd"]) * _integral(document["area"]["odd"], arrays, tau1, z)
+    y = np.stack([*columns, along], axis=1)
+    return np.asarray(
+        np.array(path["position"], dtype=np.float64) - float(path["radius"]) * (y @ plane)
+    )
+
+
+def _integral(
+    series: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array
+) -> Array:
+    """Return ∫Σ 2c cos 2π(m·z + turn) dτ₁ from zero, m = M/2.
+
+    A mode gives c/(π m·f) [sin 2π(m·z + turn) − sin 2π(m·z⁰ + turn)]. It is made as a product, so
+    that nothing cancels where m·f is small.
     """
     start = arrays["phases"]
-    columns = []
-    for series in path["transverse"]:
-        modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
-        pace = np.pi * (modes @ arrays["frequencies"])
-        weights = 2 * np.array(series["coefficients"], dtype=np.float64) / pace
-        offset = 2 * np.pi * (modes @ start + float(series["turn"]))
-        column = np.empty(len(z))
-        for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
-            h = np.pi * ((z[rows] - start) @ modes.T)
-            near = np.abs(tau1[rows, None] * pace) < 1
-            h = np.where(near, tau1[rows, None] * pace, h)
-            column[rows] = (np.cos(offset + h) * np.sin(h)) @ weights
-        columns.append(column)
-    y = np.stack([*columns, float(path["speed"]) * times], axis=1)
-    return np.asarray(
-        np.array(path["position"], dtype=np.float64)
-        - float(path["radius"]) * (y @ arrays["rotation"])
-    )
+    modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
+    pace = np.pi * (modes @ arrays["frequencies"])
+    weights = 2 * np.array(series["coefficients"], dtype=np.float64) / pace
+    offset = 2 * np.pi * (modes @ start + float(series["turn"]))
+    found = np.empty(len(z))
+    for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
+        h = np.pi * ((z[rows] - start) @ modes.T)
+        near = np.abs(tau1[rows, None] * pace) < 1
+        h = np.where(near, tau1[rows, None] * pace, h)
+        found[rows] = (np.cos(offset + h) * np.sin(h)) @ weights
+    return found
 
 
 def series_of(
@@ -101,6 +115,8 @@ def series_of(
     Numbers may be of any kind whose roots ``root`` takes.
     """
     axes = document.get("axes")
+    if "area" in document:
+        return _body_with_area(document["area"], axes, frame)
     q = frame[:, :, 0]
     if document["problem"]["system"] == "ellipsoid-geodesic":
         X = A * q / root(np.sum(A * q * q, axis=1))[:, None]
@@ -115,6 +131,27 @@ def series_of(
     if document["problem"]["system"] in ("veselova-so3", "rubber-ball"):
         return {"gamma": q, "Omega": _cross(velocity, q), "frame": frame}
     return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
+
+
+def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Any) -> dict[str, Any]:
+    """Return γ, Ω and the frame of a body with an area constant from [v n_2 γ'] of its torus.
+
+    Ω = B(K + σγ), σ = (c − (BK,γ))/(Gγ,γ): K is fixed in space, B the inverse of the inertia, and c
+    and G are (Ω,γ) and B, or 0 and −BI/D for a ball that twists.
+    """
+    inverse, form, momentum, attitude = (
+        np.asarray(area[name], dtype=frame.dtype)
+        for name in ("inverse", "form", "momentum", "attitude")
+    )
+    frame = frame @ attitude
+    if axes is not None:
+        frame = np.asarray(axes, dtype=frame.dtype) @ frame
+    gamma = frame[:, :, 0]
+    free = frame @ momentum @ inverse
+    share = np.asarray(area["constant"], dtype=frame.dtype) - np.sum(free * gamma, axis=1)
+    share = share / np.sum((gamma @ form) * gamma, axis=1)
+    Omega = free + share[:, None] * (gamma @ inverse)
+    return {"gamma": gamma, "Omega": Omega, "frame": frame}
 
 
 def _cross(a: Any, b: Any) -> Any:
@@ -140,15 +177,17 @@ def neumann_time(
     where the document has more digits than a double.
     """
     f = arrays["frequencies"]
-    modes = arrays["modes"]
     mean = float(document["mean_rate"])
     advance = _uniform_advance(document, f / mean, times)
     if remainders is not None:
         advance += remainders[:, None] * (f / mean)
     delta = np.zeros(len(times))
-    if len(modes):
-        for rows in _rows(len(times), _BLOCK // len(modes)):
-            delta[rows] = _solve_delta(arrays, mean, advance[rows])
+    series = arrays["modes"], arrays["coefficients"], np.zeros(len(arrays["modes"]))
+    if "area" in document:
+        series = _with_odd_part(document["area"]["odd"], *series)
+    if count := len(series[0]):
+        for rows in _rows(len(times), _BLOCK // count):
+            delta[rows] = _solve_delta(arrays, series, mean, advance[rows])
     return times / mean + delta, np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0), delta
 
 
@@ -163,13 +202,29 @@ def _uniform_advance(document: Mapping[str, Any], rates: Array, times: Array) ->
     )
 
 
-def _solve_delta(arrays: Mapping[str, Array], mean: float, advance: Array) -> Array:
-    """Return δ for each row of the uniform advance, by Newton's method inside a bracket."""
+def _with_odd_part(
+    odd: Mapping[str, Any], modes: Array, coefficients: Array, turns: Array
+) -> tuple[Array, Array, Array]:
+    """Return the modes of a time map with those of its odd part, which are doubled there."""
+    halves = np.array(odd["modes"], dtype=np.float64).reshape(-1, modes.shape[1]) / 2
+    further = np.array(odd["coefficients"], dtype=np.float64)
+    return (
+        np.concatenate([modes, halves]),
+        np.concatenate([coefficients, further]),
+        np.concatenate([turns, np.full(len(further), float(odd["turn"]))]),
+    )
+
+
+def _solve_delta(
+    arrays: Mapping[str, Array], series: tuple[Array, Array, Array], mean: float, advance: Array
+) -> Array:
+    """Return δ for each row of the uniform advance, by Newton's method inside a bracket; series:
+    modes, coefficients and turns.
+    """
     f = arrays["frequencies"]
-    modes = arrays["modes"]
-    coefficients = arrays["coefficients"]
+    modes, coefficients, turns = series
     pace = np.pi * (modes @ f)
-    offset = 2 * np.pi * np.mod(modes @ arrays["phases"], 1.0)
+    offset = 2 * np.pi * (np.mod(modes @ arrays["phases"], 1.0) + turns)
     uniform = np.pi * (advance @ modes.T)
 
     def excess(delta: Array) -> tuple[Array, Array]:

@@ -51,11 +51,16 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
     ]
     lines.append(rf"q &= D x,\qquad D = {number.matrix(document['directions'])}")
     normals = "".join(f"n_{k}," for k in range(2, g + 1))
+    prime = "'" if "area" in document else ""
     frozen = f" + {number.matrix(document['frozen'])}" if np.any(arrays["frozen"]) else ""
     lines.append(
-        rf"(e_2,\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = "
+        rf"(e_2{prime},\dots) &= D\,({normals}\gamma)\,\mathfrak R{frozen},\qquad \mathfrak R = "
         rf"{number.matrix(document['rotation'])}"
     )
+    if "area" in document:
+        lines.append(
+            rf"(\gamma,e_2,e_3) &= (q,e_2',e_3')\,{number.matrix(document['area']['attitude'])}"
+        )
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
 
@@ -95,23 +100,40 @@ def _quotient(name: str, pair: Sequence[Any], theta: Sequence[str], number: _Num
 
 
 def _time_map(document: Mapping[str, Any], time: str, number: _Numbers) -> str:
-    modes = document["modes"]
-    coefficients = document["coefficients"]
+    modes = _time_modes(document)
     line = rf"{time} &= {number(document['mean_rate'])}\,\tau_1"
-    for mode, value in list(zip(modes, coefficients, strict=True))[:_SHOWN_MODES]:
-        combination = _combination(mode)
-        rate = float(np.dot(mode, np.array(document["frequencies"], dtype=float)))
-        sine = rf"\sin 2\pi({combination})"
-        factor = number.signed(float(value) / (np.pi * rate))
+    for mode, value, turn in modes[:_SHOWN_MODES]:
+        rate = float(np.dot(mode, np.array(document["frequencies"], dtype=float))) / 2
+        sine = rf"\sin 2\pi({_combination(mode)}{number.signed(turn) if turn else ''})"
+        factor = number.signed(value / (np.pi * rate))
         line += rf" {factor}\,\left[{sine}\right]_{{0}}^{{\tau_1}}"
     return line + (r" + \cdots" if len(modes) > _SHOWN_MODES else "")
 
 
+def _time_modes(document: Mapping[str, Any]) -> list[tuple[list[int], float, float]]:
+    """Return the modes of the time map, doubled, their coefficients and turns: with an area
+    constant the even and the odd part, largest first.
+    """
+    pairs = zip(document["modes"], document["coefficients"], strict=True)
+    found = [([2 * m for m in mode], float(value), 0.0) for mode, value in pairs]
+    if "area" not in document:
+        return found
+    odd = document["area"]["odd"]
+    pairs = zip(odd["modes"], odd["coefficients"], strict=True)
+    found += [(mode, float(value), float(odd["turn"])) for mode, value in pairs]
+    return sorted(found, key=lambda mode: -abs(mode[1]))
+
+
 def _combination(mode: Sequence[int]) -> str:
-    terms = [
-        f"{m:+d}z_{s}".replace("+1z", "+z").replace("-1z", "-z") for s, m in enumerate(mode, 1) if m
-    ]
-    return "".join(terms).lstrip("+")
+    """Return Σ M_s z_s/2 in words."""
+    text = ""
+    for s, doubled in enumerate(mode, 1):
+        if not doubled:
+            continue
+        size = abs(doubled)
+        factor = rf"\tfrac{{{size}}}{{2}}" if size % 2 else "" if size == 2 else str(size // 2)
+        text += f"{'-' if doubled < 0 else '+'}{factor}z_{s}"
+    return text.lstrip("+")
 
 
 def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dict[str, Any]:
@@ -128,7 +150,8 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
     g = int(document["genus"])
     T = arrays["riemann_matrix"]
     supports = [lattice_within(T, halves[0], 0.0) for halves in arrays["characteristics"]]
-    terms = sum(len(points) for points in supports) + len(document["modes"])
+    time_modes = _time_modes(document)
+    terms = sum(len(points) for points in supports) + len(time_modes)
     if terms > _MOST_TERMS:
         raise Unsolved(
             "too-many-terms", f"{terms} terms, and expressions are made of at most {_MOST_TERMS}"
@@ -158,9 +181,11 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
     line = [start + rate * tau for start, rate in zip(starts, rates, strict=True)]
     found |= {f"z_{s}": phase for s, phase in enumerate(line, 1)}
     time = float(document["mean_rate"]) * tau
-    for mode, value in zip(document["modes"], arrays["coefficients"].tolist(), strict=True):
-        pace = float(np.dot(mode, rates))
-        later, before = (2 * sympy.pi * _dot(mode, phases) for phases in (line, starts))
+    for mode, value, turn in time_modes:
+        pace = float(np.dot(mode, rates)) / 2
+        later, before = (
+            2 * sympy.pi * (_dot(mode, phases) / 2 + turn) for phases in (line, starts)
+        )
         time += value / (sympy.pi * pace) * (sympy.sin(later) - sympy.sin(before))
     found["time"] = time
     return found

@@ -11,10 +11,13 @@ import numpy as np
 
 from veselova.mechanics.core.errors import InvalidInput, show
 
-__all__ = ["FORMAT", "SCHEMA", "require_document"]
+__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "require_document"]
 
 #: The name and version of the format; another number is another set of fields.
 FORMAT = "veselova.closed-form/1"
+
+#: That of documents with the field ``area``, without which an evaluator gives another motion.
+AREA_FORMAT = "veselova.closed-form/2"
 
 _NUMBER: dict[str, Any] = {
     "oneOf": [
@@ -45,7 +48,10 @@ _PAIRS: dict[str, Any] = {"type": "array", "items": _PAIR}
 _INTEGERS: dict[str, Any] = {"type": "array", "items": {"type": "integer"}}
 
 _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
-    "format": ({"const": FORMAT}, "the name and version of this format"),
+    "format": (
+        {"type": "string", "enum": [FORMAT, AREA_FORMAT]},
+        "the name and version of this format; the second has the field area",
+    ),
     "version": ({"type": "string"}, "the version of veselova that made the document"),
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
     "time": ({"type": "string", "enum": ["t", "s", "tau1"]}, "the independent variable"),
@@ -118,6 +124,17 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     ),
 }
 
+#: A function of period 2 on the torus.
+_SERIES: dict[str, Any] = {
+    "type": "object",
+    "required": ["modes", "coefficients", "turn"],
+    "properties": {
+        "modes": {"type": "array", "items": _INTEGERS},
+        "coefficients": _VECTOR,
+        "turn": _QUARTER_TURN,
+    },
+}
+
 #: Fields of some documents only.
 _FURTHER: dict[str, tuple[dict[str, Any], str]] = {
     "path": (
@@ -128,22 +145,31 @@ _FURTHER: dict[str, tuple[dict[str, Any], str]] = {
                 "radius": _NUMBER,
                 "position": _VECTOR,
                 "speed": _NUMBER,
-                "transverse": {
-                    "type": "array",
-                    "items": {
-                        "type": "object",
-                        "required": ["modes", "coefficients", "turn"],
-                        "properties": {
-                            "modes": {"type": "array", "items": _INTEGERS},
-                            "coefficients": _VECTOR,
-                            "turn": _QUARTER_TURN,
-                        },
-                    },
-                },
+                "transverse": {"type": "array", "items": _SERIES},
+                "plane": _MATRIX,
+                "odd": _NUMBER,
             },
         },
         "the contact point of a rolling ball: radius, start, speed along the momentum, and for k = "
-        "2 … g the doubled modes M and coefficients of (q', n_k) = Σ 2c cos 2π(M·z/2 + turn)",
+        "2 … g the doubled modes M and coefficients of (q', n_k) = Σ 2c cos 2π(M·z/2 + turn); with "
+        "an area constant also the directions of these parts, and the factor of the odd time",
+    ),
+    "area": (
+        {
+            "type": "object",
+            "required": ["odd", "attitude", "momentum", "inverse", "form", "constant"],
+            "properties": {
+                "odd": _SERIES,
+                "attitude": _MATRIX,
+                "momentum": _VECTOR,
+                "inverse": _MATRIX,
+                "form": _MATRIX,
+                "constant": _NUMBER,
+            },
+        },
+        "of a body with an area constant: the odd part of dt/dτ₁, the rotation from the frame of "
+        "the torus to that of the body, and K in space, B, G, c of Ω = B(K + σγ), σ = (c − "
+        "(BK,γ))/(Gγ,γ)",
     ),
 }
 
@@ -165,8 +191,9 @@ def require_document(document: Any) -> None:
     """
     if not isinstance(document, Mapping):
         raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
-    if document.get("format") != FORMAT:
-        raise InvalidInput(("document", "format"), FORMAT, show(document.get("format")))
+    form = AREA_FORMAT if "area" in document else FORMAT
+    if document.get("format") != form:
+        raise InvalidInput(("document", "format"), form, show(document.get("format")))
     missing = [name for name in _FIELDS if name not in document]
     if missing:
         raise InvalidInput(
@@ -216,7 +243,9 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     if document["axes"] is not None:
         _require_numbers(("axes",), document["axes"], (n, n))
     if "path" in document:
-        _require_path(document["path"], g, n)
+        _require_path(document["path"], g, n, "area" in document)
+    if "area" in document:
+        _require_area(document["area"], g, n)
     least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
     if not least > 0:
         raise InvalidInput(
@@ -247,7 +276,20 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         )
 
 
-def _require_path(path: Any, g: int, n: int) -> None:
+def _require_area(area: Any, g: int, n: int) -> None:
+    """Raise InvalidInput unless the body with an area constant has a series, vectors and
+    matrices.
+    """
+    if not isinstance(area, Mapping):
+        raise InvalidInput(("document", "area"), "an object", show(area))
+    for name in ("attitude", "inverse", "form"):
+        _require_numbers(("area", name), area.get(name), (n, n))
+    _require_numbers(("area", "momentum"), area.get("momentum"), (n,))
+    _require_numbers(("area", "constant"), area.get("constant"), ())
+    _require_series(("area", "odd"), area.get("odd"), g)
+
+
+def _require_path(path: Any, g: int, n: int, has_area: bool) -> None:
     """Raise InvalidInput unless the path has numbers and g − 1 series."""
     if not isinstance(path, Mapping) or not isinstance(path.get("transverse"), list):
         raise InvalidInput(("document", "path"), "an object with a list of series", show(path))
@@ -258,13 +300,20 @@ def _require_path(path: Any, g: int, n: int) -> None:
         required = f"a list of {g - 1} series"
         raise InvalidInput(("document", "path", "transverse"), required, show(path["transverse"]))
     for k, series in enumerate(path["transverse"]):
-        where = ("path", "transverse", k)
-        if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
-            raise InvalidInput(("document", *where), "an object with modes", show(series))
-        count = len(series["modes"])
-        _require_numbers((*where, "modes"), series["modes"], (count, g))
-        _require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
-        _require_numbers((*where, "turn"), series.get("turn"), ())
+        _require_series(("path", "transverse", k), series, g)
+    if has_area:
+        _require_numbers(("path", "odd"), path.get("odd"), ())
+        _require_numbers(("path", "plane"), path.get("plane"), (g, n - 1))
+
+
+def _require_series(where: tuple[str | int, ...], series: Any, g: int) -> None:
+    """Raise InvalidInput unless a function of period 2 has modes, coefficients and a turn."""
+    if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
+        raise InvalidInput(("document", *where), "an object with modes", show(series))
+    count = len(series["modes"])
+    _require_numbers((*where, "modes"), series["modes"], (count, g))
+    _require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
+    _require_numbers((*where, "turn"), series.get("turn"), ())
 
 
 def _require_reduction(reduction: Any, g: int) -> None:

@@ -47,6 +47,7 @@ class ChaplyginBall(RollingBall):
     system: ClassVar[str] = "chaplygin-ball"
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
+    has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
     twists: ClassVar[bool] = True
     #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
