@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from veselova.engines import from_torus as from_torus
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
+    from veselova.ensembles import solve_many as solve_many
+    from veselova.ensembles import tori as tori
     from veselova.mechanics.core.errors import BackendMissing as BackendMissing
     from veselova.mechanics.core.errors import InternalContradiction as InternalContradiction
     from veselova.mechanics.core.errors import InvalidInput as InvalidInput
@@ -35,7 +37,9 @@ if TYPE_CHECKING:
     from veselova.mechanics.groups.matrix_group import MatrixGroup as MatrixGroup
     from veselova.mechanics.results.closed_form import ClosedForm as ClosedForm
     from veselova.mechanics.results.comparison import Comparison as Comparison
+    from veselova.mechanics.results.ensemble import Ensemble as Ensemble
     from veselova.mechanics.results.provenance import Provenance as Provenance
+    from veselova.mechanics.results.tori import Tori as Tori
     from veselova.mechanics.results.torus import Torus as Torus
     from veselova.mechanics.results.trajectory import Trajectory as Trajectory
     from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
@@ -61,6 +65,7 @@ _HOMES = {
     "ClosedForm": "veselova.mechanics.results.closed_form",
     "Comparison": "veselova.mechanics.results.comparison",
     "EllipsoidGeodesic": "veselova.mechanics.systems.ellipsoid",
+    "Ensemble": "veselova.mechanics.results.ensemble",
     "EulerPoisson": "veselova.mechanics.systems.euler_poisson",
     "InternalContradiction": "veselova.mechanics.core.errors",
     "InvalidInput": "veselova.mechanics.core.errors",
@@ -76,6 +81,7 @@ _HOMES = {
     "ServiceError": "veselova.mechanics.core.errors",
     "ServiceUnreachable": "veselova.mechanics.core.errors",
     "StiefelFlow": "veselova.mechanics.systems.stiefel",
+    "Tori": "veselova.mechanics.results.tori",
     "Torus": "veselova.mechanics.results.torus",
     "Trajectory": "veselova.mechanics.results.trajectory",
     "Unsolved": "veselova.mechanics.core.errors",
@@ -86,7 +92,9 @@ _HOMES = {
     "compare": "veselova.engines",
     "from_torus": "veselova.engines",
     "solve": "veselova.engines",
+    "solve_many": "veselova.ensembles",
     "sweep": "veselova.service.cli.local_sweep",
+    "tori": "veselova.ensembles",
     "torus": "veselova.engines",
 }
 

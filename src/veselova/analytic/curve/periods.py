@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
@@ -53,6 +54,16 @@ class Periods(AngleSeries):
 
     curve: Curve
     nodes: int | None = None
+
+    def part(self, curve: Curve, members: NDArray[np.intp]) -> Periods:
+        """Return the periods of some of many curves, ``curve``, with what is known of them."""
+        result = Periods(curve, self.nodes)
+        for name in ("angle_series", "cycles", "inverse_cycles"):
+            if name in vars(self):
+                vars(result)[name] = vars(self)[name][members]
+        if "cut_series" in vars(self):
+            vars(result)["cut_series"] = tuple(series[members] for series in self.cut_series)
+        return result
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -268,7 +279,7 @@ class Periods(AngleSeries):
         """
         return np.asarray(
             sum(
-                np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=1)
+                (np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=-1)[..., None])[..., 0]
                 for series in self.cut_series
             )
         )

@@ -8,7 +8,7 @@ analytic.spectrum.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ class Spectra:
     - spheroconic: (N, n−1) λ's at the start
     - increasing: (N, n−1) whether they increase there
     - time_rate: (N,) dτ₁/dt there
+    - signs: (N, n) of q
     - known: (N,) which starts are of this kind
     """
 
@@ -47,7 +48,12 @@ class Spectra:
     spheroconic: DoubleDouble
     increasing: NDArray[np.bool_]
     time_rate: Array
+    signs: Array
     known: NDArray[np.bool_]
+
+    def part(self, members: NDArray[np.intp]) -> Spectra:
+        """Return the spectra of some of the starts."""
+        return Spectra(*(getattr(self, entry.name)[members] for entry in fields(self)))
 
     @classmethod
     def of(cls, A: Array, q: Array, q_dot: Array) -> Spectra:
@@ -93,6 +99,7 @@ class Spectra:
             spheroconic=spheroconic,
             increasing=np.stack([(row * velocity).total().high >= 0 for row in rows], axis=1),
             time_rate=rate.high,
+            signs=np.sign(position.high),
             known=found & converged & (excess < _CONTRADICTION),
         )
 

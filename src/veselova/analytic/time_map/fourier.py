@@ -35,6 +35,7 @@ from veselova.mechanics.core.budget import checkpoint
 
 __all__ = [
     "COLUMN_ROUNDING",
+    "SMALLEST_MODE",
     "ColumnsForModes",
     "FourierTimeMap",
     "find_modes",
@@ -46,7 +47,7 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Modes below this part of F_0 are left out: there the determinants are rounding.
-_SMALLEST_MODE = 4e-16
+SMALLEST_MODE = 4e-16
 
 #: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is
 #: hardly ever exceeded.
@@ -360,14 +361,14 @@ def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
             for s, (_, _, one, wide) in enumerate(found)
         )
         values = float(rate.scale) / mean * np.stack([np.linalg.det(matrices), off])
-        return values.T, np.abs(values[0]) > np.maximum(_SMALLEST_MODE, values[1])
+        return values.T, np.abs(values[0]) > np.maximum(SMALLEST_MODE, values[1])
 
     modes, values, edge = find_significant_modes(rate.inversion.periods.genus, determinants)
     return (
         modes,
         mean * values[:, 0],
         edge,
-        max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2),
+        max(4 * SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2),
     )
 
 

@@ -71,8 +71,12 @@ class TorusRate(ABC, Generic[P]):
         for s in range(genus):
             angles = np.zeros((count, genus), dtype=psi.dtype)
             angles[:, s] = psi
-            result.append((self._weights(self._weight_forms(s, psi)), self.inversion.map(angles)))
+            result.append((self.weights(s, psi), self.inversion.map(angles)))
         return result
+
+    def weights(self, s: int, psi: Values) -> Values:
+        """Return w_k of cut s at nodes ψ (N,), shape (g, N)."""
+        return self._weights(self._weight_forms(s, psi))
 
     def _weights(self, forms: Values) -> Values:
         """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number,

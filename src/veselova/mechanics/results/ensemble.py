@@ -1,0 +1,126 @@
+"""The motions of many problems of one system at the same times, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show, unknown_name
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.npz import write_archive
+from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.table import Target, open_target
+
+__all__ = ["SOLVED", "Ensemble", "allocate", "chosen_outputs"]
+
+Array = NDArray[np.float64]
+
+#: What ``outcome`` says of a problem that was solved; else it names the reason, and ``detail``
+#: explains it.
+SOLVED = "solved"
+
+#: Series that are kept only where they are named: they follow from q, one problem at a time.
+_ON_DEMAND = ("spheroconic",)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble:
+    """The motions of N problems of one system and dimension at T times. Its series are attributes
+    with the axes problem, time, …, such as ``ensemble.frame`` (N, T, n, n).
+
+    - times: (T,)
+    - error: (N, T) bounds the true error of every component of q and frame: true ≤ error
+    - outcome: (N,) ``solved``, or the name of the reason; numbers of such a problem are NaN
+    - detail: (N,) the reason in a sentence, empty where the problem was solved
+    - together: (N,) which problems were computed side by side; the others by ``solve``
+    - arrays: the series by name
+    """
+
+    times: Array
+    error: Array
+    outcome: NDArray[np.str_]
+    detail: tuple[str, ...]
+    together: NDArray[np.bool_]
+    arrays: Mapping[str, Array]
+    provenance: Provenance
+
+    def __len__(self) -> int:
+        return int(self.error.shape[0])
+
+    def __getattr__(self, name: str) -> Array:
+        arrays = self.__dict__.get("arrays", {})
+        if name in arrays:
+            found: Array = arrays[name]
+            return found
+        if name == "q" and "frame" in arrays:
+            return np.asarray(arrays["frame"][..., 0])
+        hint = "" if name.startswith("_") else did_you_mean(name, arrays)
+        raise AttributeError(f"this ensemble has no {name!r}{hint}")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.arrays]
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Return which problems were solved, (N,)."""
+        return np.asarray(self.outcome == SOLVED)
+
+    def to_npz(self, target: Target) -> None:
+        """Write times, error, outcome, detail and the series to a NumPy archive."""
+        parts: dict[str, NDArray[Any]] = {"times": self.times, "error": self.error}
+        parts |= {"outcome": self.outcome, "detail": np.array(self.detail)}
+        with open_target(target) as stream:
+            write_archive(stream, iter({**parts, **self.arrays}.items()))
+
+    def __repr__(self) -> str:
+        solved = int(np.count_nonzero(self.solved))
+        largest = np.nanmax(self.error, initial=0.0)
+        return (
+            f"<Ensemble: {len(self)} problems, {solved} solved, {self.times.size} times, "
+            f"error ≤ {largest:.2g}>"
+        )
+
+
+def chosen_outputs(system: type[Problem], outputs: Iterable[str] | None) -> tuple[str, ...]:
+    """Return the names of the series that are kept: those named, or all that do not follow from
+    others. Raises InvalidInput for other names, and for none.
+    """
+    if outputs is None:
+        known = [name for name in system.outputs if name not in system.derived]
+        return tuple(name for name in known if name not in _ON_DEMAND)
+    chosen = tuple(outputs)
+    if isinstance(outputs, str) or not chosen:
+        required = f"a list of one or more of {', '.join(system.outputs)}"
+        raise InvalidInput(("outputs",), required, show(outputs))
+    for i, name in enumerate(chosen):
+        if name not in system.outputs:
+            raise unknown_name(("outputs", i), name, list(system.outputs))
+    return chosen
+
+
+def allocate(
+    system: type[Problem], outputs: Iterable[str], count: int, times: int, n: int, most_bytes: int
+) -> dict[str, Array]:
+    """Return NaN arrays for the series and the error of so many problems of dimension n.
+
+    Raises InvalidInput (``times``) where they are larger than ``most_bytes``, before any work.
+    """
+    sizes = {"coordinate": n - 1}
+    shapes: dict[str, tuple[int, ...]] = {"error": (count, times)}
+    for name in outputs:
+        axes = system.outputs[name]
+        shapes[name] = (count, times, *(sizes.get(axis, n) for axis in axes))
+    total = 8 * sum(int(np.prod(shape, dtype=object)) for shape in shapes.values())
+    if total > most_bytes:
+        required = f"arrays of at most {_gigabytes(most_bytes)} (see most_bytes and outputs)"
+        given = f"{count} problems at {times} times: {_gigabytes(total)}"
+        raise InvalidInput(("times",), required, given)
+    return {name: np.full(shape, np.nan) for name, shape in shapes.items()}
+
+
+def _gigabytes(size: int) -> str:
+    return f"{size / 1e9:.3g} GB"

@@ -1,0 +1,221 @@
+"""Many problems in one call: the motions and tori of each, whatever else is computed with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from draws import adversarial_start, near_unstable_circle, random_problem
+from problems import tagged
+from veselova.mechanics.core.errors import InvalidInput, OverBudget
+
+Array = np.ndarray[Any, Any]
+
+TIMES: list[Any] = [0.0, 7.0, 0.3, "1/3", -90.0, 1e4]
+
+
+def starts(rng: np.random.Generator, count: int, n: int) -> dict[str, Any]:
+    A = np.exp(rng.uniform(0, np.log(10), (count, n)))
+    return {"A": A, "q": rng.normal(size=(count, n)), "q_dot": rng.normal(size=(count, n))}
+
+
+def single(given: dict[str, Any], i: int) -> vs.Veselova:
+    return vs.Veselova(given["A"][i], given["q"][i], given["q_dot"][i], normalize=True)
+
+
+def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: Any) -> None:
+    """Hold one row of an ensemble against 22 digits from the exact data: true ≤ error."""
+    truth = vs.solve(problem, times, digits=22)
+    off = np.abs(truth.frame - ensemble.frame[i]).max(axis=(1, 2)) - truth.error
+    assert np.all(off <= ensemble.error[i])
+    speed = np.abs(truth.q_dot).max()
+    assert np.abs(truth.q_dot - ensemble.q_dot[i]).max() <= 20 * speed * ensemble.error[i].max()
+    elapsed = 1 + np.abs(truth.tau1)
+    assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -> None:
+    problems = [
+        random_problem(rng, n, float(np.exp(rng.uniform(0, np.log(100)))), framed=k % 2 == 0)
+        for k in range(12)
+    ]
+    ensemble = vs.solve_many(problems, TIMES)
+    assert ensemble.together.all()
+    assert ensemble.solved.all()
+    for i, problem in enumerate(problems):
+        require_truth(ensemble, i, problem, TIMES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [2, 3])
+def test_errors_bound_the_truth_of_adversarial_starts(n: int, rng: np.random.Generator) -> None:
+    problems = []
+    while len(problems) < 200:
+        _, drawn = adversarial_start(rng, n)
+        problems.append(vs.Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True))
+    ensemble = vs.solve_many(problems, TIMES)
+    assert np.count_nonzero(ensemble.together) > 50
+    for i in np.flatnonzero(ensemble.together):
+        require_truth(ensemble, i, problems[i], TIMES)
+
+
+def test_the_reference_motions_are_reached() -> None:
+    cases = [case for case in tagged("reference") if case.problem().n == 3]
+    for case in cases:
+        problem = case.problem()
+        exact = vs.Veselova(problem.A, problem.q, problem.q_dot, problem.frame, normalize=True)
+        times = case.times()
+        ensemble = vs.solve_many([exact], times)
+        expected = vs.solve(problem, times)
+        off = np.abs(ensemble.frame[0] - expected.frame).max(axis=(1, 2))
+        # the data are rounded to doubles here
+        floor = 8 * problem.conditioning_floor(np.asarray(expected.times))
+        if ensemble.together[0]:
+            assert np.all(off <= ensemble.error[0] + expected.error + floor)
+
+
+def test_any_start_is_served_or_named(rng: np.random.Generator) -> None:
+    given = starts(rng, 12, 3)
+    given["A"][1] = [2.0, 2.0, 1.0]
+    given["q"][2, 0] = given["q_dot"][2, 0] = 0.0
+    given["q"][3] = [0.0, 1.0, 1.0]
+    given["q_dot"][4] = 0.0
+    given["q"][5, 1] = np.nan
+    given["A"][6, 0] = -1.0
+    given["q_dot"][7] = given["q"][7] * 3
+    ensemble = vs.solve_many({**given, "normalize": True}, TIMES)
+    assert ensemble.outcome[[5, 6]].tolist() == ["invalid-input"] * 2
+    assert "q[1]" in ensemble.detail[5]
+    assert "A[0]" in ensemble.detail[6]
+    assert np.isnan(ensemble.frame[5]).all()
+    others = np.delete(np.arange(12), [5, 6])
+    assert ensemble.solved[others].all()
+    assert not ensemble.together[[1, 2, 4]].any()
+    for i in others:
+        alone = vs.solve(single(given, i), TIMES)
+        off = np.abs(ensemble.frame[i] - alone.frame).max(axis=(1, 2))
+        assert np.all(off <= ensemble.error[i] + alone.error)
+
+
+def test_starts_near_a_separatrix_fall_back_to_solve(rng: np.random.Generator) -> None:
+    distances = ["1e-2", "1e-4", "1e-7", "1e-10", "0"]
+    problems = [near_unstable_circle(distance, "0") for distance in distances]
+    problems = [vs.Veselova(p.A, p.q, p.q_dot, normalize=True) for p in problems]
+    ensemble = vs.solve_many(problems, [0.0, 1.0, 5.0])
+    assert ensemble.together[0]
+    assert not ensemble.together[2:].any()
+    assert ensemble.solved.all()
+    for i, problem in enumerate(problems):
+        alone = vs.solve(problem, [0.0, 1.0, 5.0])
+        off = np.abs(ensemble.frame[i] - alone.frame).max(axis=(1, 2))
+        assert np.all(off <= ensemble.error[i] + alone.error)
+
+
+def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> None:
+    given = starts(rng, 60, 3)
+    whole = vs.solve_many({**given, "normalize": True}, TIMES)
+    chosen = rng.permutation(60)[:17]
+    part = {name: values[chosen] for name, values in given.items()}
+    found = vs.solve_many({**part, "normalize": True}, TIMES)
+    for name in ("frame", "q_dot", "tau1"):
+        assert np.array_equal(getattr(found, name), getattr(whole, name)[chosen])
+    assert np.array_equal(found.error, whole.error[chosen])
+
+
+def test_series_are_those_of_a_trajectory(rng: np.random.Generator) -> None:
+    given = starts(rng, 3, 3)
+    names = ("q", "omega", "spheroconic", "tau1")
+    ensemble = vs.solve_many({**given, "normalize": True}, TIMES, names)
+    assert set(ensemble.arrays) == set(names)
+    for i in range(3):
+        alone = vs.solve(single(given, i), TIMES)
+        for name in names:
+            assert getattr(ensemble, name)[i] == pytest.approx(alone.series(name), abs=1e-8)
+    with pytest.raises(AttributeError, match="no 'omegas' \\(did you mean omega"):
+        _ = ensemble.omegas
+
+
+def test_other_systems_and_dimensions_go_one_by_one(rng: np.random.Generator) -> None:
+    neumann = [vs.NeumannSystem([3, 2, 1], *rng.normal(size=(2, 3)), normalize=True) for _ in "ab"]
+    for problems in (neumann, [random_problem(rng, 5) for _ in "ab"]):
+        ensemble = vs.solve_many(problems, [0.0, 2.0])
+        assert not ensemble.together.any()
+        for i, problem in enumerate(problems):
+            alone = vs.solve(problem, [0.0, 2.0])
+            assert np.array_equal(ensemble.q[i], alone.q)
+            assert np.array_equal(ensemble.error[i], alone.error)
+
+
+def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
+    ensemble = vs.solve_many({**starts(rng, 3, 3), "normalize": True}, [1.0])
+    ensemble.to_npz(tmp_path / "many.npz")
+    with np.load(tmp_path / "many.npz") as archive:
+        assert np.array_equal(archive["frame"], ensemble.frame)
+        assert archive["outcome"].tolist() == ["solved"] * 3
+
+
+@pytest.mark.parametrize(
+    ("problems", "words"),
+    [
+        ([], "one problem at least"),
+        (7, "a list of problems"),
+        ([3], "problems\\[0\\]: required a problem"),
+        ({"A": [3, 2, 1], "q": np.ones((4, 3))}, "problems.q_dot: required this field"),
+        ({"A": [3, 2, 1], "q": np.ones((4, 3)), "q_dot": np.ones((3, 3))}, "shape \\(3, 3\\)"),
+        ({"A": [3, 2], "q": np.ones((4, 3)), "q_dot": np.ones((4, 3))}, "A: required 3 numbers"),
+        ({"A": [3, 2, 1], "q": np.ones((0, 3)), "q_dot": np.ones((0, 3))}, "one row at least"),
+        ({"A": [3, 2, 1], "q": [[1, 0], [1]], "q_dot": np.ones((2, 3))}, "rows of one length"),
+    ],
+)
+def test_bad_problems_are_refused_in_a_sentence(problems: Any, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        vs.solve_many(problems, [1.0])
+
+
+def test_more_memory_than_the_limit_is_refused_before_the_work(rng: np.random.Generator) -> None:
+    given = {**starts(rng, 1000, 3), "normalize": True}
+    with pytest.raises(InvalidInput, match=r"1000 problems at 1000000 times: 112 GB"):
+        vs.solve_many(given, {"start": 0, "stop": 1, "count": 1_000_000})
+    with pytest.raises(InvalidInput, match="at most 1e-06 GB"):
+        vs.solve_many(given, [1.0], most_bytes=1000)
+
+
+def test_budgets_end_ensembles(rng: np.random.Generator) -> None:
+    with pytest.raises(OverBudget):
+        vs.solve_many({**starts(rng, 20_000, 3), "normalize": True}, [1.0], budget_s=0.05)
+
+
+def test_progress_counts_problems(rng: np.random.Generator) -> None:
+    seen: list[tuple[float, float]] = []
+    given = {**starts(rng, 300, 3), "normalize": True}
+    vs.solve_many(given, [1.0], progress=lambda done, total: seen.append((done, total)))
+    assert seen
+    assert all(total == 300 for _, total in seen)
+
+
+def test_tori_name_what_has_none(rng: np.random.Generator) -> None:
+    given = starts(rng, 6, 4)
+    given["q_dot"][1] = 0.0
+    given["q"][2, 0] = np.nan
+    given["q"][3, 0] = given["q_dot"][3, 0] = 0.0
+    given["q"][4, 0] = 0.0
+    tori = vs.tori(**given, normalize=True)
+    assert tori.outcome.tolist() == [
+        "solved",
+        "at-rest",
+        "invalid-input",
+        "fewer-phases",
+        "solved",
+        "solved",
+    ]
+    for i in np.flatnonzero(tori.solved):
+        alone = vs.torus(single(given, i))
+        assert tori.frequencies_t[i] == pytest.approx(alone.frequencies_t, rel=1e-13)
+        assert tuple(tori.origins[i]) == alone.origins
+    assert np.isnan(tori.phases[1]).all()
+    one_body = vs.tori([3, 2, 1.5, 1], given["q"][4:], given["q_dot"][4:], normalize=True)
+    assert len(one_body) == 2
