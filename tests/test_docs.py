@@ -19,7 +19,15 @@ from veselova import __version__
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
-PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))]
+#: What the build of the guide makes of examples/gallery is no page of the repository.
+PAGES = [
+    "README.md",
+    *sorted(
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "docs").rglob("*.md")
+        if "gallery" not in path.relative_to(ROOT).parts
+    ),
+]
 #: Numbers whose size alone is promised: roundings, which differ from one processor to another.
 ROUNDING = 1e-6
 

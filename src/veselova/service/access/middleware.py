@@ -24,10 +24,10 @@ __all__ = ["UNLIMITED", "Access", "Policy"]
 #: Paths for the probes of orchestrators: neither keys nor limits.
 UNLIMITED = frozenset({"/healthz", "/readyz"})
 
-#: The contract of the service and the explorer are no secret: without a key, within the limit of
-#: the address.
-_PUBLIC = frozenset({"/", "/docs", "/openapi.json"})
-_PUBLIC_FOLDER = "/explorer/"
+#: The contract of the service, the explorer and the guide are no secret: without a key, within the
+#: limit of the address.
+_PUBLIC = frozenset({"/", "/docs", "/guide", "/openapi.json"})
+_PUBLIC_FOLDERS = ("/explorer/", "/guide/")
 
 #: Methods for which a key of scope ``read`` is enough, and paths that tell of what all do.
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -158,7 +158,7 @@ class Access:
 
 
 def _is_public(path: str) -> bool:
-    return path in _PUBLIC or path.startswith(_PUBLIC_FOLDER)
+    return path in _PUBLIC or path.startswith(_PUBLIC_FOLDERS)
 
 
 def _scope_of(scope: Scope) -> str:

@@ -29,6 +29,7 @@ from veselova.service.api.problem_details import Refused, problem_code, problem_
 from veselova.service.api.settings import Settings
 from veselova.service.http.connections import report_exhaustion
 from veselova.service.http.explorer import add_explorer
+from veselova.service.http.guide import add_guide
 from veselova.service.http.hosts import Hosts, allowed_hosts
 from veselova.service.http.job_routes import job_router
 from veselova.service.http.job_service import JobService
@@ -103,6 +104,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         app.router.routes.extend(part.routes)
     add_documentation(app)
     add_explorer(app)
+    add_guide(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
         app.add_exception_handler(
             kind,

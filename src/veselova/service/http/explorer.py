@@ -17,7 +17,7 @@ from starlette.responses import PlainTextResponse, Response
 
 from veselova.service.answers.etag import matches
 
-__all__ = ["BUNDLE", "FILES", "MISSING", "add_explorer"]
+__all__ = ["BUNDLE", "FILES", "MISSING", "BundledFile", "add_explorer", "find_file"]
 
 #: Where the build puts the bundle (``explorer/build.py``); no commit has it.
 BUNDLE = Path(__file__).parents[2] / "explorer"
@@ -57,7 +57,7 @@ _COMPRESSED = frozenset({"font/woff2", "image/png"})
 
 
 @dataclass(frozen=True)
-class _File:
+class BundledFile:
     """A file of the bundle, read when it is asked for first."""
 
     path: Path
@@ -83,10 +83,10 @@ class _File:
         known = _TYPES.get(self.path.suffix)
         return known or mimetypes.guess_type(self.path.name)[0] or "application/octet-stream"
 
-    def answer(self, request: Request, cache_control: str) -> Response:
+    def answer(self, request: Request, cache_control: str, policy: str = _POLICY) -> Response:
         """Return the file, compressed where the client takes that; 304 where the client has it."""
         headers = {"ETag": self.etag, "Cache-Control": cache_control, "Vary": "Accept-Encoding"}
-        headers["Content-Security-Policy"] = _POLICY
+        headers["Content-Security-Policy"] = policy
         if matches(request.headers.get("if-none-match"), self.etag, exists=True):
             return Response(status_code=304, headers=headers)
         content = self.content
@@ -97,7 +97,7 @@ class _File:
         return Response(content, headers=headers, media_type=self.media_type)
 
 
-def _find(path: Path) -> _File | None:
+def find_file(path: Path) -> BundledFile | None:
     """Return a file as it is now, so that a bundle may be built under a server that runs."""
     try:
         return _file(path, path.stat().st_mtime_ns) if path.is_file() else None
@@ -105,23 +105,23 @@ def _find(path: Path) -> _File | None:
         return None
 
 
-@lru_cache(maxsize=256)
-def _file(path: Path, _: int) -> _File:
-    return _File(path)
+@lru_cache(maxsize=1024)
+def _file(path: Path, _: int) -> BundledFile:
+    return BundledFile(path)
 
 
 def add_explorer(app: FastAPI, bundle: Path = BUNDLE) -> None:
     """Serve the explorer at ``/``, or one sentence where it was not built."""
 
     async def index(request: Request) -> Response:
-        page = _find(bundle / "index.html")
+        page = find_file(bundle / "index.html")
         if page is None:
             return PlainTextResponse(MISSING, status_code=404)
         return page.answer(request, "no-cache")
 
     async def file(request: Request) -> Response:
         # The name is one part of a path: it leads to no other folder.
-        found = _find(bundle / "explorer" / request.path_params["name"])
+        found = find_file(bundle / "explorer" / request.path_params["name"])
         if found is None:
             return PlainTextResponse("The explorer has no such file.\n", status_code=404)
         return found.answer(request, _FOR_EVER)

@@ -1,0 +1,155 @@
+"""Sphinx's configuration of the guide: pages as they lie in the repository, none moved.
+
+The source folder is the repository, so that every link between pages is the one a code host
+follows. ``docs/build`` builds the site.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "src"))
+# One thread, as everywhere in the checks: a gallery example is small.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from veselova import __version__  # noqa: E402
+
+project = "veselova"
+author = "The veselova developers"
+project_copyright = author
+version = release = __version__
+
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/**"]
+exclude_patterns = [
+    ".*",
+    "analytic",
+    "benchmarks",
+    "build",
+    "examples",
+    "explorer",
+    "numeric",
+    "service",
+    "src",
+    "tests",
+    "docs/gallery/images",
+]
+extensions = [
+    "matplotlib.sphinxext.plot_directive",
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "sphinxcontrib.katex",
+]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 90
+
+#: KaTeX sets the formulas when the site is built, out of the packages that the explorer is locked
+#: to. Pages have its style and fonts, which ``docs/build`` copies, and none of its scripts.
+katex_prerender = True
+katex_js_path = str(ROOT / "explorer" / "node_modules" / "katex" / "dist" / "katex.min.js")
+katex_css_path = "katex/katex.min.css"
+nodejs_binary = os.environ.get("VESELOVA_NODE", "node")
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples/gallery",
+    "gallery_dirs": "docs/gallery",
+    "filename_pattern": r"plot_",
+    "ignore_pattern": r"drawing\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    "capture_repr": (),
+    "matplotlib_animations": False,
+    "thumbnail_size": (480, 360),
+}
+plot_formats = [("png", 150)]
+plot_html_show_formats = False
+plot_html_show_source_link = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"veselova {__version__}"
+html_static_path = ["_static", "../build/guide/static"]
+html_favicon = "_static/icon.svg"
+html_context = {"default_mode": "auto"}
+html_extra_path = ["_extra"]
+html_css_files = ["guide.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "navbar_align": "left",
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+}
+
+#: The sites that links lead to are asked by ``docs/build links``, where there is a network.
+linkcheck_timeout = 20
+linkcheck_ignore = [r"http://(127\.0\.0\.1|localhost).*", r".*\.example(/.*)?$"]
+
+
+#: What sphinx-gallery puts around an example for downloads. The page has the code; a folder of
+#: scripts in the bundle would be taken for modules of the package.
+_DOWNLOADS = re.compile(
+    r"^\.\. only:: html\n\n    \.\. note::\n        :class: sphx-glr-download-link-note.*?(?=^\S)"
+    r"|^\.\. _sphx_glr_download_.*",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def _drop_downloads(app: Any, name: str, source: list[str]) -> None:
+    if name.startswith("docs/gallery/"):
+        source[0] = _DOWNLOADS.sub("", source[0])
+
+
+#: A line of a table in a docstring: a name, two spaces or more, what it means.
+_ROW = re.compile(r"(\S+(?: \S+)*) {2,}(\S.*)")
+
+
+def _adapt_docstring(
+    app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """Turn what docstrings have of plain text into reStructuredText: tables of two columns become
+    lists, and bars around absolute values are escaped.
+    """
+    adapted: list[str] = []
+    in_table = False
+    for line in lines:
+        row = _ROW.fullmatch(line)
+        if row:
+            adapted += [] if in_table or not adapted or not adapted[-1] else [""]
+            name_of = row[1] if "``" in row[1] else f"``{row[1]}``"
+            line = f"- {name_of}: {row[2]}"
+        elif in_table and line.startswith("  "):
+            line, row = f"  {line.strip()}", _ROW.match("x  x")
+        elif in_table and line:
+            adapted.append("")
+        in_table = row is not None
+        parts = line.split("``")
+        parts[::2] = [part.replace("|", "\\|") for part in parts[::2]]
+        adapted.append("``".join(parts))
+    lines[:] = adapted
+
+
+def setup(app: Any) -> None:
+    """Connect what this file adds to Sphinx."""
+    app.connect("autodoc-process-docstring", _adapt_docstring)
+    app.connect("source-read", _drop_downloads)

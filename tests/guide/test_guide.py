@@ -1,0 +1,194 @@
+"""The guide: built without a warning, complete, served with its own policy, searched offline."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from fastapi import FastAPI
+from guide_site import ROOT, build_or_skip
+from starlette.testclient import TestClient
+
+import veselova
+from conftest import Server, running_server
+from veselova import curves, theta
+from veselova.service.http import guide
+
+CHROMIUM = shutil.which("chromium")
+
+
+@pytest.fixture(scope="module")
+def site() -> Path:
+    """Return the folder of the site."""
+    return build_or_skip()
+
+
+class _Page(HTMLParser):
+    """The links of a page, what it loads, and its anchors."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note an element."""
+        values = {name: value or "" for name, value in attrs}
+        self.anchors |= {values[name] for name in ("id", "name") if name in values}
+        if tag == "a" and "href" in values:
+            self.links.append(values["href"])
+        elif tag in ("img", "script", "source") and "src" in values:
+            self.loaded.append(values["src"])
+        elif tag == "link" and values.get("rel") in ("stylesheet", "icon", "preload"):
+            self.loaded.append(values["href"])
+
+
+def test_every_link_inside_the_site_leads_somewhere(site: Path) -> None:
+    pages = {path.resolve(): _Page(path) for path in site.rglob("*.html")}
+    assert len(pages) > 40
+    for path, page in pages.items():
+        for link in page.links + page.loaded:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            assert target.is_file(), f"{path.relative_to(site)} links to {link}"
+            if parts.fragment and target in pages:
+                anchors = pages[target].anchors
+                assert unquote(parts.fragment) in anchors, f"{path.name} links to {link}"
+
+
+def test_nothing_is_loaded_from_another_site(site: Path) -> None:
+    for path in site.rglob("*.html"):
+        for address in _Page(path).loaded:
+            assert not urlsplit(address).netloc, f"{path.name} loads {address}"
+    for path in site.rglob("*.css"):
+        assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", path.read_text()), path
+
+
+def test_formulas_are_set_when_the_site_is_built(site: Path) -> None:
+    text = (site / "docs" / "toolkit.html").read_text()
+    assert 'class="katex-display"' in text
+    assert not [path for path in site.rglob("*.html") if "katex-error" in path.read_text()]
+    fonts = list((site / "_static" / "katex" / "fonts").glob("*.woff2"))
+    assert len(fonts) > 10
+
+
+def test_every_public_name_has_its_entry(site: Path) -> None:
+    pages = [_Page(path) for path in (site / "docs" / "reference" / "api").glob("*.html")]
+    anchors = set().union(*(page.anchors for page in pages))
+    names = [f"veselova.{name}" for name in veselova.__all__ if name != "__version__"]
+    names += [f"veselova.theta.{name}" for name in theta.__all__]
+    names += [f"veselova.curves.{name}" for name in curves.__all__]
+    assert not {name for name in names if name not in anchors}
+
+
+def test_every_page_stands_in_the_contents(site: Path) -> None:
+    listed = re.findall(r"^\.?[\w./-]+$", _contents(), re.MULTILINE)
+    names = {Path(name).name for name in listed}
+    for path in (ROOT / "docs").rglob("*.md"):
+        if "gallery" not in path.parts:
+            assert path.stem in names, path
+
+
+def _contents() -> str:
+    indices = [path.read_text() for path in (ROOT / "docs").rglob("index.md")]
+    blocks = [re.findall(r"^```\{toctree\}\n(.*?)^```", text, re.M | re.S) for text in indices]
+    return "\n".join(sum(blocks, ["index"]))
+
+
+EXAMPLES = sorted((ROOT / "examples" / "gallery").glob("plot_*.py"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_are_short_and_have_a_picture(path: Path, site: Path) -> None:
+    text = path.read_text()
+    assert text.count("\n") <= 90
+    title = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
+    page = (site / "docs" / "gallery" / f"{path.stem}.html").read_text()
+    assert title in page
+    pictures = re.findall(rf"_images/(sphx_glr_{path.stem}_\d+\.png)", page)
+    assert pictures
+    assert all((site / "_images" / name).stat().st_size > 10_000 for name in pictures)
+
+
+def test_the_site_is_public_and_has_its_own_policy(site: Path, tmp_path: Path) -> None:
+    with running_server(tmp_path, "--require-keys", awaited="/healthz") as server:
+        assert server.get("/guide").headers["location"] == "/guide/"
+        assert server.get("/guide/").text == (site / "index.html").read_text()
+        page = server.get("/guide/docs/index.html")
+        assert page.status_code == 200
+        policy = page.headers["content-security-policy"]
+        scripts = re.search(r"script-src ([^;]*)", policy)
+        assert scripts
+        assert "unsafe" not in scripts[1]
+        assert "default-src 'none'" in policy
+        assert server.get("/guide/_static/guide.css").headers["content-type"].startswith("text/css")
+        for name in ("%2e%2e/version.py", "nothing.html", "..%2f..%2fpyproject.toml", "docs"):
+            assert server.get(f"/guide/{name}").status_code == 404
+
+
+def test_without_a_site_one_sentence_says_how_to_get_it(tmp_path: Path) -> None:
+    app = FastAPI()
+    guide.add_guide(app, tmp_path)
+    answer = TestClient(app).get("/guide/docs/index.html")
+    assert answer.status_code == 404
+    assert answer.text.count(".\n") == 1
+    assert "docs/build" in answer.text
+
+
+@pytest.fixture(scope="module")
+def browser(site: Path) -> Iterator[Any]:
+    """Return chromium, without a window and without a network beyond this machine."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    if CHROMIUM is None:
+        pytest.skip("needs chromium in PATH")
+    arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    with playwright.sync_playwright() as tool:
+        running = tool.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield running
+        running.close()
+
+
+def test_search_finds_the_riemann_matrix_offline(browser: Any, server: Server) -> None:
+    faults: list[str] = []
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on(
+        "request",
+        lambda sent: None if sent.url.startswith(server.url) else faults.append(sent.url),
+    )
+    page.goto(f"{server.url}/guide/")
+    page.wait_for_url("**/docs/index.html")
+    page.keyboard.press("Control+k")
+    page.locator("#pst-search-dialog input[type=search]").fill("Riemann matrix")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/search.html?q=Riemann*")
+    found = page.locator("#search-results a[href*='toolkit.html']").first
+    found.wait_for()
+    found.click()
+    page.wait_for_url("**/docs/toolkit.html*")
+    assert "Riemann matrix" in page.inner_text("article")
+    page.close()
+    assert not faults
+
+
+def test_the_site_needs_no_server(browser: Any, site: Path) -> None:
+    page = browser.new_page()
+    page.goto((site / "docs" / "toolkit.html").as_uri())
+    width = page.locator(".katex-display .katex-html").first.bounding_box()["width"]
+    assert width > 100
+    loaded = "[...document.fonts].filter((font) => font.status === 'loaded').map((f) => f.family)"
+    assert any("KaTeX" in name for name in page.evaluate(loaded))
+    page.close()
