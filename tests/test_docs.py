@@ -105,7 +105,7 @@ def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
         env=environment,
     )
     assert answer.returncode == 0, answer.stderr
-    for option in ("--plot", "--output"):
+    for option in ("--plot", "--output", "--animate"):
         if option in words:
             assert (tmp_path / words[words.index(option) + 1]).exists()
 

@@ -137,6 +137,20 @@ class Problem(ABC):
         return None
 
     @property
+    def inverse_inertia(self) -> Array | None:
+        """Return 𝓘⁻¹ of a body in three dimensions up to a factor, (3, 3) along the body axes, from
+        which pictures take its shape; None where there is no such body.
+        """
+        return None
+
+    @property
+    def rolling_radius(self) -> float | None:
+        """Return the radius of the ball that pictures show on its plane, None for what does not
+        roll.
+        """
+        return None
+
+    @property
     def extent(self) -> float:
         """Return how large entries of the bounded series may be: 1 on a sphere, else the longest
         semiaxis where that is more.

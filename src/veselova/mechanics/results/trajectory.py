@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
@@ -296,6 +297,27 @@ class Trajectory(SampledMotion):
         from veselova.mechanics.results.plot import picture
 
         return picture(self.in_order_of_time())
+
+    def view(self, height: int = 640) -> Any:
+        """Return a widget that plays the motion in a notebook, ``height`` pixels high (100 to
+        10000): the page of ``to_html``.
+
+        Its attributes ``t`` (a text), ``speed`` and ``playing`` are those of the page, both ways.
+        Raises BackendMissing without anywidget, and as ``to_html`` does.
+        """
+        return import_module("veselova.notebook").view(self, height)
+
+    def animate(self, path: str | Path, seconds: float = 10, frames_per_second: int = 25) -> None:
+        """Write a film of the motion from its first to its last time, by the ending of the path:
+        .gif, or .mp4 by ffmpeg.
+
+        It shows a body in three dimensions in space, e_1 upwards, or a ball on its plane. Where the
+        motion is known at its own times only, each is one frame. Raises InvalidInput for another
+        ending, system or fewer than two times, and BackendMissing without matplotlib or ffmpeg.
+        """
+        from veselova.mechanics.results.animation import animate
+
+        animate(self, path, seconds, frames_per_second)
 
     def to_html(self, target: Target) -> None:
         """Write the motion as one page that plays in a browser, without a server or a network.

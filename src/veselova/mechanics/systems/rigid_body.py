@@ -140,6 +140,11 @@ class RigidBody(Problem):
         """Replace the natural frame, rounded from doubles, where a subclass knows more digits."""
 
     @property
+    def inverse_inertia(self) -> Array:
+        """Return 𝓘⁻¹, (3, 3) along the body axes."""
+        return self.inverse
+
+    @property
     def axes(self) -> Array | None:
         """Return the principal axes as columns, (3, 3), where a matrix was given."""
         return None if self.wide_axes is None else self.wide_axes.rounded

@@ -103,6 +103,11 @@ class RollingBall(RigidBody):
         return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
 
     @property
+    def rolling_radius(self) -> float:
+        """Return the radius of the ball."""
+        return float(self.ball.radius)
+
+    @property
     def start(self) -> Series:
         """Return the series at t = 0."""
         contact = np.array([[float(x) for x in self.ball.contact]])

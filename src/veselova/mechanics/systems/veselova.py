@@ -214,6 +214,12 @@ class Veselova(TorusProblem):
         return read_only(to_spheroconic(self.A, self.q))
 
     @property
+    def inverse_inertia(self) -> Array | None:
+        """Return A (3, 3) along the body axes, for n = 3."""
+        axes = np.eye(self.A.size) if self.axes is None else self.axes
+        return axes @ np.diag(self.A) @ axes.T if self.A.size == 3 else None
+
+    @property
     def title(self) -> str:
         """Return the system and its dimension."""
         return f"{self.system}, n = {self.n}" + (

@@ -40,6 +40,10 @@ _Output = Annotated[
 _Plot = Annotated[
     Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")
 ]
+_Animate = Annotated[
+    Path | None,
+    typer.Option(help="write the motion as a film (.mp4, .gif) or as a page that plays (.html)"),
+]
 _Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
 
@@ -128,7 +132,13 @@ def demo(method: _Method = None, plot: _Plot = None) -> None:
 
 
 @app.command()
-def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot = None) -> None:
+def solve(
+    file: _File,
+    json: _Json = False,
+    output: _Output = None,
+    plot: _Plot = None,
+    animate: _Animate = None,
+) -> None:
     """Solve a motion with one engine."""
     from veselova.service.api.json_documents import trajectory_document
     from veselova.service.api.request_models import TrajectoryRequest, read_request
@@ -138,17 +148,22 @@ def solve(file: _File, json: _Json = False, output: _Output = None, plot: _Plot 
     document = _document(file)
     request = read_request(TrajectoryRequest, document)
     _check_files(output, plot)
+    _check_file("--animate", animate, _FILMS)
     with _limits(request):
         trajectory = solve_request(request)
     if output:
         _write(trajectory, output, request.outputs)
     if plot:
         _draw(trajectory, plot)
+    if animate:
+        _film(trajectory, animate)
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
         print_trajectory(terminal(), trajectory, request.outputs)
         _say_written(output, plot)
+        if animate:
+            print(f"Film: {animate}")
 
 
 @app.command()
@@ -319,6 +334,7 @@ def _without_motion(document: Any, but: tuple[str, ...] = ()) -> Any:
 
 _WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
+_FILMS = (".mp4", ".gif", ".html")
 
 
 def _check_files(output: Path | None, plot: Path | None) -> None:
@@ -357,3 +373,10 @@ def _say_written(output: Path | None, plot: Path | None) -> None:
 
 def _draw(subject: Any, path: Path) -> None:
     subject.plot().savefig(path, dpi=130)
+
+
+def _film(trajectory: Any, path: Path) -> None:
+    if path.suffix.lower() == ".html":
+        trajectory.to_html(path)
+    else:
+        trajectory.animate(path)

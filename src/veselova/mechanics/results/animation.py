@@ -1,0 +1,276 @@
+"""A motion as a film: the body in space, or the ball on its plane, frame by frame by matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.problem import Problem
+
+__all__ = ["FILMS", "Filmed", "animate"]
+
+Array = NDArray[np.float64]
+
+#: The endings of films.
+FILMS = (".gif", ".mp4")
+
+#: Colours of e_1, e_2, e_3, of Ω and of trails (Okabe and Ito).
+_AXES = ("#56B4E9", "#D55E00", "#009E73")
+_OMEGA = "#E69F00"
+_TRAIL = "#0072B2"
+
+#: The longest half axis of the body's ellipsoid, and lengths of arrows, against a sphere of 1.
+_SIZE = 0.75
+_LONGEST_OMEGA = 1.0
+
+#: The edges of the cube in the unit sphere, (3, 3·12): two ends and a gap each.
+_BOX = np.array(
+    [
+        place
+        for axis in range(3)
+        for side in ((-1, -1), (-1, 1), (1, -1), (1, 1))
+        for place in (np.insert(side, axis, -1), np.insert(side, axis, 1), np.full(3, np.nan))
+    ]
+).T / np.sqrt(3)
+
+#: Half the width of the picture of a ball, in radii.
+_WINDOW = 3.0
+
+#: Frames of the longest film.
+_MOST_FRAMES = 10_000
+
+
+class Filmed(Protocol):
+    """A motion as films need it."""
+
+    @property
+    def problem(self) -> Problem:
+        """Return the problem."""
+
+    @property
+    def times(self) -> Array:
+        """Return the times, (N,)."""
+
+    @property
+    def dense(self) -> Callable[[Any], Filmed] | None:
+        """Return what evaluates the motion at other times, None where it is known at its own."""
+
+    def series(self, name: str) -> Array:
+        """Return one of the problem's outputs by name."""
+
+    def in_order_of_time(self) -> Filmed:
+        """Return the motion with its times in increasing order."""
+
+
+def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second: int) -> None:
+    """Write a film of a motion of a body in three dimensions, or of a ball; its ending says which
+    kind: .gif by pillow, .mp4 by ffmpeg.
+
+    Raises InvalidInput for another ending, another dimension or a film without frames, and
+    BackendMissing without matplotlib or ffmpeg.
+    """
+    film = Path(path)
+    _require(motion, film, seconds, frames_per_second)
+    writer = _writer(film, frames_per_second)
+    shown = _frames(motion, max(2, round(seconds * frames_per_second)))
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 6.4), dpi=80)
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_subplot(projection="3d", position=(0.0, 0.0, 1.0, 0.94))
+    axes.set_axis_off()
+    radius = motion.problem.rolling_radius
+    scene = _Body(axes, shown) if radius is None else _Ball(axes, shown, radius)
+    figure.suptitle(motion.problem.title, fontsize=9)
+    label = figure.text(0.03, 0.03, "", fontsize=10)
+    with writer.saving(figure, str(film), 80):
+        for k, t in enumerate(shown.times):
+            scene.show(k)
+            label.set_text(f"{motion.problem.time} = {t:.4g}")
+            writer.grab_frame()
+
+
+def _require(motion: Filmed, film: Path, seconds: float, frames_per_second: int) -> None:
+    """Refuse what makes no film, before any of the work."""
+    if film.suffix.lower() not in FILMS:
+        raise InvalidInput(("path",), f"a file name ending in {' or '.join(FILMS)}", str(film))
+    problem = motion.problem
+    if problem.inverse_inertia is None or "frame" not in problem.outputs:
+        raise InvalidInput(("problem",), "a body in three dimensions, or a ball", problem.title)
+    for name, value in (("seconds", seconds), ("frames_per_second", frames_per_second)):
+        number = not isinstance(value, bool) and isinstance(value, (int, float))
+        if not number or not 0 < value < float("inf"):
+            raise InvalidInput((name,), "a number greater than 0", show(value))
+    if seconds * frames_per_second > _MOST_FRAMES:
+        given = f"{seconds * frames_per_second:.6g}"
+        raise InvalidInput(("seconds",), f"a film of at most {_MOST_FRAMES} frames", given)
+
+
+def _writer(film: Path, frames_per_second: int) -> Any:
+    """Return what writes films of this kind."""
+    try:
+        from matplotlib.animation import FFMpegWriter, PillowWriter
+    except ImportError:
+        raise BackendMissing("matplotlib", "a film", "pip install matplotlib") from None
+    if film.suffix.lower() == ".gif":
+        return PillowWriter(fps=frames_per_second)
+    if not FFMpegWriter.isAvailable():
+        install = "apt-get install ffmpeg, or write a .gif"
+        raise BackendMissing("ffmpeg", "a film in .mp4", install)
+    return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+
+
+def _frames(motion: Filmed, count: int) -> Filmed:
+    """Return the motion at so many times in equal steps, or at its own where these are all."""
+    first, last = (float(motion.times.min()), float(motion.times.max()))
+    if motion.times.size < 2 or first == last:
+        raise InvalidInput(
+            ("times",), "two different times or more", f"{motion.times.size} time(s)"
+        )
+    return (
+        motion.dense(np.linspace(first, last, count)) if motion.dense else motion.in_order_of_time()
+    )
+
+
+def _in_space(frame: Array) -> Array:
+    """Return the rotations (…, 3, 3) from the body to the picture, whose axes are e_2, e_3, e_1."""
+    return np.swapaxes(frame[..., [1, 2, 0]], -1, -2)
+
+
+def _surface(turn: Array, half_axes: Array, axes: Array, across: int, along: int) -> list[Array]:
+    """Return the coordinates of a grid on an ellipsoid in space, (across, along) each."""
+    latitude, longitude = np.meshgrid(
+        np.linspace(0, np.pi, across), np.linspace(0, 2 * np.pi, along), indexing="ij"
+    )
+    unit = np.stack(
+        [
+            np.sin(latitude) * np.cos(longitude),
+            np.sin(latitude) * np.sin(longitude),
+            np.cos(latitude),
+        ]
+    )
+    points = np.einsum("ij,jk,kab->iab", turn, axes * half_axes, unit)
+    return [points[0], points[1], points[2]]
+
+
+def _Omega(shown: Filmed) -> Array:
+    """Return the angular velocity in the body, (N, 3)."""
+    if "Omega" in shown.problem.outputs:
+        return shown.series("Omega")
+    omega = shown.series("omega")
+    return np.stack([omega[:, 2, 1], omega[:, 0, 2], omega[:, 1, 0]], axis=1)
+
+
+class _Body:
+    """The body's ellipsoid (x,𝓘x) = 1 in space with its box and axes; e_1 points upwards."""
+
+    def __init__(self, axes: Any, shown: Filmed) -> None:
+        self._axes = axes
+        self._turns = _in_space(shown.series("frame"))
+        squares, self._principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
+        self._half = _SIZE * np.sqrt(squares / squares.max())
+        omega = np.einsum("nij,nj->ni", self._turns, _Omega(shown))
+        largest = float(np.linalg.norm(omega, axis=1).max(initial=0.0))
+        self._omega = omega * (_LONGEST_OMEGA / largest if largest else 0.0)
+        self._moving: list[Any] = []
+        self._draw_space()
+        (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2)
+
+    def _draw_space(self) -> None:
+        axes = self._axes
+        axes.set_xlim(-1, 1)
+        axes.set_ylim(-1, 1)
+        axes.set_zlim(-1, 1)
+        axes.set_box_aspect((1, 1, 1), zoom=1.35)
+        axes.view_init(elev=22, azim=-55)
+        angle = np.linspace(0, 2 * np.pi, 97)
+        axes.plot(np.cos(angle), np.sin(angle), 0 * angle, color="0.7", linewidth=0.8)
+        for name, end, colour in zip(
+            ("$e_1$", "$e_2$", "$e_3$"), ((0, 0, 1.1), (1.1, 0, 0), (0, 1.1, 0)), _AXES, strict=True
+        ):
+            axes.plot(*zip((0, 0, 0), end, strict=True), color=colour, linewidth=1.6)
+            axes.text(*(1.07 * np.array(end)), name, color=colour)
+
+    def show(self, k: int) -> None:
+        """Show frame k."""
+        for artist in self._moving:
+            artist.remove()
+        axes = self._axes
+        turn = self._turns[k]
+        grid = _surface(turn, self._half, self._principal, 13, 25)
+        self._moving = [
+            axes.plot_surface(*grid, color="#9FB4CC", alpha=0.35, linewidth=0.2, edgecolor="0.55")
+        ]
+        edges = turn @ self._principal @ (self._half[:, None] * _BOX)
+        self._moving += axes.plot(*edges, color="#12385C", linewidth=1.1)
+        for axis in range(3):
+            tip = turn @ self._principal[:, axis] * (self._half[axis] + 0.2)
+            self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color="0.2", linewidth=1)
+        tip = self._omega[k]
+        self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color=_OMEGA, linewidth=2.4)
+        self._trail.set_data_3d(*self._omega[: k + 1].T)
+
+
+class _Ball:
+    """The ball on its plane, which the picture follows, with the path of its contact point."""
+
+    def __init__(self, axes: Any, shown: Filmed, radius: float) -> None:
+        self._axes = axes
+        self._radius = radius
+        self._turns = _in_space(shown.series("frame"))
+        self._path = shown.series("position")
+        self._moving: list[Any] = []
+        axes.set_box_aspect((1, 1, 1), zoom=1.5)
+        axes.view_init(elev=24, azim=-60)
+        axes.set_zlim(*(radius * (1.0 + np.array([-_WINDOW, _WINDOW]))))
+        (self._trail,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.4)
+
+    def show(self, k: int) -> None:
+        """Show frame k."""
+        for artist in self._moving:
+            artist.remove()
+        axes = self._axes
+        x, y = self._path[k]
+        grid = _surface(self._turns[k], self._radius * np.ones(3), np.eye(3), 17, 33)
+        octants = np.arange(16)[:, None] // 8 + np.arange(32)[None, :] // 8
+        colours = np.where((octants % 2 == 0)[..., None], _rgb("#56B4E9"), _rgb("#F4F7FA"))
+        self._moving = [
+            axes.plot_surface(
+                grid[0] + x,
+                grid[1] + y,
+                grid[2] + self._radius,
+                facecolors=colours,
+                rstride=1,
+                cstride=1,
+                linewidth=0,
+                antialiased=False,
+            )
+        ]
+        half = _WINDOW * self._radius
+        axes.set_xlim(x - half, x + half)
+        axes.set_ylim(y - half, y + half)
+        self._moving += axes.plot(*self._floor(x, y, half), color="0.82", linewidth=0.7)
+        behind = self._path[: k + 1]
+        near = np.all(np.abs(behind - self._path[k]) <= half, axis=1)
+        self._trail.set_data_3d(*np.where(near, behind.T, np.nan), np.zeros(k + 1))
+
+    def _floor(self, x: float, y: float, half: float) -> Array:
+        """Return the lines of the plane at whole multiples of the radius, with gaps, (3, …)."""
+        lines = []
+        for axis, (centre, other) in enumerate(((x, y), (y, x))):
+            first, last = ((centre - half) / self._radius, (centre + half) / self._radius)
+            for place in self._radius * np.arange(np.ceil(first), np.floor(last) + 1):
+                ends = np.array([[place, place, np.nan], [other - half, other + half, np.nan]])
+                lines.append(ends if axis == 0 else ends[::-1])
+        flat = np.concatenate(lines, axis=1)
+        return np.vstack([flat, np.zeros(flat.shape[1])])
+
+
+def _rgb(colour: str) -> Array:
+    return np.array([int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)])

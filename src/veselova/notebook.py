@@ -1,0 +1,90 @@
+"""A motion in a notebook: the page of ``motion_page`` as a widget, whose time Python can set."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra, show
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.motion_page import page
+
+__all__ = ["FRONT", "view"]
+
+#: The heights of a widget, in pixels, that show something.
+_HEIGHTS = (100, 10_000)
+
+#: The part in the browser: the page in a frame, and both ways between its time and the widget's.
+#: The frame has no origin, so that it shares no style, script or storage with the notebook.
+FRONT = """
+const NAMES = ["t", "speed", "playing"];
+export default {
+  render({ model, el }) {
+    const frame = document.createElement("iframe");
+    frame.setAttribute("sandbox", "allow-scripts allow-downloads");
+    frame.title = model.get("title");
+    frame.style.width = "100%";
+    frame.style.border = "0";
+    const resize = () => (frame.style.height = `${model.get("height")}px`);
+    resize();
+    let heard = false;
+    const hear = ({ source, data }) => {
+      if (source !== frame.contentWindow || !data?.veselova) return;
+      heard = true;
+      for (const name of NAMES) model.set(name, data.veselova[name]);
+      model.save_changes();
+      heard = false;
+    };
+    const tell = NAMES.map((name) => [`change:${name}`, () => {
+      if (heard) return;
+      frame.contentWindow?.postMessage({ veselova: { [name]: model.get(name) } }, "*");
+    }]);
+    window.addEventListener("message", hear);
+    model.on("change:height", resize);
+    for (const [event, act] of tell) model.on(event, act);
+    frame.srcdoc = model.get("page");
+    el.append(frame);
+    return () => {
+      window.removeEventListener("message", hear);
+      model.off("change:height", resize);
+      for (const [event, act] of tell) model.off(event, act);
+    };
+  },
+};
+"""
+
+
+def view(trajectory: Trajectory, height: int) -> Any:
+    """Return the widget that shows a motion; raises BackendMissing without anywidget or the bundle
+    of the explorer, and InvalidInput for a height that shows nothing.
+    """
+    low, high = _HEIGHTS
+    if isinstance(height, bool) or not isinstance(height, int) or not low <= height <= high:
+        raise InvalidInput(("height",), f"a whole number from {low} to {high}", show(height))
+    widget = _widget()
+    first = repr(float(trajectory.times.min()))
+    return widget(page=page(trajectory), title=trajectory.problem.title, height=height, t=first)
+
+
+@lru_cache(maxsize=1)
+def _widget() -> Any:
+    """Return the class of the widget."""
+    try:
+        import anywidget
+        import traitlets
+    except ImportError:
+        install = install_extra("notebook")
+        raise BackendMissing("anywidget", "a motion in a notebook", install) from None
+
+    class MotionWidget(anywidget.AnyWidget):  # type: ignore[misc]
+        """A motion that plays; ``t``, ``speed`` and ``playing`` follow the page, and it them."""
+
+        _esm = FRONT
+        page = traitlets.Unicode().tag(sync=True)
+        title = traitlets.Unicode().tag(sync=True)
+        height = traitlets.Int().tag(sync=True)
+        t = traitlets.Unicode("0").tag(sync=True)
+        speed = traitlets.Float(1.0).tag(sync=True)
+        playing = traitlets.Bool(True).tag(sync=True)
+
+    return MotionWidget
