@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.motion.area_motion import AreaBody, motion_with_area
+from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
@@ -290,4 +290,4 @@ def _with_neighbours(
 
 def _lengths(displacement: Array) -> Array:
     """Return the largest component at each time, at least one."""
-    return np.asarray(np.maximum(1.0, np.max(np.abs(displacement), axis=1)))
+    return np.asarray(np.maximum(1.0, largest_component(displacement)))

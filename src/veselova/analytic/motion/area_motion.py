@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["AreaBody", "motion_with_area", "plane_of_path", "roll"]
+__all__ = ["AreaBody", "largest_component", "motion_with_area", "plane_of_path", "roll"]
 
 Array = NDArray[np.float64]
 
@@ -38,15 +38,19 @@ def motion_with_area(problem: AreaBody, point: Trajectory) -> Trajectory:
     assert isinstance(torus, AreaVeselova)
     axes = np.eye(3) if problem.axes is None else problem.axes
     at_start = axes.T @ problem.frame
-    frame = axes @ point.series("frame") @ (torus.frame.T @ at_start)
+    # one product, not one for every time
+    rows = point.series("frame").reshape(-1, 3) @ (torus.frame.T @ at_start)
+    frame = rows.reshape(-1, 3, 3)
+    if problem.axes is not None:
+        frame = axes @ frame
     # a row of errors times a column of unit length
     error = np.sqrt(3) * point.error + _ROUNDINGS * _EPSILON
     series = {"Omega": problem.angular_velocity(frame), "frame": frame}
     if isinstance(problem, RollingBall):
         rolled = roll(problem, torus, point.series("displacement"))
         series["position"] = problem.start["position"] + rolled
-        lost = _ROUNDINGS * _EPSILON * np.max(np.abs(rolled), axis=1)
-        lost += _EPSILON * np.max(np.abs(series["position"]), axis=1)
+        lost = _ROUNDINGS * _EPSILON * largest_component(rolled)
+        lost += _EPSILON * largest_component(series["position"])
         error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     return Trajectory(
@@ -60,6 +64,11 @@ def roll(ball: RollingBall, torus: TorusProblem, displacement: Array) -> Array:
     if not isinstance(torus, AreaVeselova):
         return -radius * displacement
     return np.asarray(radius * displacement @ plane_of_path(ball, torus))
+
+
+def largest_component(vectors: Array) -> Array:
+    """Return the largest |component| of each vector of the plane, (N, K) to (N,)."""
+    return reduce(np.maximum, np.abs(vectors).T)
 
 
 def plane_of_path(ball: RollingBall, torus: AreaVeselova) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.motion.area_motion import largest_component
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier_modes import TorusSeries
@@ -75,7 +76,7 @@ class Displacement(ABC):
     @staticmethod
     def _rounding(displacement: Array) -> Array:
         """Return the rounding of the products and sums that a displacement is made of."""
-        size = np.max(np.abs(displacement), axis=1)
+        size = largest_component(displacement)
         return np.asarray(_ROUNDINGS * np.finfo(float).eps * size)
 
     @abstractmethod

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.motion.area_motion import roll
+from veselova.analytic.motion.area_motion import largest_component, roll
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Decimals, Later, Pair
 from veselova.mechanics.results.trajectory import Trajectory
@@ -30,7 +30,7 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
     if isinstance(problem, RubberBall):
         rolled = roll(problem, problem.on_torus(), point.series("displacement"))
         series["position"] = problem.start["position"] + rolled
-        lost = np.finfo(float).eps * np.max(np.abs(series["position"]), axis=1)
+        lost = np.finfo(float).eps * largest_component(series["position"])
         error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     decimals = None if point.decimals is None else _decimals(problem, point.decimals)

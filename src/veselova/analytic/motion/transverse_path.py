@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.motion.displacement import Displacement
 from veselova.analytic.time_map.chebyshev_panels import Panels
-from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
+from veselova.analytic.time_map.panel_quadrature import integrate_together
 from veselova.analytic.time_map.torus_series import SeriesIntegral
 
 __all__ = ["FourierPath", "PanelPath", "TransversePath"]
@@ -71,18 +71,14 @@ class PanelPath:
             if borders[0] <= low and high <= borders[-1]:
                 return self._known
             low, high = min(low, float(borders[0])), max(high, float(borders[-1]))
-        self._known = [
-            integrate_on_panels(
-                lambda z, k=k: self._displacement.integrands(  # type: ignore[misc]
-                    self._solution.attitude(z, self._method)
-                )[:, k],
+        if self._displacement.count:
+            self._known = integrate_together(
+                lambda z: self._displacement.integrands(self._solution.attitude(z, self._method)),
                 self._solution.in_tau1,
                 _FARTHER * low,
                 _FARTHER * high,
                 1.0,
             )
-            for k in range(self._displacement.count)
-        ]
         return self._known
 
     def at(self, tau1: Array, z: Array) -> Array:

@@ -81,8 +81,7 @@ class CrossComponent(SeriesComponent):
         below, above = cut.distances(psi)
         measure, of_gaps = cut.measure(below, above)
         density = measure / np.prod(of_gaps, axis=0)
-        angles = np.repeat(psi[:, None], 2, axis=1)
-        roots, own = self.frame.roots(angles)
+        roots, own = self._roots_of_all_cuts(psi)
         lower, upper = own[2 * s + 1], own[2 * s + 2]
         others = [i for i in range(1, 5) if i not in (2 * s + 1, 2 * s + 2, self.place)]
         common = density * np.prod(roots[s][others], axis=0)

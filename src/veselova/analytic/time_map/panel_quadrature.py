@@ -16,7 +16,7 @@ from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["integrate_between", "integrate_on_panels"]
+__all__ = ["integrate_between", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,24 @@ def integrate_on_panels(
     at zero, where the integral is known, has no margin. Raises Unsolved (``narrow-gap``) where a
     spike is too short for that.
     """
+    return integrate_together(lambda z: integrand(z)[:, None], in_tau1, low, high, floor, noise)[0]
+
+
+def integrate_together(
+    integrands: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> list[Panels]:
+    """Return the integrals of K functions along one orbit, on the same panels.
+
+    ``integrands`` gives them at phases z (N, g), shape (N, K). A panel is resolved where all are.
+    Otherwise as ``integrate_on_panels``.
+    """
     panels = _Panels(
-        integrand,
+        integrands,
         in_tau1,
         floor,
         _FEW_NODES,
@@ -105,12 +121,13 @@ def integrate_between(
     def series(lefts: Array, lengths: Array) -> tuple[Array, Array, Array]:
         coefficients = values(lefts, lengths) @ to_coefficients
         sizes = np.maximum(np.max(np.abs(coefficients), axis=1), np.finfo(float).tiny)
-        return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+        tails = np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+        return coefficients[None], sizes[None], tails[None]
 
     lefts = borders[:-1]
     lengths = np.diff(borders)
     whole = max(scale, float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths))
-    return _refine(series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL / lefts.size * whole)
+    return _refine(series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL / lefts.size * whole)[0]
 
 
 def _refine(
@@ -119,42 +136,51 @@ def _refine(
     lengths: Array,
     noise: float,
     negligible: float,
-) -> Panels:
-    """Return the panels of which those that are not resolved are halved, each for itself.
+) -> list[Panels]:
+    """Return the panels of K functions, of which those that are not resolved are halved, each for
+    itself.
 
-    ``series`` gives coefficients, sizes and tails of panels; an integral of tails that is
-    ``negligible`` is resolved.
+    ``series`` gives coefficients (K, P, N), sizes and tails (K, P) of panels; an integral of tails
+    that is ``negligible`` is resolved.
     """
     most = _MOST_HALVED + _MOST_HALVED_AGAIN * lefts.size
-    before = np.full(lefts.size, np.inf)
+    before: Array = np.full((1, lefts.size), np.inf)
     done: list[tuple[Array, Array, Array, Array, Array]] = []
     for _ in range(_MOST_HALVINGS):
         coefficients, sizes, tails = series(lefts, lengths)
         # A spike may be shorter than its phases are exact, and its series never end; a short one
         # needs no more than a long panel.
-        converged = are_settled(tails, before, noise) | (tails * sizes * lengths <= negligible)
+        resolved = are_settled(tails, before, noise) | (tails * sizes * lengths <= negligible)
+        converged = np.all(resolved, axis=0)
         done.append(
             (
                 lefts[converged],
                 lengths[converged],
-                coefficients[converged],
-                tails[converged],
-                sizes[converged],
+                coefficients[:, converged],
+                tails[:, converged],
+                sizes[:, converged],
             )
         )
         if np.all(converged):
-            return Panels.of(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+            return _join(done)
         if np.count_nonzero(~converged) > most:
             break
         halves = lengths[~converged] / 2
         lefts = (lefts[~converged][:, None] + halves[:, None] * np.array([0.0, 1.0])).ravel()
         lengths = np.repeat(halves, 2)
-        before = np.repeat(tails[~converged], 2)
+        before = np.repeat(tails[:, ~converged], 2, axis=1)
     raise Unsolved(
         "narrow-gap",
         "a spike along the orbit is shorter than phases in doubles are exact; integrate "
         "numerically",
     )
+
+
+def _join(parts: list[tuple[Array, Array, Array, Array, Array]]) -> list[Panels]:
+    """Return the panels of each function, from those resolved in turn."""
+    lefts, lengths = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    of_functions = (np.concatenate([part[k] for part in parts], axis=1) for k in (2, 3, 4))
+    return [Panels.of(lefts, lengths, *values) for values in zip(*of_functions, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -178,7 +204,7 @@ class _Panels:
         return np.arange(-first, last, dtype=float) * self.length
 
     def series(self, lefts: Array, lengths: Array) -> tuple[Array, Array, Array]:
-        """Return the Chebyshev coefficients (P, nodes), their sizes and relative tails, (P,).
+        """Return the Chebyshev coefficients (K, P, nodes), their sizes and relative tails, (K, P).
 
         Phases of nodes are those of the border plus a short way.
         """
@@ -190,10 +216,11 @@ class _Panels:
             self.integrand(z[first : first + _BLOCK])
             for first in iterate(range(0, z.shape[0], _BLOCK), "time map")
         ]
-        coefficients = np.concatenate(values).reshape(lefts.size, -1) @ to_coefficients
+        together = np.ascontiguousarray(np.concatenate(values).T)
+        coefficients = together.reshape(len(together), lefts.size, -1) @ to_coefficients
         # zero is resolved
-        sizes = np.maximum(np.abs(coefficients[:, 0]), max(self.floor, np.finfo(float).tiny))
-        return coefficients, sizes, np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
+        sizes = np.maximum(np.abs(coefficients[:, :, 0]), max(self.floor, np.finfo(float).tiny))
+        return coefficients, sizes, np.max(np.abs(coefficients[:, :, -3:]), axis=2) / sizes
 
     def longer(self, low: float, high: float) -> _Panels:
         """Return longer panels of more nodes where such resolve the integrand, and

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,19 @@ class SeriesComponent(TorusRate[Periods]):
     def turn(self) -> float:
         """Return the phase of the series, in cycles."""
 
+    def _roots_of_all_cuts(self, psi: Values) -> tuple[Values, Values]:
+        """Return ``Frame.roots`` where every cut has the angles (N,): the same for all columns."""
+        known = self._known_roots.get(psi.size)
+        if known is None or not np.array_equal(known[0], psi):
+            angles = np.repeat(psi[:, None], self.inversion.periods.genus, axis=1)
+            known = (psi, *self.frame.roots(angles))
+            self._known_roots[psi.size] = known
+        return known[1:]
+
+    @cached_property
+    def _known_roots(self) -> dict[int, tuple[Values, Values, Values]]:
+        return {}
+
     @property
     def needed_nodes(self) -> tuple[int, ...]:
         """Return those of the forms' own series: the factors are analytic in their strips."""
@@ -117,11 +131,10 @@ class NormalComponent(SeriesComponent):
 
     def at(self, psi: Values) -> Values:
         """Return (q',n_k) at angles of shape (N, g)."""
-        return np.asarray(self.scale * np.prod(self._factors(psi), axis=0))
+        return np.asarray(self.scale * np.prod(self._factors(*self.frame.roots(psi)), axis=0))
 
-    def _factors(self, psi: Values) -> Values:
-        """Return φ_s at angles (N, g), shape (g, N)."""
-        roots, own = self.frame.roots(psi)
+    def _factors(self, roots: Values, own: Values) -> Values:
+        """Return φ_s from the roots at angles (N, g), shape (g, N)."""
         factors = roots[:, self.place].copy()
         factors[self.cut] = own[self.place]
         return np.asarray(factors)
@@ -129,9 +142,9 @@ class NormalComponent(SeriesComponent):
     def _weight_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
-        angles = np.repeat(psi[:, None], self.inversion.periods.genus, axis=1)
         sign = (-1) ** (self.inversion.periods.genus - s - 1)
-        return np.asarray(sign * cut.forms(below, above) * self._factors(angles)[s])
+        factors = self._factors(*self._roots_of_all_cuts(psi))
+        return np.asarray(sign * cut.forms(below, above) * factors[s])
 
 
 def find_series(component: SeriesComponent) -> TorusSeries:
