@@ -34,7 +34,7 @@ from veselova.mechanics.results.tori import Tori
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["MOST_BYTES", "Starts", "fill", "solve_many", "tori"]
+__all__ = ["MOST_BYTES", "Starts", "fill", "solve_many", "solve_starts", "tori"]
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,14 @@ def solve_many(
     assert grid is not None
     assert starts is not None
     with limits(budget_s, progress):
-        return fill(starts, grid, outputs, most_bytes, _side_by_side)
+        return solve_starts(starts, grid, outputs, most_bytes)
+
+
+def solve_starts(
+    starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
+) -> Ensemble:
+    """Return the motions of validated starts at validated times; raises as ``solve_many`` does."""
+    return fill(starts, grid, outputs, most_bytes, _side_by_side)
 
 
 def tori(
@@ -163,6 +170,7 @@ class Starts:
     - A, q, q_dot: (N, n) doubles, exact where ``surely`` (N,)
     - frames: (N, n, n) at the start, NaN for natural ones; None where all are
     - problem: the i-th problem; raises InvalidInput where it is none
+    - normalize: whether it scales q and projects q_dot
     """
 
     system: type[Problem]
@@ -174,6 +182,14 @@ class Starts:
     surely: NDArray[np.bool_]
     frames: Array | None
     problem: Callable[[int], Problem]
+    normalize: bool = False
+
+    @property
+    def are_natural(self) -> NDArray[np.bool_]:
+        """Return which frames are the natural ones, (N,)."""
+        if self.frames is None:
+            return np.ones(self.count, dtype=bool)
+        return np.asarray(np.isnan(self.frames[:, 0, 0]))
 
     @classmethod
     def of(cls, problems: Any) -> Starts:
@@ -221,7 +237,18 @@ class Starts:
             )
 
         surely = _are_starts(masses, position, velocity, bool(normalize))
-        return cls(Veselova, n, count, masses, position, velocity, surely, None, problem)
+        return cls(
+            Veselova,
+            n,
+            count,
+            masses,
+            position,
+            velocity,
+            surely,
+            None,
+            problem,
+            bool(normalize),
+        )
 
 
 def _fields(problems: Mapping[str, Any]) -> dict[str, Any]:
@@ -291,7 +318,7 @@ def _of_list(problems: Sequence[Any]) -> Starts:
             if not exact.natural:
                 frames[i] = problem.frame
     A, q, q_dot = numbers
-    return Starts(system, n, count, A, q, q_dot, surely, frames, problems.__getitem__)
+    return Starts(system, n, count, A, q, q_dot, surely, frames, problems.__getitem__, True)
 
 
 #: What computes states side by side: yields (rows, series by name, error).

@@ -123,6 +123,7 @@ def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
         "curve",
         "download",
         "run",
+        "solve_many",
         "sweep",
         "theta",
         "torus",

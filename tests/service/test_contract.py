@@ -32,6 +32,7 @@ CHECKS = [
         ("/v1/trajectories", "POST"),
         ("/v1/trajectories/{name}", "GET"),
         ("/v1/comparisons", "POST"),
+        ("/v1/ensembles", "POST"),
         ("/v1/tori", "POST"),
         ("/v1/closed-forms", "POST"),
         ("/v1/curves", "POST"),

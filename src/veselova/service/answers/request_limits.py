@@ -7,6 +7,7 @@ from typing import Any
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.service.api.content_negotiation import negotiate_type
+from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import (
     BudgetedRequest,
@@ -81,6 +82,9 @@ def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) 
 
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
     path = (request.point_fields[0],)
+    if isinstance(request, EnsembleRequest) and request.dimension > settings.max_dimension:
+        required = f"rows of at most {settings.max_dimension} numbers on this server"
+        faults.add((*path, "q"), required, str(request.dimension))
     count = request.point_count()
     values = request.value_count()
     if count > settings.max_times:

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["ANSWERS", "BODIES", "BODY3_PROBLEM", "BODY4", "BODY4_PROBLEM", "CURVE", "THETA"]
+__all__ = [
+    "ANSWERS",
+    "BODIES",
+    "BODY3_PROBLEM",
+    "BODY4",
+    "BODY4_PROBLEM",
+    "CURVE",
+    "ENSEMBLE",
+    "THETA",
+]
 
 #: A four-dimensional body with distinct A's, thrown so that no phase is slow (examples/body4.json
 #: is this document).
@@ -37,10 +46,22 @@ THETA: dict[str, Any] = {
     "characteristic": [[0.5, 0], [0, 0.5]],
 }
 
+#: Two starts of one body.
+ENSEMBLE: dict[str, Any] = {
+    "A": [3, 2, 1],
+    "starts": {
+        "q": [[0.6, 0.48, 0.64], [0, 0.6, 0.8]],
+        "q_dot": [[0.8, -0.36, -0.48], [1, 0.4, -0.3]],
+    },
+    "times": [0, 1000],
+    "outputs": ["q", "tau1"],
+}
+
 #: Kind of answer → the body of its worked example.
 BODIES: dict[str, Any] = {
     "trajectory": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
     "comparison": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
+    "ensemble": ENSEMBLE,
     "torus": {"problem": BODY4_PROBLEM},
     "closed_form": {"problem": BODY3_PROBLEM},
     "curve": CURVE,

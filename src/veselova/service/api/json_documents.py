@@ -16,15 +16,19 @@ from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import InternalContradiction
 from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = [
     "comparison_document",
     "comparison_of",
     "encode",
+    "ensemble_document",
+    "ensemble_of",
     "torus_of",
     "trajectory_document",
     "trajectory_of",
@@ -113,6 +117,40 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         problem, times, decimals, provenance, remainders=_optional(document, "remainders")
     )
     return trajectory.with_conditioning(_optional(document, CONDITIONING))
+
+
+def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
+    """Return the document of an ensemble: ``rows`` are the problems that were solved, and the
+    first axis of the series.
+    """
+    rows = np.flatnonzero(ensemble.solved)
+    return {
+        "times": ensemble.times,
+        "outcome": ensemble.outcome.tolist(),
+        "detail": list(ensemble.detail),
+        "together": ensemble.together.tolist(),
+        "rows": rows,
+        "series": {name: values[rows] for name, values in ensemble.arrays.items()},
+        "error": ensemble.error[rows],
+        "provenance": ensemble.provenance.as_dict(),
+    }
+
+
+def ensemble_of(n: int, document: Mapping[str, Any]) -> Ensemble:
+    """Return the ensemble of a document of bodies of dimension n; what was not solved is NaN."""
+    outcome = np.array(document["outcome"])
+    times = np.array(document["times"], dtype=np.float64)
+    rows = np.array(document["rows"], dtype=np.intp)
+    arrays = {}
+    for name, values in {**document["series"], "error": document["error"]}.items():
+        axes = Veselova.outputs.get(name, ())
+        sizes = [n - 1 if axis == "coordinate" else n for axis in axes]
+        arrays[name] = np.full((outcome.size, times.size, *sizes), np.nan)
+        arrays[name][rows] = np.array(values, dtype=np.float64).reshape(-1, times.size, *sizes)
+    error = arrays.pop("error")
+    together = np.array(document["together"], dtype=bool)
+    provenance = Provenance(**document["provenance"])
+    return Ensemble(times, error, outcome, tuple(document["detail"]), together, arrays, provenance)
 
 
 def comparison_document(

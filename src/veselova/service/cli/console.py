@@ -12,11 +12,19 @@ from rich.table import Table
 
 from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode
 
-__all__ = ["print_comparison", "print_json", "print_torus", "print_trajectory", "terminal"]
+__all__ = [
+    "print_comparison",
+    "print_ensemble",
+    "print_json",
+    "print_torus",
+    "print_trajectory",
+    "terminal",
+]
 
 #: Rows of a trajectory that a terminal is shown; files and JSON have all.
 _SHOWN_TIMES = 12
@@ -101,6 +109,22 @@ def print_trajectory(
         table.add_row(time, *components, *more, *bounds)
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
+
+
+def print_ensemble(console: Console, ensemble: Ensemble) -> None:
+    """Print how many of many starts were solved, with which errors, and why the others were not."""
+    console.print(
+        f"{len(ensemble)} starts at {ensemble.times.size} times, "
+        f"{np.count_nonzero(ensemble.together)} side by side; {ensemble.provenance.seconds:.3g} s",
+        highlight=False,
+    )
+    table = _table("outcome", "starts", "largest error")
+    for outcome in np.unique(ensemble.outcome).tolist():
+        rows = ensemble.outcome == outcome
+        errors = ensemble.error[rows]
+        largest = f"{np.max(errors):.1e}" if np.isfinite(errors).all() else ""
+        table.add_row(outcome, str(np.count_nonzero(rows)), largest)
+    console.print(table)
 
 
 def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:

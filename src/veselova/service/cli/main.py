@@ -139,13 +139,16 @@ def solve(
     plot: _Plot = None,
     animate: _Animate = None,
 ) -> None:
-    """Solve a motion with one engine."""
+    """Solve a motion with one engine, or those of many starts."""
     from veselova.service.api.json_documents import trajectory_document
     from veselova.service.api.request_models import TrajectoryRequest, read_request
     from veselova.service.cli.console import print_json, print_trajectory, terminal
     from veselova.service.workers.tasks import solve_request
 
     document = _document(file)
+    if isinstance(document, dict) and "starts" in document:
+        _solve_many(document, json, output, plot or animate)
+        return
     request = read_request(TrajectoryRequest, document)
     _check_files(output, plot)
     _check_file("--animate", animate, _FILMS)
@@ -164,6 +167,18 @@ def solve(
         _say_written(output, plot)
         if animate:
             print(f"Film: {animate}")
+
+
+def _solve_many(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
+    from veselova.mechanics.core.errors import InvalidInput
+    from veselova.service.cli import ensemble_command
+
+    request = ensemble_command.read(document)
+    _check_file("--output", output, ensemble_command.WRITERS)
+    if plot is not None:
+        raise InvalidInput(("--plot",), "no picture and no film of many starts", str(plot))
+    with _limits(request):
+        ensemble_command.show(request, json, output)
 
 
 @app.command()

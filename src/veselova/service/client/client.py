@@ -35,6 +35,7 @@ from veselova.service.client.requests import (
     compare_call,
     curve_call,
     download_call,
+    solve_many_call,
     theta_call,
     torus_call,
     trajectory_call,
@@ -228,6 +229,7 @@ class Client(_Core):
     trajectory = _method(trajectory_call)
     download = _method(download_call)
     compare = _method(compare_call)
+    solve_many = _method(solve_many_call)
     torus = _method(torus_call)
     closed_form = _method(closed_form_call)
     curve = _method(curve_call)
@@ -327,6 +329,7 @@ class AsyncClient(_Core):
     trajectory = _method(trajectory_call)
     download = _method(download_call)
     compare = _method(compare_call)
+    solve_many = _method(solve_many_call)
     torus = _method(torus_call)
     closed_form = _method(closed_form_call)
     curve = _method(curve_call)

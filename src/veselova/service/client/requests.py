@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
     curve_outputs,
@@ -24,13 +26,14 @@ from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.curve import CurveData
+from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.complex_numbers import to_pairs
-from veselova.service.api.json_documents import comparison_of, torus_of, trajectory_of
+from veselova.service.api.json_documents import comparison_of, ensemble_of, torus_of, trajectory_of
 from veselova.service.client.download import DownloadTarget, media_type_of, provenance_of, sink_of
 
 __all__ = [
@@ -39,6 +42,7 @@ __all__ = [
     "compare_call",
     "curve_call",
     "download_call",
+    "solve_many_call",
     "theta_call",
     "torus_call",
     "trajectory_call",
@@ -154,6 +158,37 @@ def compare_call(
         budget_s,
         partial(comparison_of, asked),
     )
+
+
+def solve_many_call(
+    problems: Mapping[str, Any] | Sequence[Problem],
+    times: Any,
+    outputs: Sequence[str] | None = None,
+    *,
+    budget_s: float = 10.0,
+) -> Call[Ensemble]:
+    """Return the motions of many Veselova problems at the same times (see ``veselova.solve_many``):
+    arrays by name, or a list of problems given by doubles, with natural frames.
+    """
+    from veselova.ensembles import Starts
+
+    starts = Starts.of(problems)
+    numbers = [starts.A, starts.q, starts.q_dot]
+    if not isinstance(problems, Mapping):
+        fits = starts.surely & starts.are_natural
+        for i in np.flatnonzero(~fits).tolist():
+            required = "a Veselova problem that moves, given by doubles, with its natural frame"
+            raise InvalidInput(("problems", i), required, show(starts.problem(i)))
+    A, q, q_dot = ([[x if x == x else None for x in row] for row in y.tolist()] for y in numbers)
+    body = {
+        "A": A,
+        "starts": {"q": q, "q_dot": q_dot},
+        "normalize": starts.normalize,
+        "times": as_request(times),
+        "outputs": None if outputs is None else list(outputs),
+        "budget_s": budget_s,
+    }
+    return Call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:

@@ -39,6 +39,16 @@ def _series(number: dict[str, Any]) -> dict[str, Any]:
     return schemas
 
 
+def _series_of_many() -> dict[str, Any]:
+    """Return the schemas of the outputs of many Veselova problems."""
+    number = {"type": "number"}
+    outputs = SYSTEMS["veselova"].problem_class.outputs
+    return {
+        name: {"type": "array", "items": _series(number)[name], "description": "by rows, times, …"}
+        for name in outputs
+    }
+
+
 _TEXT = {"type": "string"}
 _TEXTS = {"type": "array", "items": _TEXT}
 _DECIMAL = {"type": "string", "pattern": r"^-?\d", "description": "a decimal"}
@@ -120,6 +130,30 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "provenance": _PROVENANCE,
         },
         required=["engine", "times", "series", "integrals", "error", "provenance"],
+    ),
+    "Ensemble": _object(
+        {
+            "times": _NUMBERS,
+            "outcome": {**_TEXTS, "description": "of each start: solved, or the reason's name"},
+            "detail": {**_TEXTS, "description": "of each start: the reason in a sentence"},
+            "together": {
+                "type": "array",
+                "items": {"type": "boolean"},
+                "description": "which starts were computed side by side",
+            },
+            "rows": {
+                "type": "array",
+                "items": {"type": "integer"},
+                "description": "the starts that were solved, from 0: the first axis of the series",
+            },
+            "series": _object(_series_of_many(), required=[]),
+            "error": {
+                **_MATRIX,
+                "description": "bounds the true error of every component of q and frame: true ≤ "
+                "error; by rows and times",
+            },
+            "provenance": _PROVENANCE,
+        }
     ),
     "Comparison": _object(
         {

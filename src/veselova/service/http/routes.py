@@ -40,6 +40,11 @@ RESOURCES = {
         "Solve a motion with both engines",
         "Both motions and how they agree",
     ),
+    "/v1/ensembles": (
+        "ensemble",
+        "Solve the motions of many starts",
+        "The motions at the given times, in arrays",
+    ),
     "/v1/tori": (
         "torus",
         "Describe the invariant torus of a motion",
@@ -66,6 +71,7 @@ RESOURCES = {
 _OPERATIONS = {
     "trajectory": "solve_trajectory",
     "comparison": "compare_engines",
+    "ensemble": "solve_ensemble",
     "torus": "compute_torus",
     "closed_form": "compute_closed_form",
     "curve": "compute_curve",

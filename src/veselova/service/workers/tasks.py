@@ -8,15 +8,23 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from veselova.engines import Prepared, closed_form, compare, torus
+from veselova.ensembles import solve_starts
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.examples import BODY4, CURVE, THETA
-from veselova.service.api.json_documents import comparison_document, encode, trajectory_document
+from veselova.service.api.json_documents import (
+    comparison_document,
+    encode,
+    ensemble_document,
+    trajectory_document,
+)
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
@@ -29,6 +37,7 @@ __all__ = [
     "TASKS",
     "closed_form_request",
     "compare_request",
+    "ensemble_request",
     "solve_request",
     "torus_request",
     "warm_up",
@@ -83,6 +92,15 @@ def _comparison(request: Any) -> dict[str, Any]:
     return comparison_document(compare_request(request), request.outputs)
 
 
+def ensemble_request(request: EnsembleRequest) -> Ensemble:
+    """Return the motions of many starts that a request asks for."""
+    return solve_starts(request.parsed, request.time_grid(), request.outputs)
+
+
+def _ensemble(request: Any) -> dict[str, Any]:
+    return ensemble_document(ensemble_request(request))
+
+
 def _torus(request: Any) -> dict[str, Any]:
     return torus_request(request).as_dict()
 
@@ -115,6 +133,7 @@ def _theta(request: ThetaRequest) -> dict[str, Any]:
 TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]]] = {
     "trajectory": (TrajectoryRequest, _trajectory),
     "comparison": (ComparisonRequest, _comparison),
+    "ensemble": (EnsembleRequest, _ensemble),
     "torus": (TorusRequest, _torus),
     "closed_form": (ClosedFormRequest, _closed_form),
     "curve": (CurveRequest, _curve),
