@@ -34,7 +34,16 @@ from veselova.mechanics.results.tori import Tori
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["MOST_BYTES", "Starts", "fill", "solve_many", "solve_starts", "tori"]
+__all__ = [
+    "MOST_BYTES",
+    "Starts",
+    "fill",
+    "series_of",
+    "side_by_side",
+    "solve_many",
+    "solve_starts",
+    "tori",
+]
 
 Array = NDArray[np.float64]
 
@@ -96,7 +105,7 @@ def solve_starts(
     starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
 ) -> Ensemble:
     """Return the motions of validated starts at validated times; raises as ``solve_many`` does."""
-    return fill(starts, grid, outputs, most_bytes, _side_by_side)
+    return fill(starts, grid, outputs, most_bytes, side_by_side)
 
 
 def tori(
@@ -371,7 +380,7 @@ def fill(
     return Ensemble(asked, error, outcomes, tuple(details), served, arrays, provenance)
 
 
-def _side_by_side(
+def side_by_side(
     starts: Starts, rows: NDArray[np.intp], grid: TimeGrid, names: tuple[str, ...]
 ) -> Iterable[Any]:
     """Yield (rows, series by name) of starts that can be computed side by side."""

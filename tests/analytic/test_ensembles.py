@@ -219,3 +219,82 @@ def test_tori_name_what_has_none(rng: np.random.Generator) -> None:
     assert np.isnan(tori.phases[1]).all()
     one_body = vs.tori([3, 2, 1.5, 1], given["q"][4:], given["q_dot"][4:], normalize=True)
     assert len(one_body) == 2
+
+
+BODY = [1.6, 1.05, 0.5]
+
+
+def body_starts(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    q, q_dot = rng.normal(size=(2, count, 3))
+    q /= np.linalg.norm(q, axis=1)[:, None]
+    q_dot -= np.sum(q * q_dot, axis=1)[:, None] * q
+    return q, q_dot
+
+
+@pytest.mark.parametrize("A", [BODY, [1.0, 40.0, 3.0], [1.0, 1.02, 1.05]])
+def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -> None:
+    q, q_dot = body_starts(rng, 40)
+    flow = vs.FlowMap(A)
+    found = flow.solve(q, q_dot, TIMES, normalize=True)
+    assert found.solved.all()
+    # of a body with wide A's some starts have slow modes, and go to solve
+    assert np.mean(found.together) > (0.8 if max(A) > 10 else 0.99)
+    for i in range(0, 40, 4):
+        problem = vs.Veselova(A, q[i], q_dot[i], normalize=True)
+        require_truth(found, i, problem, TIMES)
+
+
+@pytest.mark.slow
+def test_a_flow_map_bounds_the_truth_of_many_starts(rng: np.random.Generator) -> None:
+    for _ in range(10):
+        A = np.exp(rng.uniform(0, np.log(30), 3))
+        q, q_dot = body_starts(rng, 60)
+        found = vs.FlowMap(A).solve(q, q_dot, TIMES, normalize=True)
+        assert found.solved.all()
+        for i in np.flatnonzero(found.together):
+            problem = vs.Veselova(A, q[i], q_dot[i], normalize=True)
+            require_truth(found, i, problem, TIMES)
+
+
+def test_a_flow_map_serves_starts_beside_the_separatrix() -> None:
+    A = [3.0, 2.0, 1.0]
+    problems = [near_unstable_circle(x, "0") for x in ("1e-1", "1e-3", "1e-5", "1e-9", "0")]
+    q = np.array([problem.q for problem in problems])
+    q_dot = np.array([problem.q_dot for problem in problems])
+    found = vs.FlowMap(A).solve(q, q_dot, [0.0, 2.0, 5.0], normalize=True)
+    assert found.solved.all()
+    for i in range(len(problems)):
+        alone = vs.solve(vs.Veselova(A, q[i], q_dot[i], normalize=True), [0.0, 2.0, 5.0])
+        off = np.abs(found.frame[i] - alone.frame).max(axis=(1, 2))
+        assert np.all(off <= found.error[i] + alone.error)
+
+
+def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> None:
+    q, q_dot = body_starts(rng, 300)
+    q[7, 1] = np.nan
+    q_dot[8] = 0.0
+    found = vs.FlowMap(BODY).solve(q, q_dot, TIMES, ["q", "tau1"], normalize=True)
+    other = vs.solve_many({"A": BODY, "q": q, "q_dot": q_dot, "normalize": True}, TIMES)
+    assert found.outcome.tolist() == other.outcome.tolist()
+    assert found.outcome[7] == "invalid-input"
+    both = found.solved
+    off = np.abs(found.q - other.q).max(axis=2)
+    assert np.all(off[both] <= (found.error + other.error)[both])
+    assert set(found.arrays) == {"q", "tau1"}
+
+
+@pytest.mark.parametrize(
+    ("A", "words"),
+    [
+        ([3, 2, 1.5, 1], "3 numbers \\(solve_many serves other dimensions\\); given 4"),
+        ([2, 2, 1], "3 different numbers"),
+        ([2, -1, 1], "3 positive numbers"),
+        ("abc", "3 positive numbers"),
+    ],
+)
+def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        vs.FlowMap(A)
+    flow = vs.FlowMap(BODY)
+    with pytest.raises(InvalidInput, match="q_dot: required an array of 2 rows"):
+        flow.solve(np.ones((2, 3)), np.ones((1, 3)), [1.0])

@@ -37,6 +37,7 @@ OPERATIONS = {
     "list_jobs",
     "list_schemas",
     "list_systems",
+    "solve_ensemble",
     "solve_trajectory",
     "watch_job",
 }

@@ -53,9 +53,8 @@ _CERTAIN = 1e-9
 _STEP = 1e-8
 
 #: The constants of analytic.motion.error_bound and analytic.motion.base, in ε where they are
-#: roundings: of f and F_0, of a phase, of the start's phases, of one evaluation, and the factor of
-#: the whole.
-_RATE, _PHASE, _START_PHASE, _EVALUATION, _SAFETY = 2.0, 4.0, 4.0, 9.0, 2.0
+#: roundings: of a phase, of the start's phases, of one evaluation, and the factor of the whole.
+_PHASE, _START_PHASE, _EVALUATION, _SAFETY = 4.0, 4.0, 9.0, 2.0
 
 #: Errors above this are left out: second orders would count, and one problem has guard digits.
 _LARGEST_ERROR = 1e-6
@@ -236,14 +235,14 @@ class _Motions:
         sensitivities at the times; quotients are those of the frame, (N, T, n², g).
         """
         maps = self.maps
-        rounding = _RATE * _EPSILON
+        rounding = self.stack.rate_rounding[:, None]
         frequencies = np.abs(maps.frequencies)
         of_map, drift = maps.error(
             np.max(np.abs(tau1), axis=1),
             _START_PHASE * _EPSILON + self.stack.start_rounding,
             rounding * frequencies,
         )
-        lag = np.abs(times) / np.abs(maps.mean)[:, None] * (rounding + drift[:, None])
+        lag = np.abs(times) / maps.mean[:, None] * (rounding + drift[:, None])
         lag += of_map[:, None]
         with np.errstate(divide="ignore"):
             lag *= np.maximum(1.0, 1 / slopes)
@@ -253,5 +252,6 @@ class _Motions:
         together = np.max(np.sqrt(np.sum(quotients * quotients, axis=3)), axis=2)
         result = lag * along + rounding * np.abs(tau1) * by_rates
         evaluation = max(_EVALUATION, 3.0 * quotients.shape[3] + 3.0)
-        result += (_PHASE * together + evaluation) * _EPSILON
+        result += (_PHASE * _EPSILON + 2 * self.stack.phase_error[:, None]) * together
+        result += evaluation * _EPSILON
         return np.asarray(_SAFETY * result)

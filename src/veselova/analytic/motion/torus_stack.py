@@ -25,7 +25,15 @@ from veselova.analytic.time_map.mode_tables import ModeTables, form_tables
 from veselova.analytic.time_map.rate import TimeRate, rate_factor
 from veselova.mechanics.core.budget import checkpoint
 
-__all__ = ["NODE_COUNTS", "TorusStack", "torus_stacks"]
+__all__ = [
+    "NODE_COUNTS",
+    "TorusStack",
+    "branch_points",
+    "columns_at_nodes",
+    "known_starts",
+    "origins_of",
+    "torus_stacks",
+]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +52,21 @@ _MOST_BINARY_DIGITS = 150
 #: Largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
 _MOST_DIMENSIONS = 9
 
+
+#: Relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
+_RATE_ROUNDING = 2.0
+
+#: What a stack knows of each of its tori, once it is asked for.
+_BY_ROWS = (
+    "angles",
+    "phases",
+    "frequencies",
+    "mean",
+    "signs",
+    "rate_rounding",
+    "phase_error",
+    "start_rounding",
+)
 
 #: Derived: N nodes of half a period have the mean of what has less than 2N waves in it, those of
 #: the forms and of a mode together. A tenth more, and some, leaves nothing above 1e-15.
@@ -77,7 +100,7 @@ class TorusStack:
             self.points[members],
             self.periods.part(part, members),
         )
-        for name in ("angles", "phases", "frequencies", "mean", "signs"):
+        for name in _BY_ROWS:
             if name in vars(self):
                 vars(result)[name] = vars(self)[name][members]
         return result
@@ -133,16 +156,18 @@ class TorusStack:
         """Return the Fourier coefficients of dt/dτ₁ in a box of modes |m_k| ≤ ``highest``, which
         turn by ``pace`` radians at most by one of ψ.
         """
-        nodes = math.ceil(_NODES_PER_WAVE * (self.periods.longest + pace)) + _SPARE_NODES
-        psi = DOUBLE.nodes(nodes)
-        series = self.periods.angle_series  # (N, k, s, M)
-        orders = np.arange(1, series.shape[3])
-        powers = np.sin(np.outer(orders, psi)) / orders[:, None]
-        G = np.ascontiguousarray(np.swapaxes(series[..., 1:], 1, 2)) @ powers
-        cuts = np.arange(self.periods.genus)
-        G[:, cuts, cuts] += psi / (2 * np.pi)
-        weights = np.stack([self.rate.weights(s, psi) for s in cuts.tolist()], axis=1)
-        return form_tables(weights, G, self.rate.scale, self.mean, highest)
+        columns = columns_at_nodes(self.periods, self.rate, pace)
+        return form_tables(*columns, self.rate.scale, self.mean, highest)
+
+    @cached_property
+    def rate_rounding(self) -> Array:
+        """Return the relative error of f and F_0, (N,)."""
+        return np.full(self.rows.size, _RATE_ROUNDING * DOUBLE.epsilon)
+
+    @cached_property
+    def phase_error(self) -> Array:
+        """Return by how much the maps between angles and phases are off beyond rounding, (N,)."""
+        return np.zeros(self.rows.size)
 
     @cached_property
     def start_rounding(self) -> Array:
@@ -170,6 +195,22 @@ class TorusStack:
         return result
 
 
+def columns_at_nodes(periods: Periods, rate: TimeRate, pace: float) -> tuple[Array, Array]:
+    """Return the weights of dt/dτ₁ and G_s, (N, s, k, J) each, at J nodes, enough for modes that
+    turn by ``pace`` radians at most by one of ψ.
+    """
+    nodes = math.ceil(_NODES_PER_WAVE * (periods.longest + pace)) + _SPARE_NODES
+    psi = DOUBLE.nodes(nodes)
+    series = periods.angle_series  # (N, k, s, M)
+    orders = np.arange(1, series.shape[3])
+    powers = np.sin(np.outer(orders, psi)) / orders[:, None]
+    G = np.ascontiguousarray(np.swapaxes(series[..., 1:], 1, 2)) @ powers
+    cuts = np.arange(periods.genus)
+    G[:, cuts, cuts] += psi / (2 * np.pi)
+    weights = np.stack([rate.weights(s, psi) for s in cuts.tolist()], axis=1)
+    return weights, G
+
+
 def torus_stacks(
     A: Array, q: Array, q_dot: Array, node_counts: Sequence[int] = NODE_COUNTS
 ) -> Iterator[TorusStack]:
@@ -182,7 +223,7 @@ def torus_stacks(
     """
     if A.shape[1] > _MOST_DIMENSIONS:
         return
-    chosen = np.flatnonzero(_plain(A, q, q_dot))
+    chosen = known_starts(A, q, q_dot)
     if not chosen.size:
         return
     spectra = Spectra.of(A[chosen], q[chosen], q_dot[chosen])
@@ -190,7 +231,7 @@ def torus_stacks(
     order = lower @ (1 << np.arange(lower.shape[1]))
     for code in np.unique(order[spectra.known]):
         members = np.flatnonzero(spectra.known & (order == code))
-        points, origins = _branch_points(spectra, members, lower[members[0]])
+        points, origins = branch_points(spectra, members, lower[members[0]])
         wide = np.min((points[:, 1:] - points[:, :-1]).high, axis=1) > _NARROWEST
         members = members[wide]
         points = points[wide]
@@ -205,7 +246,7 @@ def torus_stacks(
             yield TorusStack(chosen[rows], spectra.part(rows), points[part], periods)
 
 
-def _plain(A: Array, q: Array, q_dot: Array) -> NDArray[np.bool_]:
+def known_starts(A: Array, q: Array, q_dot: Array) -> NDArray[np.intp]:
     """Return which problems are of moderate size, with A's apart and no q_i = 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         sizes = np.stack(
@@ -217,26 +258,30 @@ def _plain(A: Array, q: Array, q_dot: Array) -> NDArray[np.bool_]:
         largest = np.abs(np.log2(np.max(np.abs(q_dot), axis=1)))
     ordered = np.sort(A, axis=1)
     apart = np.all(np.diff(ordered, axis=1) > 0, axis=1)
-    return np.asarray(
-        np.all(sizes < _MOST_BINARY_DIGITS, axis=0) & (largest < _MOST_BINARY_DIGITS) & apart
-    )
+    moderate = np.all(sizes < _MOST_BINARY_DIGITS, axis=0) & (largest < _MOST_BINARY_DIGITS)
+    return np.flatnonzero(moderate & apart)
 
 
-def _branch_points(
+def branch_points(
     spectra: Spectra, members: NDArray[np.intp], lower: NDArray[np.bool_]
 ) -> tuple[DoubleDouble, tuple[BranchPoint, ...]]:
     """Return b_0 < … < b_{2g} and where they come from, where c_s < I_s for the s = 2…g that
     ``lower`` marks.
     """
+    order = origins_of(lower)
+    values = {"c": spectra.constants[members], "I": spectra.inverse[members]}
+    columns = [values[origin.kind][:, origin.index] for origin in order]
+    return stack_double_doubles(columns), order
+
+
+def origins_of(lower: NDArray[np.bool_]) -> tuple[BranchPoint, ...]:
+    """Return where b_0 < … < b_{2g} come from, where c_s < I_s for the s that ``lower`` marks."""
     order = [BranchPoint("c", 0), BranchPoint("I", 0)]
     for s, constant_first in enumerate(lower, start=1):
         pair = [BranchPoint("c", s), BranchPoint("I", s)]
         order += pair if constant_first else pair[::-1]
     order.append(BranchPoint("I", lower.size + 1))
-    values = {"c": spectra.constants[members], "I": spectra.inverse[members]}
-    return stack_double_doubles([values[origin.kind][:, origin.index] for origin in order]), tuple(
-        order
-    )
+    return tuple(order)
 
 
 def _node_counts(periods: Periods, node_counts: Sequence[int]) -> NDArray[np.int_]:

@@ -20,7 +20,7 @@ from veselova.analytic.arithmetic.double_double import exact_product
 from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, SMALLEST_MODE
 from veselova.mechanics.core.budget import checkpoint
 
-__all__ = ["ModeTables", "TimeMaps", "form_tables"]
+__all__ = ["ModeTables", "TimeMaps", "form_tables", "fourier_coefficients", "orders_of"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -71,7 +71,7 @@ class ModeTables:
     @cached_property
     def orders(self) -> NDArray[np.int64]:
         """Return the modes of the box, (K, g)."""
-        return _orders(self.highest, self.genus)
+        return orders_of(self.highest, self.genus)
 
     def part(self, rows: NDArray[np.intp]) -> ModeTables:
         """Return the tables of some of the tori."""
@@ -85,7 +85,8 @@ class ModeTables:
         return np.asarray(~np.any(flat[:, at_face], axis=1))
 
 
-def _orders(highest: int, genus: int) -> NDArray[np.int64]:
+def orders_of(highest: int, genus: int) -> NDArray[np.int64]:
+    """Return the modes of a box, (K, g): m_1 = 0 … M, the others −M … M."""
     axes = [np.arange(highest + 1), *(np.arange(-highest, highest + 1),) * (genus - 1)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, genus)
 
@@ -99,13 +100,28 @@ def _is_counted(orders: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def form_tables(weights: Array, G: Array, scale: Array, mean: Array, highest: int) -> ModeTables:
-    """Return the tables of N tori from the weights and G_s at J nodes of each cut, both (N, s, k,
-    J), and the scale and mean of dt/dτ₁, (N,).
+    """Return the tables of N tori; the arguments are those of ``fourier_coefficients``."""
+    values, off, counts = fourier_coefficients(weights, G, scale, mean, highest)
+    largest = np.max(np.where(counts, off, 0.0), axis=1) / 2
+    genus = weights.shape[1]
+    shape = (len(values), highest + 1, *(2 * highest + 1,) * (genus - 1))
+    return ModeTables(
+        np.where(counts, values, 0.0).reshape(shape), np.maximum(4 * SMALLEST_MODE, largest)
+    )
+
+
+def fourier_coefficients(
+    weights: Array, G: Array, scale: Array, mean: Array, highest: int
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return F_m/F_0 of the modes of a box, by how much each is off, and which count, (N, K) each.
+
+    - weights, G: (N, s, k, J) those of G_s at J nodes of each cut
+    - scale, mean: of dt/dτ₁, (N,)
 
     F_m = scale det_{ks}[Σ_j w_kj cos(2πm·G_s(ψ_j))], as in analytic.time_map.fourier.
     """
-    count, genus = weights.shape[:2]
-    orders = _orders(highest, genus)
+    genus = weights.shape[1]
+    orders = orders_of(highest, genus)
     columns = np.stack(
         [_column(weights[:, s], 2 * np.pi * G[:, s], highest) for s in range(genus)], axis=2
     )  # (N, k, s, K)
@@ -119,11 +135,7 @@ def form_tables(weights: Array, G: Array, scale: Array, mean: Array, highest: in
         off += sizes[:, s, None] * (1 + _each(wide[:, s], np.abs(orders).T)) * others
     off *= COLUMN_ROUNDING * np.abs(scale / mean)[:, None]
     counts = (np.abs(values) > np.maximum(SMALLEST_MODE, off)) & _is_counted(orders)
-    largest = np.max(np.where(counts, off, 0.0), axis=1) / 2
-    shape = (count, highest + 1, *(2 * highest + 1,) * (genus - 1))
-    return ModeTables(
-        np.where(counts, values, 0.0).reshape(shape), np.maximum(4 * SMALLEST_MODE, largest)
-    )
+    return values, off, counts
 
 
 def _column(weights: Array, angles: Array, highest: int) -> Array:
