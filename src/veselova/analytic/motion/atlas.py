@@ -278,7 +278,9 @@ def _stack(
     vars(periods)["angle_series"] = np.ascontiguousarray(numbers[:, 3:end]).reshape(count, 2, 2, -1)
     values = np.zeros((count, (panel.highest + 1) * (2 * panel.highest + 1)))
     values[:, panel.modes] = numbers[:, end:]
-    tables = ModeTables(values.reshape(count, panel.highest + 1, -1), np.full(count, panel.off))
+    tables = ModeTables(
+        values.reshape(count, panel.highest + 1, -1), np.full(count, panel.off), panel.modes
+    )
     slopes = np.abs(stack.maps.slopes(stack.angles[:, None])[:, 0])
     of_angles = (slopes @ np.abs(stack.angles)[..., None])[..., 0] + panel.cancellation
     vars(stack).update(

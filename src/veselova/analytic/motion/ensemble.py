@@ -136,8 +136,7 @@ def states_of_stack(
 ) -> Iterator[States]:
     """Yield the states at the times of a grid of those problems of a stack that can be served."""
     maps = TimeMaps(tables, stack.phases, stack.frequencies, stack.mean)
-    motions = _Motions(stack, maps, frames)
-    rows = np.flatnonzero(~maps.has_slow_modes & motions.is_certain)
+    rows = np.flatnonzero(~maps.has_slow_modes)
     size = max(1, _POINT_BLOCK // times.doubles.size)
     for first in range(0, rows.size, size):
         checkpoint()
@@ -203,7 +202,7 @@ class _Motions:
         times = grid.doubles
         tau1, z, slopes, converged = self.maps.tau1(times, grid.remainders)
         psi, inverted = stack.maps.invert(z)
-        served = converged & inverted
+        served = converged & inverted & self.is_certain
         count, number, genus = psi.shape
         inverses = np.linalg.inv(stack.maps.slopes(psi))  # ∂ψ/∂z
         steps = _STEP / np.maximum(1.0, np.max(np.abs(inverses), axis=2))  # (N, T, g)

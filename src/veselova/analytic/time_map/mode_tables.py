@@ -53,10 +53,12 @@ class ModeTables:
     - values: (N, M+1, 2M+1, …) F_m/F_0, one of each m and −m; the others, m = 0 and what is
       rounding are zero
     - off: (N,) what each of them is off by
+    - kept: (K',) the places in the box of modes that may count on any torus; None for all
     """
 
     values: Array
     off: Array
+    kept: NDArray[np.intp] | None = None
 
     @property
     def highest(self) -> int:
@@ -70,19 +72,33 @@ class ModeTables:
 
     @cached_property
     def orders(self) -> NDArray[np.int64]:
-        """Return the modes of the box, (K, g)."""
-        return orders_of(self.highest, self.genus)
+        """Return the modes that may count, (K, g)."""
+        box = orders_of(self.highest, self.genus)
+        return box if self.kept is None else box[self.kept]
+
+    @cached_property
+    def flat(self) -> Array:
+        """Return F_m/F_0 of these, (N, K)."""
+        values = self.values.reshape(len(self.values), -1)
+        return values if self.kept is None else values[:, self.kept]
+
+    def box_of(self, flat: Array) -> Array:
+        """Return numbers of these modes in the box, (N, M+1, 2M+1, …)."""
+        if self.kept is None:
+            return np.asarray(flat.reshape(self.values.shape))
+        result = np.zeros((len(flat), self.values[0].size))
+        result[:, self.kept] = flat
+        return result.reshape(self.values.shape)
 
     def part(self, rows: NDArray[np.intp]) -> ModeTables:
         """Return the tables of some of the tori."""
-        return ModeTables(self.values[rows], self.off[rows])
+        return ModeTables(self.values[rows], self.off[rows], self.kept)
 
     @cached_property
     def fits(self) -> NDArray[np.bool_]:
         """Return of which tori no mode on the faces of the box counts, (N,)."""
         at_face = np.max(np.abs(self.orders), axis=1) == self.highest
-        flat = self.values.reshape(len(self.values), -1)
-        return np.asarray(~np.any(flat[:, at_face], axis=1))
+        return np.asarray(~np.any(self.flat[:, at_face], axis=1))
 
 
 def orders_of(highest: int, genus: int) -> NDArray[np.int64]:
@@ -222,8 +238,11 @@ class TimeMaps:
         """Return the error that the modes add to τ₁ within Neumann times (N,), and what is to be
         multiplied with |τ₁|, (N,) each, from errors of z⁰ and f, (N, g), as FourierTimeMap does.
         """
-        counts = _with_neighbours(self.tables.values != 0).reshape(len(self.mean), -1)
-        counts &= np.any(self.tables.orders != 0, axis=1)
+        if self.tables.kept is None:
+            counts = _with_neighbours(self.tables.values != 0).reshape(len(self.mean), -1)
+            counts &= np.any(self.tables.orders != 0, axis=1)
+        else:
+            counts = np.ones(self._flat.shape, dtype=bool)
         lengths = np.minimum(1 / np.maximum(self.paces, _STANDING), elapsed[:, None])
         of_all = np.sqrt(np.sum(np.where(counts, lengths * lengths, 0.0), axis=1))
         of_modes = self.tables.off * (of_all + 1 / self.fastest)
@@ -248,7 +267,7 @@ class TimeMaps:
 
     @cached_property
     def _flat(self) -> Array:
-        return np.asarray(self.tables.values.reshape(len(self.mean), -1))
+        return self.tables.flat
 
     @cached_property
     def _amplitudes(self) -> Array:
@@ -274,8 +293,7 @@ class TimeMaps:
     @cached_property
     def _stacked(self) -> Array:
         """Return amplitudes and coefficients, doubled, in one table (N, 2, M+1, 2M+1, …)."""
-        shape = self.tables.values.shape
-        amplitudes = self._amplitudes.reshape(shape)
+        amplitudes = self.tables.box_of(self._amplitudes)
         return np.stack([amplitudes, 2 * self.tables.values], axis=1)
 
     @cached_property

@@ -11,7 +11,6 @@ from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_documents import encode, ensemble_document
 from veselova.service.api.request_models import read_request
 from veselova.service.cli.console import print_ensemble, print_json, terminal
-from veselova.service.workers.tasks import ensemble_request
 
 __all__ = ["WRITERS", "read", "show"]
 
@@ -26,6 +25,8 @@ def read(document: Any) -> EnsembleRequest:
 
 def show(request: EnsembleRequest, as_json: bool, output: Path | None) -> None:
     """Solve all starts; print what became of them, and write the arrays."""
+    from veselova.service.workers.tasks import ensemble_request
+
     ensemble = ensemble_request(request)
     if output is not None and output.suffix.lower() == ".json":
         output.write_bytes(encode(ensemble_document(ensemble)))

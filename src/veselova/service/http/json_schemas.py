@@ -16,6 +16,7 @@ from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.mechanics.results.curve import QUASI_PERIODS
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.http.ensemble_schema import ensemble_schema
 from veselova.service.http.job_document import JobDocument, JobList
 from veselova.service.workers.tasks import TASKS
 
@@ -37,16 +38,6 @@ def _series(number: dict[str, Any]) -> dict[str, Any]:
             for _ in range(len(axes) + 1):
                 schemas[name] = {"type": "array", "items": schemas[name]}
     return schemas
-
-
-def _series_of_many() -> dict[str, Any]:
-    """Return the schemas of the outputs of many Veselova problems."""
-    number = {"type": "number"}
-    outputs = SYSTEMS["veselova"].problem_class.outputs
-    return {
-        name: {"type": "array", "items": _series(number)[name], "description": "by rows, times, …"}
-        for name in outputs
-    }
 
 
 _TEXT = {"type": "string"}
@@ -131,30 +122,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
         },
         required=["engine", "times", "series", "integrals", "error", "provenance"],
     ),
-    "Ensemble": _object(
-        {
-            "times": _NUMBERS,
-            "outcome": {**_TEXTS, "description": "of each start: solved, or the reason's name"},
-            "detail": {**_TEXTS, "description": "of each start: the reason in a sentence"},
-            "together": {
-                "type": "array",
-                "items": {"type": "boolean"},
-                "description": "which starts were computed side by side",
-            },
-            "rows": {
-                "type": "array",
-                "items": {"type": "integer"},
-                "description": "the starts that were solved, from 0: the first axis of the series",
-            },
-            "series": _object(_series_of_many(), required=[]),
-            "error": {
-                **_MATRIX,
-                "description": "bounds the true error of every component of q and frame: true ≤ "
-                "error; by rows and times",
-            },
-            "provenance": _PROVENANCE,
-        }
-    ),
+    "Ensemble": ensemble_schema(_PROVENANCE),
     "Comparison": _object(
         {
             "deviation": {
