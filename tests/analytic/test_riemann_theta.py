@@ -301,3 +301,22 @@ def test_all_faults_of_the_arguments_come_together() -> None:
         theta.riemann_theta([["x", 1]], [["y", 0], [0, 1j]], [[0], [0]], 7)
     fields = [fault.field for fault in caught.value.faults]
     assert fields == ["tau[0][0]", "z[0][0]", "derivatives"]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("genus", [1, 2, 3])
+def test_functions_found_together_are_those_found_alone(genus: int, order: int) -> None:
+    # those that differ by halves share their terms; thirds are on their own
+    random = np.random.default_rng([17, genus, order])
+    tau = random_tau(random, genus)
+    z = random.normal(size=(5, genus)) * 30 + 0.3j * random.normal(size=(5, genus))
+    thirds = [[[1 / 3] * genus, [0.1] * genus], [[1 / 3] * genus, [0.6] + [0.1] * (genus - 1)]]
+    characteristics = [*all_halves(genus), *thirds]
+    together = theta.scaled_riemann_theta(z, tau, characteristics, order)
+    for place, characteristic in enumerate(characteristics):
+        alone = theta.scaled_riemann_theta(z, tau, characteristic, order)
+        size = np.exp(together.exponent[:, place] - alone.exponent)
+        size = size.reshape(size.shape + (1,) * order)
+        off = np.abs(together.mantissa[:, place] * size - alone.mantissa)
+        bound = (alone.error + together.error[:, place]).reshape(size.shape)
+        assert (off <= bound).all()
