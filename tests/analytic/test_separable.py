@@ -71,6 +71,34 @@ def test_tensors_equal_moments_and_special_starts_are_served(rng: Generator) -> 
     agreement(VeselovaSO3([0.5, 1, 2], gamma, across, {"family": [0, 0, 1e-6, 0, 0]}))
 
 
+@pytest.mark.parametrize(
+    ("inertia", "gamma", "Omega", "clebsch"),
+    [
+        # past a pole of the coordinate lines, where they turn by π within a ten-thousandth
+        (
+            ["1000/797", "1000/1047", "500/349"],
+            ["67/12500000", "-66/125", "269/1000"],
+            ["-224593/500000", "-25527/12500000000", "30887/6250000000"],
+            "-1/125",
+        ),
+        # a start that is steeper than every sampled point of its torus
+        (
+            ["302/125", "2117/1000", "190660596/67896125"],
+            ["1/1000", "-737/1000", "-211/250"],
+            ["331387/1000000", "-92729/200000", "202629/500000"],
+            "49/100",
+        ),
+    ],
+)
+def test_beside_a_pole_of_the_coordinate_lines_the_error_holds(
+    inertia: Any, gamma: Any, Omega: Any, clebsch: str
+) -> None:
+    problem = VeselovaSO3(inertia, gamma, Omega, {"clebsch": clebsch}, normalize=True)
+    for times in (np.array([-4.3, -1.3, 0.0, 0.4, 1.7, 4.3]), np.linspace(-4.3, 4.3, 101)):
+        closed = agreement(problem, times)
+        assert np.max(closed.error) < 1e-9
+
+
 @pytest.mark.slow
 def test_far_away_the_closed_form_keeps_its_digits(rng: Generator) -> None:
     problem = VeselovaSO3(

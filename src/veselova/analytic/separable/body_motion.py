@@ -96,12 +96,13 @@ class BodyMotion(Motion[VeselovaSO3]):
         at, velocity, rate = orbit.states(z)
         series = self._series(at, velocity, panels.at(tau))
         lag = orbit.lag(grid.doubles, tau, rate, time_map)
-        error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _frames))
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
         # mean.
-        error = error + panels.error(tau) + (panels.mean_size + np.abs(panels.integrand(tau))) * lag
-        along = orbit.slopes_along(self._turning_at, panels, tau)
-        error = error + orbit.integral_error(tau, slopes, along)
+        turning = np.abs(panels.integrand(tau))
+        sensitivities = orbit.sensitivities(self._sensitivity, z, _frames, turning)
+        error = orbit.error(tau, lag, *sensitivities)
+        error = error + panels.error(tau) + (panels.mean_size + turning) * lag
+        error = error + orbit.integral_error(orbit.motion.turning, panels, tau)
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
 

@@ -41,15 +41,17 @@ _EVALUATION = 16.0
 _PHASE = 8.0
 _RATE = 4.0
 
-#: Points at which steepness is sampled.
+#: Points at which turning is sampled.
 _SAMPLES = 48
 
-#: Panels up to which slopes of an integrand are summed along the orbit, and cells of a panel.
-_FEW_PANELS = 200
-_CELLS = 8
+#: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at once, and by
+#: how much they may be steeper within a panel than in its mean.
+_GAUSS = 16
+_BLOCK = 4096
+_STEEPEST = 8.0
 
-#: Step of a difference quotient in a phase.
-_STEP = 1e-6
+#: Step of a difference quotient in a phase, over what the slowest phase takes along a panel.
+_STEP = 1e-3
 
 
 class SeparableOrbit:
@@ -113,7 +115,7 @@ class SeparableOrbit:
 
     @cached_property
     def sample(self) -> Array:
-        """Return points of the torus at which steepness is looked at, phases modulo 2."""
+        """Return points of the torus at which turning is looked at, phases modulo 2."""
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
@@ -123,11 +125,24 @@ class SeparableOrbit:
         """
         return self._sensitivity_at(self.sample, values).largest()
 
-    def local_sensitivity(
-        self, z: Array, values: Callable[[Attitude], Array]
-    ) -> Sensitivity | None:
-        """Return the same at each of the phases z (N, g); None where they are many."""
-        return None if len(z) > MOST_LOCAL else self._sensitivity_at(z, values)
+    def sensitivities(
+        self,
+        sampled: Sensitivity,
+        z: Array,
+        values: Callable[[Attitude], Array],
+        turning: Array | None = None,
+    ) -> tuple[Sensitivity, Sensitivity | None]:
+        """Return the largest of the sampled ones and of those at some of the phases z (N, g), half
+        of them where ``turning`` (N,) is largest; and those at each, None where they are many.
+        """
+        if len(z) <= MOST_LOCAL:
+            local = self._sensitivity_at(z, values)
+            return sampled.maximum(local.largest()), local
+        rows = np.linspace(0, len(z) - 1, MOST_LOCAL).astype(int)
+        if turning is not None:
+            steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
+            rows = np.concatenate([rows[::2], steepest])
+        return sampled.maximum(self._sensitivity_at(z[rows], values).largest()), None
 
     def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
         genus = self.motion.periods.genus
@@ -161,35 +176,55 @@ class SeparableOrbit:
 
         return by(largest) if local is None else combine_bounds(by(largest), by(local))
 
-    def slopes_along(
+    def integral_error(
         self, integrand: Callable[[Array], Array], panels: Panels, tau: Array
-    ) -> Array | None:
-        """Return ∫|∂f/∂z_k| dτ from zero to each τ, (N, g), of an integrand f at phases; None on
-        many panels.
-        """
-        genus = self.motion.periods.genus
-        if panels.lengths.size > _FEW_PANELS:
-            return None
-        cells = np.repeat(panels.lengths / _CELLS, _CELLS)
-        borders = panels.borders[0] + np.concatenate([[0.0], np.cumsum(cells)])
-        z = self.in_tau.phases(borders[:-1] + cells / 2)
-        here = integrand(z)
-        slopes = [np.abs(integrand(z + step) - here) / _STEP for step in _STEP * np.eye(genus)]
-        sums = [np.concatenate([[0.0], np.cumsum(BETWEEN * cells * part)]) for part in slopes]
-        between = [np.interp(tau, borders, x) - np.interp(0.0, borders, x) for x in sums]
-        return np.asarray(np.abs(np.stack(between, axis=1)))
+    ) -> Array:
+        """Return how far errors of the phases move the integral along the orbit from zero to each
+        τ, (N,), of an integrand f at angles.
 
-    def integral_error(self, tau: Array, slopes: Array, along: Array | None) -> Array:
-        """Return how far errors of the phases move an integral along the orbit, (N,), from its
-        integrand's largest slopes in them, (g,), and from those along the orbit, ``slopes_along``.
-
-        They act in one sense for as long as the slowest phase takes for a radian, at most.
+        A constant error δ_k moves it by δ_k ∫∂f/∂z_k dτ, one of a frequency by as much of
+        ∫τ ∂f/∂z_k dτ. Rounding of single phases adds in squares.
         """
-        rates = np.abs(self.in_tau.rates)
-        elapsed = np.abs(tau)
-        acting = np.minimum(elapsed, 1 / np.min(rates))
-        moved = self.start_rounding + _RATE * DOUBLE.epsilon * elapsed[:, None] * rates
-        largest = acting * (moved @ slopes)
-        if along is None:
-            return np.asarray(largest)
-        return np.asarray(np.minimum(largest, np.sum(moved * along, axis=1)))
+        zero = int(np.searchsorted(panels.borders, 0.0))
+        nodes, parts = self._slopes_along(integrand, panels)
+        sums = (parts, parts * nodes, parts * parts)
+        whole, growing, squares = (np.abs(_from_zero(np.sum(x, axis=2), zero)) for x in sums)
+        panel = panels.panel_of(panels.borders, tau)
+        border = panel + (tau < 0)  # of the panel, on the side of zero
+        part = _STEEPEST * np.abs(tau - panels.borders[border]) / panels.lengths[panel]
+        within = np.sum(np.abs(parts), axis=2)[:, panel] * np.minimum(1.0, part)
+        start = self.start_rounding[:, None]
+        rates = _RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates)[:, None]
+        moved = start * (whole[:, border] + within + np.sqrt(squares[:, border]))
+        moved += rates * (growing[:, border] + np.abs(tau) * within)
+        return np.asarray(BETWEEN * np.sum(moved, axis=0))
+
+    def _slopes_along(
+        self, integrand: Callable[[Array], Array], panels: Panels
+    ) -> tuple[Array, Array]:
+        """Return Gauss' nodes of each panel, (P, _GAUSS), and ∂f/∂z_k there times their weights,
+        (g, P, _GAUSS).
+
+        Panels are short where f is steep, and a step in a phase is a part of what a panel takes.
+        """
+        places, weights = np.polynomial.legendre.leggauss(_GAUSS)
+        lengths = panels.lengths[:, None]
+        nodes = panels.borders[:-1, None] + lengths * (1 + places) / 2
+        z = self.in_tau.phases(nodes.ravel())
+        slowest = np.min(np.abs(self.in_tau.rates))
+        steps = (_STEP * panels.lengths * slowest).repeat(_GAUSS)
+        slopes = np.empty((z.shape[1], len(z)))
+        for first in range(0, len(z), _BLOCK):
+            rows = slice(first, first + _BLOCK)
+            phi = self.inversion.invert(z[rows])
+            moves = np.linalg.inv(self.inversion.jacobian(phi)) * steps[rows, None, None]
+            here = integrand(phi)
+            for k in range(len(slopes)):
+                slopes[k, rows] = (integrand(phi + moves[:, :, k]) - here) / steps[rows]
+        return nodes, slopes.reshape(len(slopes), *nodes.shape) * lengths * weights / 2
+
+
+def _from_zero(over_panels: Array, zero: int) -> Array:
+    """Return the sums (g, P+1) at borders of parts over panels (g, P), 0 at number ``zero``."""
+    sums = np.concatenate([np.zeros((len(over_panels), 1)), np.cumsum(over_panels, axis=1)], axis=1)
+    return np.asarray(sums - sums[:, zero, None])

@@ -68,7 +68,7 @@ class PointMotion(Motion[SeparableVeselova]):
         at, velocity, rate = orbit.states(z)
         series = self._series(at, velocity)
         lag = orbit.lag(grid.doubles, tau, rate, time_map)
-        error = orbit.error(tau, lag, self._sensitivity, orbit.local_sensitivity(z, _positions))
+        error = orbit.error(tau, lag, *orbit.sensitivities(self._sensitivity, z, _positions))
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
 
