@@ -22,8 +22,11 @@ const carriesMotion: Plugin = {
   },
 };
 
+const { build, ...shared } = page;
+const { rolldownOptions: _, ...built } = build ?? {};
+
 export default mergeConfig(
-  page,
+  { ...shared, build: built },
   defineConfig({
     plugins: [carriesMotion, viteSingleFile({ removeViteModuleLoader: true })],
     resolve: {

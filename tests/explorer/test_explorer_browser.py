@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,15 +14,20 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import httpx2
+import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium, running_browser, visiting
 from explorer_bundle import EXPLORER
+from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from conftest import Server, running_server
 
 pytestmark = needs_chromium
 
-PRESETS = [preset["name"] for preset in json.loads((EXPLORER / "src/presets.json").read_text())]
+PRESET_LIST = json.loads((EXPLORER / "src/presets.json").read_text())
+PRESETS = [preset["name"] for preset in PRESET_LIST]
 
 
 @pytest.fixture(scope="module")
@@ -324,3 +331,74 @@ def test_when_the_server_goes_the_motion_goes_on(browser: Any, tmp_path: Path) -
         assert "The server does not answer." in visit.text("#banner")
         before = visit.time()
         visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.2")
+
+
+def test_the_page_of_the_api_works_offline(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.page.goto(f"{server.url}/docs")
+        visit.wait_for("document.querySelectorAll('.opblock').length >= 15")
+        assert "veselova" in visit.text(".info .title")
+        visit.page.click('.opblock:has-text("/v1/systems") button.opblock-summary-control')
+        visit.page.click(".try-out__btn")
+        visit.page.click("button.execute")
+        visit.wait_for("document.querySelector('.live-responses-table tbody .response-col_status')")
+        assert "200" in visit.text(".live-responses-table tbody .response-col_status")
+        assert "ellipsoid-geodesic" in visit.text(".live-responses-table")
+
+
+@pytest.mark.parametrize(("preset", "view"), [("generic", "body"), ("ball", "ball")])
+def test_a_scene_leaves_with_its_motion(
+    visit: Visit, tmp_path: Path, preset: str, view: str
+) -> None:
+    """The file is read by hand: its frames are those of the engine, to single precision."""
+    visit.open(f"#preset={preset}&t=3&speed=2&play=0")
+    visit.wait_for_ink(view, colours=100, part=0.03)
+    raw = visit.download(f'[data-view="{view}"] button:has-text("GLB")', tmp_path).read_bytes()
+    magic, version, length, size, kind = struct.unpack_from("<4sIII4s", raw)
+    assert (magic, version, length, kind) == (b"glTF", 2, len(raw), b"JSON")
+    scene = json.loads(raw[20 : 20 + size])
+    data = raw[28 + size :]
+
+    def read(accessor: int, width: int) -> Any:
+        one = scene["accessors"][accessor]
+        where = scene["bufferViews"][one["bufferView"]]
+        start = where.get("byteOffset", 0) + one.get("byteOffset", 0)
+        return np.frombuffer(data, "<f4", one["count"] * width, start).reshape(-1, width)
+
+    (animation,) = scene["animations"]
+    turns = [one for one in animation["channels"] if one["target"]["path"] == "rotation"]
+    sampler = animation["samplers"][turns[0]["sampler"]]
+    seconds, found = read(sampler["input"], 1)[:, 0], read(sampler["output"], 4)
+    assert (seconds[0], seconds[-1], seconds.size) == (0, 10, 301)
+    problem = next(one for one in PRESET_LIST if one["name"] == preset)["problem"]
+    request = {"problem": problem, "times": [float(3 + 2 * s) for s in seconds]}
+    frame = np.array(
+        httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]["frame"]
+    )
+    # The rows of the attitude in the order e_2, e_3, e_1: the picture has its z upwards.
+    truth = Rotation.from_matrix(np.swapaxes(frame[..., [1, 2, 0]], 1, 2))
+    assert np.max((Rotation.from_quat(found) * truth.inv()).magnitude()) < 1e-5
+    assert np.all(np.sum(found[1:] * found[:-1], axis=1) > 0)
+    assert len(scene["meshes"]) >= 3
+
+
+def test_a_film_leaves_the_page(visit: Visit, browser: Any, tmp_path: Path) -> None:
+    visit.open("#preset=generic&t=3&play=0")
+    visit.wait_for_ink("body", colours=300, part=0.2)
+    button = '[data-view="body"] .card-tools button[aria-label^="WebM"]'
+    visit.page.click(button)
+    visit.wait_for("document.getElementById('play').textContent === 'Pause'")
+    assert visit.text(button) == "Stop"
+    visit.page.wait_for_timeout(2500)
+    film = visit.download(button, tmp_path)
+    assert film.read_bytes()[:4] == b"\x1a\x45\xdf\xa3"
+    assert b"V_VP" in film.read_bytes()[:1000]
+    (tmp_path / "film.html").write_text("<p id='status'>.</p><video src='body.webm' muted></video>")
+    with visiting(browser, "file://") as other:
+        other.open(f"{tmp_path}/film.html".lstrip("/"))
+        other.wait_for("document.querySelector('video').readyState >= 2")
+        video = other.page.locator("video")
+        width = visit.page.locator('[data-view="body"] canvas').evaluate("(one) => one.width")
+        assert video.evaluate("(one) => one.videoWidth") == width
+        shown = Image.open(io.BytesIO(video.screenshot())).convert("RGB")
+        assert len(shown.getcolors(1 << 24)) > 300

@@ -19,6 +19,10 @@ from veselova.service.http.app import create_app
 LARGEST_FIRST_LOAD = 350_000
 
 
+#: Files that come when they are asked for: the API's page, and the export of scenes.
+LATER = ("docs-", "scene_file-")
+
+
 @pytest.fixture(scope="module")
 def bundle() -> Path:
     """Return the folder of the bundle."""
@@ -60,6 +64,21 @@ def test_the_policy_lets_nothing_but_its_own_files_run(bundle: Path, client: Tes
     assert "://" not in re.sub(r'href="data:[^"]*"', "", text)
 
 
+def test_the_page_of_the_api_runs_its_own_files_alone(bundle: Path, client: TestClient) -> None:
+    page = client.get("/docs")
+    assert page.status_code == 200
+    policy = page.headers["content-security-policy"]
+    assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self'")
+    assert "unsafe" not in policy
+    assert "http" not in policy
+    for header, value in (("x-content-type-options", "nosniff"), ("x-frame-options", "DENY")):
+        assert page.headers[header] == value
+    names = re.findall(r'(?:src|href)="\./(explorer/[\w.-]+)"', page.text)
+    assert len(names) == 2
+    assert all(client.get(f"/{name}").status_code == 200 for name in names)
+    assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\sstyle=|\son\w+=", page.text)
+
+
 def test_files_are_compressed_and_known_again(bundle: Path, client: TestClient) -> None:
     plain = client.get("/", headers={"Accept-Encoding": "identity"})
     assert "content-encoding" not in plain.headers
@@ -82,7 +101,12 @@ def test_other_paths_are_no_files(bundle: Path, client: TestClient) -> None:
 def test_the_first_load_is_small(bundle: Path) -> None:
     """All scripts and styles together, and the fonts that the formulas of the page take."""
     folder = bundle / "explorer"
-    files = [path for path in folder.iterdir() if path.suffix in (".js", ".css")]
+    files = [
+        path
+        for path in folder.iterdir()
+        if path.suffix in (".js", ".css") and not path.name.startswith(LATER)
+    ]
+    assert len(files) >= 5
     size = sum(len(gzip.compress(path.read_bytes())) for path in files)
     fonts = ("KaTeX_Main-Regular", "KaTeX_Math-Italic", "KaTeX_Size1", "KaTeX_Size2")
     size += sum(path.stat().st_size for name in fonts for path in folder.glob(f"{name}-*"))
@@ -93,12 +117,13 @@ def test_the_first_load_is_small(bundle: Path) -> None:
 def test_without_a_bundle_the_page_says_how_to_get_it(tmp_path: Path) -> None:
     from fastapi import FastAPI
 
-    app = FastAPI()
+    app = FastAPI(docs_url=None)
     explorer.add_explorer(app, tmp_path)
-    answer = TestClient(app).get("/")
-    assert answer.status_code == 404
-    assert answer.text.count(".\n") == 1
-    assert "explorer/build.py" in answer.text
+    for path in ("/", "/docs"):
+        answer = TestClient(app).get(path)
+        assert answer.status_code == 404
+        assert answer.text.count(".\n") == 1
+        assert "explorer/build.py" in answer.text
 
 
 def test_a_server_serves_it(bundle: Path, server: Server) -> None:

@@ -119,7 +119,6 @@ def test_the_openapi_document_describes_and_exemplifies_every_resource(server: S
         assert body["schema"]["$ref"].split("/")[-1] in document["components"]["schemas"]
         assert post(server, path, body["example"]).status_code == 200
         assert {"200", "400", "413", "415", "422", "503", "504"} <= set(operation["responses"])
-    assert server.get("/docs").status_code == 200
 
 
 def test_systems_health_and_readiness(server: Server) -> None:

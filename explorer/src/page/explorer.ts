@@ -13,6 +13,7 @@ import { FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
+import type { Film } from "./scene_file.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
 import type { Only, State } from "./state.ts";
@@ -65,14 +66,16 @@ export class Explorer {
     this.#controls = new Controls(elements.fields, source.editable, change);
     this.#state = this.#stateOf(location.hash);
     document.documentElement.dataset.editable = String(source.editable);
-    this.#gallery = new Gallery(
-      elements.views,
-      (choice) => this.#start(choice),
-      (name) => {
+    this.#gallery = new Gallery(elements.views, {
+      choose: (choice) => this.#start(choice),
+      enlarged: (name) => {
         this.#state.large = name;
         this.#writeAddress();
       },
-    );
+      film: () => this.#film(),
+      play: () => this.place({ playing: true }),
+      say: (sentence) => (elements.message.textContent = sentence),
+    });
     this.#fillChoosers();
     this.#listen();
     this.#adopt(this.#state);
@@ -185,6 +188,13 @@ export class Explorer {
     if (event.key !== " " || typing) return;
     event.preventDefault();
     this.#toggle();
+  }
+
+  #film(): Film | null {
+    if (!this.#loaded) return null;
+    const { motion, range } = this.#loaded;
+    const { time, speed } = this.#player;
+    return { motion, range, from: time[0], speed };
   }
 
   /** What is shown at the moment. */

@@ -16,9 +16,26 @@ import { TorusView } from "../views/torus_view.ts";
 import { element } from "../views/view.ts";
 import type { Loaded, View } from "../views/view.ts";
 import { pictureOf, save, svgOf } from "./exports.ts";
+import { filmType, record } from "./recorder.ts";
+import type { Recording } from "./recorder.ts";
+import type { Film } from "./scene_file.ts";
 
 /** Milliseconds between two writings of the twins in text. */
 const TWIN_EVERY_MS = 1000;
+
+/** What views ask of the page. */
+export interface Hooks {
+  /** Begin at constants that were chosen on the map. */
+  choose: (choice: Choice) => void;
+  /** A view was enlarged, or none. */
+  enlarged: (name: string) => void;
+  /** The motion that plays, from its present time on. */
+  film: () => Film | null;
+  /** Let the motion play. */
+  play: () => void;
+  /** Say something in a sentence. */
+  say: (sentence: string) => void;
+}
 
 export class Gallery {
   readonly #engines = new EnginesView();
@@ -26,18 +43,17 @@ export class Gallery {
   readonly #host: HTMLElement;
   readonly #absent = element("p", { id: "absent" });
   readonly #seen = new Set<Element>();
-  readonly #enlarged: (name: string) => void;
+  readonly #hooks: Hooks;
+  /** Films that are being recorded; their views are drawn out of sight too. */
+  readonly #recordings = new Map<View, Recording>();
+  readonly #sceneButtons = new Map<View3D, HTMLButtonElement>();
   #shown: View[] = [];
   #written = -TWIN_EVERY_MS;
   #time = NaN;
 
-  constructor(
-    host: HTMLElement,
-    choose: (choice: Choice) => void,
-    enlarged: (name: string) => void,
-  ) {
+  constructor(host: HTMLElement, hooks: Hooks) {
     this.#host = host;
-    this.#enlarged = enlarged;
+    this.#hooks = hooks;
     this.#views = [
       new BodyView(),
       new SphereView(),
@@ -45,7 +61,7 @@ export class Gallery {
       new BallView(),
       new EllipsoidView(),
       new CurveView(),
-      new ConstantsView(choose),
+      new ConstantsView(hooks.choose),
       this.#engines,
     ];
     const watch = new IntersectionObserver((entries) => {
@@ -64,11 +80,12 @@ export class Gallery {
 
   #tools(view: View): HTMLElement {
     const tools = element("div", { class: "card-tools" });
-    const add = (text: string, label: string, act: () => void) => {
+    const add = (text: string, label: string, act: (made: HTMLButtonElement) => void) => {
       const made = element("button", { type: "button", "aria-label": `${text}, ${label}: ${view.title}` });
       made.textContent = text;
-      made.addEventListener("click", act);
+      made.addEventListener("click", () => act(made));
       tools.append(made);
+      return made;
     };
     add("PNG", "save a picture", () => void this.#savePicture(view));
     if (!(view instanceof View3D) && view.name !== "constants") {
@@ -76,11 +93,19 @@ export class Gallery {
         save(svgOf(view.curves()), `${view.name}.svg`, "image/svg+xml"),
       );
     }
+    if (view instanceof View3D) {
+      const made = add("GLB", "save the scene and its motion", () => void this.#saveScene(view));
+      this.#sceneButtons.set(view, made);
+    }
+    const type = filmType();
+    if (type && (view instanceof View3D || view.name === "curve")) {
+      add("WebM", "record a film", (made) => void this.#record(view, made, type));
+    }
     if (view !== this.#engines) {
       add("⤢", "enlarge or reduce", () => {
         const large = view.card.classList.contains("large") ? "" : view.name;
         this.enlarge(large);
-        this.#enlarged(large);
+        this.#hooks.enlarged(large);
       });
     }
     return tools;
@@ -90,6 +115,36 @@ export class Gallery {
     view.draw();
     const canvases = view === this.#engines ? this.#engines.canvases() : [view.canvas];
     if (canvases.length) save(await pictureOf(canvases, theme().background), `${view.name}.png`);
+  }
+
+  async #saveScene(view: View3D): Promise<void> {
+    const film = this.#hooks.film();
+    if (!film) return;
+    // The exporter comes when it is asked for first.
+    const { sceneFile } = await import("./scene_file.ts");
+    save(await sceneFile(view, film), `${view.name}.glb`);
+    view.stale = true;
+  }
+
+  /** Record a film until the button is pressed again. */
+  async #record(view: View, made: HTMLButtonElement, type: string): Promise<void> {
+    const going = this.#recordings.get(view);
+    if (going) {
+      going.stop();
+      return;
+    }
+    this.#hooks.play();
+    const recording = record(view.canvas, type);
+    this.#recordings.set(view, recording);
+    made.textContent = "Stop";
+    try {
+      save(await recording.film, `${view.name}.webm`);
+    } catch (error) {
+      this.#hooks.say((error as Error).message);
+    } finally {
+      this.#recordings.delete(view);
+      made.textContent = "WebM";
+    }
   }
 
   /** Make one view as broad as the page, or none. */
@@ -119,6 +174,7 @@ export class Gallery {
     }
     this.#absent.textContent = reasons.join(" ");
     for (const view of this.#shown) view.build(loaded);
+    for (const [view, made] of this.#sceneButtons) made.hidden = view.actors().length === 0;
     this.refresh();
   }
 
@@ -150,7 +206,8 @@ export class Gallery {
       if (moved) view.stale = true;
       if (write) view.twin.textContent = view.describe(sample);
       // What is out of sight is drawn now and then, so that scrolling finds no empty card.
-      if (!view.stale || (!write && !this.#seen.has(view.card))) continue;
+      const watched = write || this.#seen.has(view.card) || this.#recordings.has(view);
+      if (!view.stale || !watched) continue;
       view.show(sample);
       view.draw();
       view.stale = false;

@@ -1,7 +1,7 @@
 /** The ball on its plane: contact path, horizontal momentum, and the line of its mean drift. */
 import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import { BufferAttribute, Color } from "three";
-import type { ArrowHelper, Line } from "three";
+import type { ArrowHelper, Line, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -100,6 +100,16 @@ export class BallView extends View3D {
       this.#drift.visible = size > 0;
       if (size > 0) moveLine(this.#drift, alongDrift(x, y, u / size, v / size, a));
     }
+  }
+
+  override actors(): Object3D[] {
+    return [this.#ball];
+  }
+
+  override pen({ position }: Sample): Point | null {
+    if (!position) return null;
+    const [x, y] = this.#origin;
+    return [position[0] - x, position[1] - y, 0.012 * this.#radius];
   }
 
   describe({ position, q }: Sample): string {

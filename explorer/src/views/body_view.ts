@@ -4,7 +4,7 @@
  */
 import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
 import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
-import type { ArrowHelper } from "three";
+import type { ArrowHelper, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
@@ -187,6 +187,17 @@ export class BodyView extends View3D {
       aim(this.#omega, ...end);
       this.#trail?.lead(end);
     }
+  }
+
+  override readonly ink = ORANGE;
+
+  override actors(): Object3D[] {
+    if (this.#n > 3) return [];
+    return this.#omega ? [this.#solid, this.#omega, this.#omega.line, this.#omega.cone] : [this.#solid];
+  }
+
+  override pen({ frame, Omega }: Sample): Point | null {
+    return Omega.length ? this.#inSpace(frame, Omega) : null;
   }
 
   /** Move the vertices of the hypercube: y = Eᵀx, in perspective along y_4, coloured by it. */

@@ -2,7 +2,7 @@
  * The geodesic on Σ X_i²/A_i = 1 with X = Aq/√(q,Aq), (Gauss): its tangent lines touch the confocal
  * quadric of μ = 1/c_2 (Chasles).
  */
-import type { Line, Mesh } from "three";
+import type { Line, Mesh, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { confocalQuadric } from "./conics.ts";
@@ -106,6 +106,15 @@ export class EllipsoidView extends View3D {
       this.#touch.visible = touch !== null && Math.abs(touch) < 2.6;
       this.#touch.position.set(...at(touch ?? 0));
     }
+  }
+
+  override actors(): Object3D[] {
+    if (this.#A.length > 3 || !this.#point || !this.#touch) return [];
+    return this.#mu === null ? [this.#point] : [this.#point, this.#touch];
+  }
+
+  override pen({ q }: Sample): Point {
+    return this.#position(q).map((x) => 1.004 * x) as Point;
   }
 
   /** Return where along the tangent it touches the quadric. */

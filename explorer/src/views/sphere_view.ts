@@ -1,5 +1,5 @@
 /** q on the unit sphere: its trail, the net of spheroconic coordinates, the zone of the motion. */
-import type { ArrowHelper, Mesh } from "three";
+import type { ArrowHelper, Mesh, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { netValues, spheroconicLine } from "./conics.ts";
@@ -85,6 +85,15 @@ export class SphereView extends View3D {
       this.#velocity.position.set(...at);
       aim(this.#velocity, ...place(velocity, 0, this.#n, 0), 0.42);
     }
+  }
+
+  override actors(): Object3D[] {
+    if (this.#n > 3 || !this.#point || !this.#velocity) return [];
+    return [this.#point, this.#velocity];
+  }
+
+  override pen({ q }: Sample): Point {
+    return place(q, 0, this.#n);
   }
 
   describe({ q, lambda }: Sample): string {

@@ -11,10 +11,12 @@ import {
   Vector3,
   WebGLRenderer,
 } from "three";
-import type { Material, Mesh } from "three";
+import type { Material, Mesh, Object3D } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Sample } from "../evaluator/motion.ts";
+import type { Point } from "./shapes.ts";
+import { BLUE, theme } from "./theme.ts";
 import { View } from "./view.ts";
-import { theme } from "./theme.ts";
 
 let renderer: WebGLRenderer | null = null;
 let failed = false;
@@ -59,6 +61,19 @@ export abstract class View3D extends View {
     this.canvas.addEventListener("keydown", (event) => this.#turn(event));
     this.canvas.classList.add("space");
     this.canvas.setAttribute("aria-roledescription", "scene; arrows turn it, + and − zoom");
+  }
+
+  /** The colour of the trail in a file. */
+  readonly ink: string = BLUE;
+
+  /** Return what moves as a whole when a time is shown, for files of the scene. */
+  actors(): Object3D[] {
+    return [];
+  }
+
+  /** Return the point that draws the trail of such a file. */
+  pen(_sample: Sample): Point | null {
+    return null;
   }
 
   override draw(): void {

@@ -36,7 +36,7 @@ from veselova.service.http.job_service import JobService
 from veselova.service.http.openapi import openapi_document
 from veselova.service.http.readiness import missing_parts
 from veselova.service.http.routes import router
-from veselova.service.http.security_headers import SecurityHeaders, add_documentation
+from veselova.service.http.security_headers import SecurityHeaders
 from veselova.service.observability.metrics import Metrics
 from veselova.service.observability.request_log import Failures, RequestLog, note
 from veselova.service.workers.pool import Workers
@@ -102,7 +102,6 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     )
     for part in routers:
         app.router.routes.extend(part.routes)
-    add_documentation(app)
     add_explorer(app)
     add_guide(app)
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):

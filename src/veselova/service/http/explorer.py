@@ -1,5 +1,5 @@
-"""The explorer at ``/``: files of a bundle that the build of the package makes, with the one policy
-that lets them run.
+"""The explorer at ``/`` and the page of the API at ``/docs``: files of a bundle that the build of
+the package makes, each with the policy that lets it run.
 """
 
 from __future__ import annotations
@@ -40,6 +40,20 @@ _POLICY = "; ".join(
     )
 )
 
+#: The page of the API draws by scripts and styles of its own, and asks this server.
+_POLICY_OF_DOCS = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+
 #: Names of files hold a hash of what is in them, so they never change; the page names them anew.
 _FOR_EVER = "public, max-age=31536000, immutable"
 
@@ -47,6 +61,12 @@ _FOR_EVER = "public, max-age=31536000, immutable"
 MISSING = (
     "The explorer was not built with this installation: with Node 22 or newer in PATH, "
     "run `python explorer/build.py` in a clone and start the server again.\n"
+)
+
+#: The same at ``/docs``.
+MISSING_DOCS = (
+    "The page of the API was not built with this installation: with Node 22 or newer in PATH, run "
+    "`python explorer/build.py` in a clone and start the server again; /openapi.json has it all.\n"
 )
 
 #: Types that mimetypes of some systems do not know.
@@ -111,13 +131,21 @@ def _file(path: Path, _: int) -> BundledFile:
 
 
 def add_explorer(app: FastAPI, bundle: Path = BUNDLE) -> None:
-    """Serve the explorer at ``/``, or one sentence where it was not built."""
+    """Serve the explorer at ``/`` and the API's page at ``/docs``, or one sentence each where they
+    were not built.
+    """
 
     async def index(request: Request) -> Response:
         page = find_file(bundle / "index.html")
         if page is None:
             return PlainTextResponse(MISSING, status_code=404)
         return page.answer(request, "no-cache")
+
+    async def documentation(request: Request) -> Response:
+        page = find_file(bundle / "docs.html")
+        if page is None:
+            return PlainTextResponse(MISSING_DOCS, status_code=404)
+        return page.answer(request, "no-cache", _POLICY_OF_DOCS)
 
     async def file(request: Request) -> Response:
         # The name is one part of a path: it leads to no other folder.
@@ -127,4 +155,5 @@ def add_explorer(app: FastAPI, bundle: Path = BUNDLE) -> None:
         return found.answer(request, _FOR_EVER)
 
     app.add_route("/", index, include_in_schema=False)
+    app.add_route("/docs", documentation, include_in_schema=False)
     app.add_route(FILES + "{name}", file, include_in_schema=False)

@@ -1,0 +1,41 @@
+/** A film of a view as the page draws it: WebM, by the browser's own recorder. */
+
+/** Pictures a second, and the seconds after which a film ends by itself. */
+const PICTURES = 30;
+const LONGEST_S = 60;
+
+const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+
+export interface Recording {
+  /** End the film. */
+  stop: () => void;
+  /** The film, once it has ended. */
+  film: Promise<Blob>;
+}
+
+/** Return the kind of films that this browser records; null for one that records none. */
+export function filmType(): string | null {
+  if (typeof MediaRecorder === "undefined") return null;
+  return TYPES.find((type) => MediaRecorder.isTypeSupported(type)) ?? null;
+}
+
+/** Begin to record a canvas. */
+export function record(canvas: HTMLCanvasElement, type: string): Recording {
+  const recorder = new MediaRecorder(canvas.captureStream(PICTURES), {
+    mimeType: type,
+    videoBitsPerSecond: 6e6,
+  });
+  const parts: Blob[] = [];
+  const film = new Promise<Blob>((resolve, reject) => {
+    recorder.ondataavailable = ({ data }) => parts.push(data);
+    recorder.onstop = () => resolve(new Blob(parts, { type: "video/webm" }));
+    recorder.onerror = () => reject(new Error("The browser stopped the film."));
+  });
+  const timer = setTimeout(() => recorder.stop(), 1000 * LONGEST_S);
+  recorder.start();
+  const stop = () => {
+    clearTimeout(timer);
+    if (recorder.state !== "inactive") recorder.stop();
+  };
+  return { stop, film };
+}
