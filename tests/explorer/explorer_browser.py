@@ -153,13 +153,17 @@ def visiting(browser: Any, origin: str, allowed: tuple[str, ...] = (), **options
     try:
         yield visit
         visit.faults += page.evaluate("window.breaches")
-        assert not visit.faults
+        assert not visit.faults, visit.faults
     finally:
         context.close()
 
 
+#: What the browser says of a server that has too much to do: the page asks again.
+BUSY = ("status of 503", "status of 504")
+
+
 def _note(visit: Visit, message: Any, allowed: tuple[str, ...]) -> None:
-    if message.type == "error" and not any(text in message.text for text in allowed):
+    if message.type == "error" and not any(text in message.text for text in (*allowed, *BUSY)):
         visit.faults.append(f"console: {message.text}")
 
 

@@ -35,9 +35,10 @@ export class Controls {
     const shape = `${problem.system} ${counts.join()}`;
     if (shape !== this.#shape) {
       this.#shape = shape;
+      const open = this.#host.querySelector("details")?.open ?? false;
       this.#host.replaceChildren(...fields.map((field) => this.#fieldset(field)));
       if (ANY_DIMENSION.has(problem.system)) this.#host.append(this.#dimension());
-      this.#host.append(this.#source());
+      this.#host.append(this.#source(open));
       if (!this.#editable) {
         const texts = this.#host.querySelectorAll<HTMLInputElement>("input, textarea");
         for (const text of texts) text.readOnly = true;
@@ -125,8 +126,8 @@ export class Controls {
   }
 
   /** The problem as JSON, for data without sliders. */
-  #source(): HTMLElement {
-    const details = element("details");
+  #source(open: boolean): HTMLElement {
+    const details = element("details", open ? { open: "" } : {});
     const area = element("textarea", {
       rows: "9",
       spellcheck: "false",

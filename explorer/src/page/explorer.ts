@@ -9,7 +9,7 @@ import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { EVALUATION, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
-import { FAR } from "./loader.ts";
+import { BUSY, FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
@@ -29,6 +29,8 @@ const SLOW_MS = 24;
 
 /** Milliseconds between looks for a server that has gone. */
 const RETRY_MS = 3000;
+
+const RESTS = "The body rests: its velocity is zero, so nothing moves.";
 
 /** What a page shows of its motion. */
 export interface Position {
@@ -312,7 +314,9 @@ export class Explorer {
     this.#tries = 0;
     elements.banner.hidden = true;
     elements.keyForm.hidden = true;
-    elements.message.textContent = "";
+    const { velocity, Omega } = loaded.motion.at(0);
+    const rests = Math.hypot(...velocity, ...Omega) < 1e-12;
+    elements.message.textContent = rests ? RESTS : "";
     this.#controls.mark([]);
     this.#show(loaded);
     elements.status.textContent = originOf(loaded, milliseconds);
@@ -334,7 +338,7 @@ export class Explorer {
       elements.message.textContent = apiKey.get() ? error.message : "";
       return false;
     }
-    if (error instanceof Refusal && [503, 504].includes(error.status) && this.#tries++ < 4) {
+    if (error instanceof Refusal && BUSY.includes(error.status) && this.#tries++ < 4) {
       elements.message.textContent = `${error.message} The page asks again.`;
       setTimeout(() => void this.#load(), RETRY_MS);
       return true;
@@ -342,7 +346,7 @@ export class Explorer {
     const sentence = error instanceof Error ? error.message : String(error);
     const faults = error instanceof Refusal ? error.faults : [];
     if (error instanceof Refusal && error.outcome === "at-rest") {
-      elements.message.textContent = "The body rests: its velocity is zero, so nothing moves.";
+      elements.message.textContent = RESTS;
       return false;
     }
     const rest = this.#controls.mark(faults);

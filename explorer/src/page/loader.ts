@@ -19,6 +19,11 @@ export const FAR = 1e6;
 /** Digits of that document. */
 const MORE_DIGITS = 30;
 
+/** The answers of a server that has too much to do, and when it is asked again, how often. */
+export const BUSY = [503, 504];
+const AGAIN_MS = 2000;
+const MOST_TRIES = 4;
+
 const LETTERS: Record<string, string> = { t: "t", s: "s", tau1: "τ₁" };
 
 /** Where the motions of a page come from. */
@@ -146,17 +151,32 @@ async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded 
   return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
 }
 
+interface EngineAnswer {
+  times: number[];
+  series: { frame: number[][][] };
+  error: number[];
+}
+
+/** Return what is asked for; a server that has too much to do is asked again, some times. */
+async function patiently<T>(ask: () => Promise<T>): Promise<T> {
+  for (let tries = 0; ; tries++) {
+    try {
+      return await ask();
+    } catch (error) {
+      const busy = error instanceof Refusal && BUSY.includes(error.status);
+      if (!busy || tries === MOST_TRIES) throw error;
+      await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+    }
+  }
+}
+
 async function loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences> {
   const count = 241;
   const stop = Math.min(60, Math.max(1, loaded.reach / 4));
   const ask = async (engine: string): Promise<EngineSeries> => {
     const times = { start: 0, stop, count };
     const body = { problem: loaded.problem, times, engine, outputs: ["frame"] };
-    const answer = await post<{
-      times: number[];
-      series: { frame: number[][][] };
-      error: number[];
-    }>("v1/trajectories", body, signal);
+    const answer = await patiently(() => post<EngineAnswer>("v1/trajectories", body, signal));
     return { times: answer.times, frame: answer.series.frame, error: answer.error };
   };
   const [analytic, numeric] = await Promise.allSettled([ask("analytic"), ask("numeric")]);

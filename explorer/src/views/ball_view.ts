@@ -8,6 +8,7 @@ import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import { aim, arrow, line, moveLine } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
+import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { short } from "./view.ts";
@@ -100,6 +101,14 @@ export class BallView extends View3D {
       this.#drift.visible = size > 0;
       if (size > 0) moveLine(this.#drift, alongDrift(x, y, u / size, v / size, a));
     }
+  }
+
+  protected override labels(): Label[] {
+    if (!this.#momentum?.visible) return [];
+    const [u, v] = this.#mean;
+    const reach = (1.85 * this.#radius) / Math.hypot(u, v);
+    const { x, y } = this.#momentum.position;
+    return [{ text: "mean velocity", at: [x + reach * u, y + reach * v, 0] }];
   }
 
   override actors(): Object3D[] {

@@ -10,6 +10,7 @@ import type { Samples } from "../evaluator/samples.ts";
 import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
+import type { Label } from "./stage.ts";
 import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short } from "./view.ts";
@@ -35,6 +36,7 @@ export class BodyView extends View3D {
   #omega: ArrowHelper | null = null;
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
   #scale = 1;
+  #end: Point = [0, 0, 0];
 
   constructor() {
     super(
@@ -184,9 +186,21 @@ export class BodyView extends View3D {
     this.#solid.matrixWorldNeedsUpdate = true;
     if (this.#omega && Omega.length) {
       const end = this.#inSpace(frame, Omega);
+      this.#end = end;
       aim(this.#omega, ...end);
       this.#trail?.lead(end);
     }
+  }
+
+  protected override labels(): Label[] {
+    const names: Label[] = [{ text: "e₁", at: [0.14, 0, 1.1] }, { text: "e₂", at: [1.12, -0.15, 0] }];
+    if (this.#n > 2) names.push({ text: "e₃", at: [0, 1.29, 0] });
+    const size = Math.hypot(...this.#end);
+    if (this.#omega?.visible && size > 0.2) {
+      const [x, y, z] = this.#end.map((entry) => entry * (1 + 0.13 / size));
+      names.push({ text: "ω", at: [x, y, z - 0.09] });
+    }
+    return names;
   }
 
   override readonly ink = ORANGE;

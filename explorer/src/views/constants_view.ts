@@ -3,8 +3,8 @@
  * c_2. For n = 4 the plane of c_2 and c_3. A click is a start with the constants clicked at.
  */
 import type { Sample } from "../evaluator/motion.ts";
-import { disc, FONT, stroke, subscript } from "./curve_view.ts";
-import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { disc, stroke, subscript } from "./curve_view.ts";
+import { FONT, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { list, short, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
@@ -15,7 +15,9 @@ export interface Choice {
 }
 
 /** Room at the sides of the map, parts of the canvas. */
-const [LEFT, RIGHT, TOP, BOTTOM] = [0.11, 0.03, 0.05, 0.13];
+const [LEFT, RIGHT, TOP, BOTTOM] = [0.11, 0.04, 0.05, 0.13];
+
+type Place = [number, number];
 
 export class ConstantsView extends View {
   #torus: Torus | null = null;
@@ -121,40 +123,39 @@ export class ConstantsView extends View {
     disc(context, x, y, 4.5 * ratio);
   }
 
+  /** Shade a polygon of places of the map, and write a name into its middle. */
+  #fill(context: CanvasRenderingContext2D, colour: string, places: Place[], name: string): void {
+    const corners = places.map(([x, y]): Place => [this.#x(x), this.#y(y)]);
+    context.globalAlpha = 0.38;
+    context.fillStyle = colour;
+    context.beginPath();
+    for (const corner of corners) context.lineTo(...corner);
+    context.fill();
+    context.globalAlpha = 1;
+    context.fillStyle = theme().text;
+    context.textAlign = "center";
+    const middle = (axis: 0 | 1) => corners.reduce((sum, one) => sum + one[axis], 0) / corners.length;
+    context.fillText(name, middle(0), middle(1));
+  }
+
   /** Shade where λ_1 and λ_2 move, for each c_2. */
   #drawZones(context: CanvasRenderingContext2D): void {
     const [low, middle, high] = this.#I;
-    const fill = (colour: string, points: [number, number][]) => {
-      context.globalAlpha = 0.38;
-      context.fillStyle = colour;
-      context.beginPath();
-      for (const [c, value] of points) context.lineTo(this.#x(c), this.#y(value));
-      context.fill();
-      context.globalAlpha = 1;
-    };
     // λ_1 ∈ [I_1, min(c_2, I_2)], λ_2 ∈ [max(c_2, I_2), I_3].
-    fill(GREEN, [[low, low], [middle, middle], [high, middle], [high, low]]);
-    fill(PINK, [[low, middle], [middle, middle], [high, high], [low, high]]);
+    this.#fill(context, GREEN, [[low, low], [middle, middle], [high, middle], [high, low]], "λ₁");
+    this.#fill(context, PINK, [[low, middle], [middle, middle], [high, high], [low, high]], "λ₂");
   }
 
   /** Shade the four regimes of c_2 < c_3. */
   #drawCells(context: CanvasRenderingContext2D): void {
-    const [, I2, I3, I4] = this.#I;
-    const low = this.#I[0];
-    const cells: [string, [number, number][]][] = [
-      [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]]],
-      [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]]],
-      [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]]],
-      [VERMILION, [[I2, I2], [I3, I3], [I2, I3]]],
+    const [low, I2, I3, I4] = this.#I;
+    const cells: [string, Place[], string][] = [
+      [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]], "c₂ < I₂ < c₃ < I₃"],
+      [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]], "c₂ < I₂, I₃ < c₃"],
+      [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]], "I₂ < c₂ < I₃ < c₃"],
+      [VERMILION, [[I2, I2], [I3, I3], [I2, I3]], "I₂ < c₂, c₃ < I₃"],
     ];
-    for (const [colour, points] of cells) {
-      context.globalAlpha = 0.34;
-      context.fillStyle = colour;
-      context.beginPath();
-      for (const [c2, c3] of points) context.lineTo(this.#x(c2), this.#y(c3));
-      context.fill();
-    }
-    context.globalAlpha = 1;
+    for (const cell of cells) this.#fill(context, ...cell);
   }
 
   #drawAxes(context: CanvasRenderingContext2D, ratio: number): void {
@@ -180,14 +181,22 @@ export class ConstantsView extends View {
       context.fillText(name, this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
     }
     const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
-    context.fillText(names[0], (0.5 * (1 + LEFT)) * width, height - 6 * ratio);
+    const under = (1 - BOTTOM) * height + 15 * ratio;
+    context.fillText(names[0], this.#besideMarks(inX, 0), under);
     context.textAlign = "right";
     for (const value of inY) {
       const name = `I${subscript(this.#I.indexOf(value) + 1)}`;
       context.fillText(name, LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
     }
-    context.textAlign = "left";
-    context.fillText(names[1], 5 * ratio, 0.5 * height);
+    context.fillText(names[1], LEFT * width - 6 * ratio, this.#besideMarks(inY, 1) + 4 * ratio);
+  }
+
+  /** Return the middle of the widest gap between the marks of an axis. */
+  #besideMarks(marks: number[], axis: 0 | 1): number {
+    const places = marks.map((value) => (axis ? this.#y(value) : this.#x(value)));
+    const gaps = places.slice(1).map((place, k): Place => [Math.abs(place - places[k]), k]);
+    const [, k] = gaps.reduce((widest, gap) => (gap[0] > widest[0] ? gap : widest));
+    return (places[k] + places[k + 1]) / 2;
   }
 
   #key(event: KeyboardEvent): void {

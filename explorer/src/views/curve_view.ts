@@ -1,6 +1,6 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
-import { SERIES, theme } from "./theme.ts";
+import { FONT, SERIES, theme } from "./theme.ts";
 import { list, View } from "./view.ts";
 import type { Curves, Loaded, Torus } from "./view.ts";
 
@@ -146,8 +146,6 @@ export class CurveView extends View {
     return `λ is ${list(this.#lambda, 5)}. Branch points: ${names}.`;
   }
 }
-
-export const FONT = '"DejaVu Sans", system-ui, sans-serif';
 
 export function stroke(context: CanvasRenderingContext2D, points: [number, number][]): void {
   context.beginPath();

@@ -9,6 +9,7 @@ import { confocalQuadric } from "./conics.ts";
 import { ball, line, moveLine, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
+import type { Label } from "./stage.ts";
 import { BLUE, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short } from "./view.ts";
@@ -106,6 +107,11 @@ export class EllipsoidView extends View3D {
       this.#touch.visible = touch !== null && Math.abs(touch) < 2.6;
       this.#touch.position.set(...at(touch ?? 0));
     }
+  }
+
+  protected override labels(): Label[] {
+    const at = this.#point?.position.clone().multiplyScalar(1.14).toArray();
+    return at ? [{ text: "X", at }] : [];
   }
 
   override actors(): Object3D[] {

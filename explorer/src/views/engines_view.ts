@@ -13,6 +13,9 @@ import type { Curves, Loaded } from "./view.ts";
 /** Samples of the trail that the first plot shows. */
 const WINDOW = 1200;
 
+/** The height of a plot, in pixels. */
+const HEIGHT = 210;
+
 /** What is zero is drawn here on a logarithmic axis. */
 const FLOOR = 1e-17;
 
@@ -220,7 +223,7 @@ function makeChart(plot: Plot, width: number): uPlot {
   });
   const options: uPlot.Options = {
     width,
-    height: 138,
+    height: HEIGHT,
     legend: { show: false },
     cursor: { show: false },
     scales: {

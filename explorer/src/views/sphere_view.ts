@@ -6,6 +6,7 @@ import { netValues, spheroconicLine } from "./conics.ts";
 import { aim, arrow, ball, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
+import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { list, short } from "./view.ts";
@@ -85,6 +86,11 @@ export class SphereView extends View3D {
       this.#velocity.position.set(...at);
       aim(this.#velocity, ...place(velocity, 0, this.#n, 0), 0.42);
     }
+  }
+
+  protected override labels(): Label[] {
+    const at = this.#point?.position.clone().multiplyScalar(1.12).toArray();
+    return at ? [{ text: "q", at }] : [];
   }
 
   override actors(): Object3D[] {

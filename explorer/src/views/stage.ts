@@ -15,7 +15,7 @@ import type { Material, Mesh, Object3D } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Point } from "./shapes.ts";
-import { BLUE, theme } from "./theme.ts";
+import { BLUE, FONT, theme } from "./theme.ts";
 import { View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
@@ -31,6 +31,12 @@ export function sharedRenderer(): WebGLRenderer | null {
     failed = true;
   }
   return renderer;
+}
+
+/** A name beside what it names. */
+export interface Label {
+  text: string;
+  at: Point;
 }
 
 export abstract class View3D extends View {
@@ -63,6 +69,11 @@ export abstract class View3D extends View {
     this.canvas.setAttribute("aria-roledescription", "scene; arrows turn it, + and − zoom");
   }
 
+  /** Return the names that are written into the picture. */
+  protected labels(): Label[] {
+    return [];
+  }
+
   /** The colour of the trail in a file. */
   readonly ink: string = BLUE;
 
@@ -79,7 +90,7 @@ export abstract class View3D extends View {
   override draw(): void {
     const shared = sharedRenderer();
     const context = this.canvas.getContext("2d");
-    this.fit();
+    const ratio = this.fit();
     const { width, height } = this.canvas;
     if (!shared || !context || !width || !height) return;
     this.scene.background = new Color(theme().background);
@@ -97,6 +108,27 @@ export abstract class View3D extends View {
     shared.setScissor(0, 0, width, height);
     shared.render(this.scene, this.camera);
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+    this.#write(context, ratio);
+  }
+
+  /** Write the names, with a rim by which they stand out from lines. */
+  #write(context: CanvasRenderingContext2D, ratio: number): void {
+    const { width, height } = this.canvas;
+    const colours = theme();
+    context.font = `${13 * ratio}px ${FONT}`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.lineWidth = 3 * ratio;
+    context.lineJoin = "round";
+    context.strokeStyle = colours.background;
+    context.fillStyle = colours.text;
+    for (const { text, at } of this.labels()) {
+      const { x, y, z } = new Vector3(...at).project(this.camera);
+      if (Math.abs(x) > 1 || Math.abs(y) > 1 || z > 1) continue;
+      const place = [(0.5 + 0.5 * x) * width, (0.5 - 0.5 * y) * height] as const;
+      context.strokeText(text, ...place);
+      context.fillText(text, ...place);
+    }
   }
 
   /** Take everything out of the world and free its memory. */

@@ -8,6 +8,9 @@ export const PINK = "#cc79a7";
 export const DEEP_BLUE = "#0072b2";
 export const YELLOW = "#f0e442";
 
+/** The font of what is written into pictures. */
+export const FONT = '"DejaVu Sans", system-ui, sans-serif';
+
 /** Colours of λ_1, λ_2, … and of the phases z_1, z_2, … */
 export const SERIES = [GREEN, PINK, ORANGE, BLUE, VERMILION];
 

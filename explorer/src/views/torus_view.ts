@@ -7,6 +7,7 @@ import type { Samples } from "../evaluator/samples.ts";
 import { ball, line, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
+import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { list, short } from "./view.ts";
@@ -104,6 +105,20 @@ export class TorusView extends View3D {
     }
     const angle = 2 * Math.PI * z[from];
     return [Math.cos(angle), Math.sin(angle), 0];
+  }
+
+  protected override labels(): Label[] {
+    if (this.#genus === 2) {
+      return [
+        { text: "z₁", at: onRing(0.87, 0, 1.16) },
+        { text: "z₂", at: onRing(0, 0.2, 1.2) },
+      ];
+    }
+    if (this.#genus < 3) return [];
+    return ["z₁", "z₂", "z₃"].map((text, axis) => ({
+      text,
+      at: [0, 1, 2].map((i) => (i === axis ? 0.87 : -0.75)) as Point,
+    }));
   }
 
   override extend(samples: Samples, anew: boolean): void {
