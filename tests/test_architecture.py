@@ -45,7 +45,7 @@ ALLOWED_LATER = {
         "mpmath",
         "flint",
     },
-    "analytic": set(),
+    "analytic": {"mpmath"},
     "numeric": {"heyoka"},
 }
 
@@ -188,11 +188,13 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
 
 @pytest.mark.parametrize(("library", "room"), [("mpmath", "arithmetic.py"), ("flint", "balls.py")])
 def test_only_one_file_touches_precision(library: str, room: str) -> None:
-    users = {
-        path
-        for path in FILES
-        if library in {name.split(".")[0] for name in _split_imports(path)[0]}
-    }
+    engine = sorted((ROOT / "analytic").rglob("*.py"))
+    users = set()
+    for path in FILES:
+        outer, inner = _split_imports(path)
+        names = [*outer, *inner] if path in engine else outer
+        if library in {name.split(".")[0] for name in names}:
+            users.add(path)
     assert users == {ROOT / "analytic" / "arithmetic" / room}
     assert not [
         path for path in FILES if path not in users and f"{library}.mp." in path.read_text()
@@ -292,6 +294,13 @@ def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:
         "pydantic",
         "veselova.engines",
     }
+
+
+def test_a_first_answer_loads_neither_scipy_nor_mpmath() -> None:
+    statement = "import veselova as vs; p = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0, 1, 0])"
+    loaded = _loaded_by(f"{statement}; vs.solve(p, [0, 1])")
+    assert "veselova.analytic.solve" in loaded
+    assert not loaded & {"scipy", "mpmath", "heyoka", "matplotlib", "pydantic"}
 
 
 @pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])

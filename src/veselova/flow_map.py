@@ -27,8 +27,8 @@ class FlowMap:
 
     - A: 3 different positive numbers (doubles)
 
-    It pays from some thousand starts on: making it takes about as long as 5000 starts of
-    ``solve_many``, and then each takes a third. For n ≥ 4 tori depend on two constants or more, and
+    Making it takes as long as 4000 starts of ``solve_many``, and then each start takes a third: it
+    pays from some 6000 starts on. For n ≥ 4 tori depend on two constants or more, and
     a table of them does not pay below a million starts: ``solve_many`` serves these. Raises
     InvalidInput for other A's.
     """

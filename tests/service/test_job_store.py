@@ -17,8 +17,9 @@ from test_sweeps import request as sweep_request
 
 from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import connect, schema_differences
+from veselova.service.access.database import REVISION, connect, schema_differences
 from veselova.service.access.keys import open_keys
+from veselova.service.access.schema_migrations import latest
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
@@ -144,6 +145,17 @@ def test_servers_that_start_together_make_the_tables_of_the_code_once(store: Set
     for engine in together(lambda _: connect(store), 4):
         assert schema_differences(engine) == []
         engine.dispose()
+
+
+def test_a_database_that_is_up_to_date_is_opened_without_migrations(
+    store: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert latest() == REVISION
+    connect(store).dispose()
+    monkeypatch.setattr("veselova.service.access.schema_migrations.migrate", None)
+    engine = connect(store)
+    assert schema_differences(engine) == []
+    engine.dispose()
 
 
 def test_a_job_goes_through_its_states_and_keeps_its_dates(

@@ -16,12 +16,10 @@ from fractions import Fraction
 from functools import lru_cache, partial
 from typing import Any, ClassVar
 
-import mpmath
 import numpy as np
-from mpmath.libmp import from_rational
 from numpy.typing import NDArray
-from scipy.special import ellipkm1, elliprf
 
+from veselova.analytic.arithmetic.elliptic_integrals import carlson_rf, quarter_period
 from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
 
 __all__ = [
@@ -218,11 +216,11 @@ class Double(Arithmetic):
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""
-        return elliprf(x, y, z)
+        return carlson_rf(x, y, z)
 
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
-        return ellipkm1(complement)
+        return quarter_period(complement)
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix, or of each of a stack."""
@@ -286,6 +284,9 @@ class Extended(Arithmetic):
     """
 
     def __init__(self, digits: int) -> None:
+        # half a second of imports that doubles and balls do without
+        import mpmath
+
         self._context = mpmath.MPContext()
         self._context.dps = digits + _GUARD
         self.digits = digits
@@ -303,6 +304,8 @@ class Extended(Arithmetic):
     def number(self, value: Any) -> Any:
         """Return one number, rounded to this precision."""
         if isinstance(value, (Fraction, decimal.Decimal)):
+            from mpmath.libmp import from_rational
+
             return self._context.make_mpf(
                 from_rational(*value.as_integer_ratio(), self._context.prec, "n")
             )

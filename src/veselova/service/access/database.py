@@ -19,13 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
-from alembic.autogenerate import compare_metadata
-from alembic.config import Config
-from alembic.runtime.environment import EnvironmentContext
-from alembic.runtime.migration import MigrationContext, MigrationStep
-from alembic.script import ScriptDirectory
-from alembic.script.revision import RevisionError
-from alembic.util import CommandError
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.sqlite_file import (
@@ -39,6 +32,7 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 
 __all__ = [
+    "REVISION",
     "api_keys",
     "chunks",
     "connect",
@@ -117,6 +111,9 @@ api_keys = sa.Table(
     sa.Column("expires_at", sa.DateTime(timezone=True)),
 )
 
+#: The revision of the tables here, to which the last of ``veselova.migrations`` leads.
+REVISION = "0003"
+
 #: Alembic keeps the migration that runs in a module of its own, so two must not run in one process
 #: at once.
 _MIGRATING = threading.Lock()
@@ -158,17 +155,11 @@ def _bring_up_to_date(engine: sa.Engine, path: Path | None) -> None:
         damage = "" if path is None else damage_of(engine, path)
         if not damage:
             with writing(engine, "migrations") as connection:
-                changed = _migrate(connection)
+                changed = False if _is_current(connection) else _migrate(connection)
             if changed and path is not None:
                 empty_log(engine)  # tables that are in the file outlive what may happen to the log
             lacking = sorted(metadata.tables.keys() - set(sa.inspect(engine).get_table_names()))
             damage = f"it lacks the tables {', '.join(lacking)}" if lacking else ""
-    except (CommandError, RevisionError) as error:
-        detail = (
-            "The database was made by a later version of veselova, which has to be started "
-            f"instead ({error})."
-        )
-        raise Refused("database-newer", detail) from None
     except sa.exc.OperationalError:
         raise
     except sa.exc.DatabaseError as error:
@@ -232,32 +223,27 @@ def database_url(settings: Settings) -> sa.URL:
 
 
 def _migrate(connection: sa.Connection) -> bool:
-    """Run the migrations that the database has not seen, all or none of them, and return whether
-    there were any.
-
-    Of two servers that start together the second waits for the first, and finds nothing to do.
+    """Run the missing migrations and return whether there were any; raises Refused
+    (``database-newer``).
     """
-    scripts = Path(__file__).parent.parent.parent / "migrations"
-    config = Config()
-    config.set_main_option("script_location", str(scripts).replace("%", "%%"))
-    config.set_main_option("version_locations", str(scripts).replace("%", "%%"))
-    config.set_main_option("path_separator", "newline")
-    script = ScriptDirectory.from_config(config)
+    from veselova.service.access.schema_migrations import LaterVersion, migrate
 
-    pending: list[Any] = []
-
-    def steps(current: Any, _: Any) -> list[Any]:
-        pending.extend(reversed(list(script.iterate_revisions("head", current or "base"))))
-        return [
-            MigrationStep.upgrade_from_script(script.revision_map, revision) for revision in pending
-        ]
-
-    with EnvironmentContext(config, script, fn=steps) as environment:
-        environment.configure(
-            connection=connection, target_metadata=metadata, transactional_ddl=True
+    try:
+        return migrate(connection, metadata)
+    except LaterVersion as error:
+        detail = (
+            "The database was made by a later version of veselova, which has to be started "
+            f"instead ({error})."
         )
-        environment.run_migrations()
-    return bool(pending)
+        raise Refused("database-newer", detail) from None
+
+
+def _is_current(connection: sa.Connection) -> bool:
+    """Return whether the database has seen all migrations."""
+    if not sa.inspect(connection).has_table("alembic_version"):
+        return False
+    found = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalars().all()
+    return list(found) == [REVISION]
 
 
 def in_utc(moment: datetime) -> datetime:
@@ -300,5 +286,7 @@ def schema_differences(engine: sa.Engine) -> list[Any]:
     """Return what the tables in the database have that those of this module have not, and the other
     way round.
     """
+    from veselova.service.access.schema_migrations import differences
+
     with engine.connect() as connection:
-        return list(compare_metadata(MigrationContext.configure(connection), metadata))
+        return differences(connection, metadata)
