@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.area_solution import solution_of
+from veselova.analytic.motion.orbit_period import close_orbit
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -67,6 +69,7 @@ def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
         phases=np.mod(np.mod(solution.in_tau1.start, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
         mean_rate=solution.mean_rate / root,
         regime=solution.regime,
+        close_orbit=partial(close_orbit, problem),
     )
 
 

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, unknown_name
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import Flow
 
@@ -191,6 +192,56 @@ class Problem(ABC):
         derived.
         """
         return error
+
+    @cached_property
+    def _flows(self) -> dict[str, Flow]:
+        return {}
+
+    def _flow_of(self, formulation: str | None) -> Flow:
+        """Return the flow of a formulation, None for the first, made once."""
+        name = formulation or self.formulations[0]
+        if name not in self.formulations:
+            raise unknown_name(("formulation",), name, self.formulations)
+        if not self.moves:
+            raise Unsolved("at-rest", "nothing moves, so there is no field to integrate")
+        if name not in self._flows:
+            self._flows[name] = self.flow(name)
+        return self._flows[name]
+
+    def initial_state(self, formulation: str | None = None) -> Array:
+        """Return the state y at time zero that ``rhs`` takes, (m,)."""
+        return np.array(self._flow_of(formulation).initial)
+
+    def rhs(self, time: float, y: Any, formulation: str | None = None) -> Array:
+        """Return dy/d(time) of a state y (m,): the right-hand side for an integrator of one's own.
+
+        The time is the problem's own. Entries of y are of order one, in units of the formulation
+        (None for the first of ``formulations``); ``series_of`` gives the problem's series of them.
+        The field is autonomous. Raises InvalidInput for an unknown formulation, Unsolved at rest.
+        """
+        flow = self._flow_of(formulation)
+        state = np.asarray(y, dtype=np.float64)
+        if state.shape != flow.initial.shape:
+            required = f"an array of {flow.initial.size} numbers, as initial_state()"
+            raise InvalidInput(("y",), required, f"one of shape {state.shape}")
+        return flow.vector_field(time, state) / flow.time_unit
+
+    def series_of(self, states: Any, formulation: str | None = None) -> dict[str, Array]:
+        """Return all ``outputs`` by name, first axis the times, of states (N, m) that ``rhs``
+        moves.
+
+        Frames are made orthonormal; integrals are left as integrated. Raises as ``rhs``.
+        """
+        flow = self._flow_of(formulation)
+        rows = np.asarray(states, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != flow.initial.size:
+            required = f"an array (N, {flow.initial.size}): for SciPy's solution.y its transpose"
+            raise InvalidInput(("states",), required, f"one of shape {rows.shape}")
+        series = dict(self.complete(flow.unpack(rows)))
+        for name in self.outputs:
+            if name not in series:
+                series[name] = self.derive(name, series)
+        return {name: series[name] for name in self.outputs}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""

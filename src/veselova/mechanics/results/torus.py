@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
 
 __all__ = ["Torus"]
 
@@ -38,6 +42,8 @@ class Torus:
     - regime: ``generic``, ``closed-cut`` (directions that do not move, or equal A's) or
       ``separatrix`` (some c_k = I_i: periods are infinite there, and the torus is that of a
       start 1e-40 away)
+    - close_orbit: the time in which the phases go round so many times along the orbit, and whether
+      the attitude is then the same; None for a torus from a document
     """
 
     n: int
@@ -56,10 +62,55 @@ class Torus:
     phases: Array
     mean_rate: float
     regime: str
+    close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(
+        default=None, repr=False
+    )
+
+    def resonance(self, max_order: int = 12, tolerance: float = 1e-9) -> Resonance:
+        """Return the integer relations k·f = 0 between the frequencies, |k_s| ≤ max_order, where
+        |k·f| is at most ``tolerance`` of the largest frequency.
+
+        Raises InvalidInput for a bad order or tolerance, and for more than 4·10⁶ combinations k.
+        """
+        return find_resonance(self.frequencies_tau1, max_order, tolerance)
+
+    def period(self, max_order: int = 100, tolerance: float = 1e-9) -> float:
+        """Return the time after which the motion of a torus that is filled by periodic orbits
+        returns: the state, with the attitude, is the same.
+
+        All frequencies are then whole multiples of one: f = p f_0 with integers |p_s| ≤ max_order,
+        where ratios of frequencies may differ by ``tolerance``. The period is not p_s/Ω_s for the
+        ``frequencies_t`` Ω, which are means over the torus. On a resonance the time rate has
+        another mean along the orbit, so it is integrated along it. The attitude may have changed
+        signs after one turn; it takes two then. A ball's position returns but for its drift.
+
+        Raises InvalidInput for bad arguments, Unsolved (``not-periodic``) where the frequencies
+        are in no such ratio, on a separatrix, and for a torus that was read from a document. The
+        state returns to 1e-10 where the ratios hold to 1e-13; tested for n = 2, 3 and 4.
+        """
+        windings = find_windings(self.frequencies_tau1, max_order, tolerance)
+        if self.regime == "separatrix":
+            raise Unsolved("not-periodic", "a motion on a separatrix never returns")
+        if windings is None:
+            raise Unsolved(
+                "not-periodic",
+                f"the frequencies are in no ratio of whole numbers up to {max_order} to "
+                f"{tolerance:g}",
+            )
+        if self.close_orbit is None:
+            raise Unsolved(
+                "not-periodic",
+                "a torus from a document has no time along its orbit; take veselova.torus(problem)",
+            )
+        time, returned = self.close_orbit(windings)
+        # The second turn may take another time than the first: with an area constant dt/dτ₁ has
+        # period 2 in the phases.
+        return time if returned else self.close_orbit(2 * windings)[0]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the torus as a JSON-ready dictionary (arrays as nested lists)."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        names = [f.name for f in fields(self) if f.name != "close_orbit"]
+        values = {name: getattr(self, name) for name in names}
         return {
             name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v
             for name, v in values.items()
