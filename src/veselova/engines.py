@@ -210,24 +210,50 @@ def compare(
     times: Any,
     method: str | None = None,
     *,
+    formulation: str | None = None,
     budget_s: float | None = None,
     progress: Progress = None,
 ) -> Comparison:
-    """Return both engines' answers and their differences; ``method`` is the numerical one
-    (``dop853`` or ``taylor``).
+    """Return both engines' answers and their differences. For a system that integration alone
+    solves: those of two formulations, the first of ``problem.formulations`` and another.
+
+    ``method`` is the numerical one (``dop853`` or ``taylor``), ``formulation`` what the numerical
+    engine, or the other of two integrations, takes; None for the first, or the second. Raises as
+    ``solve``.
     """
-    if isinstance(problem, Problem) and len(problem.engines) < len(ENGINES):
-        given = f"{problem.system}, which {' and '.join(problem.engines)} alone solves"
-        raise InvalidInput(("problem",), "a system that both engines solve", given)
+    if not isinstance(problem, Problem):
+        raise InvalidInput(
+            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
+        )
+    kind = type(problem)
     faults = Faults()
     grid = faults.attempt(TimeGrid.of, times)
-    if isinstance(problem, Problem):
-        faults.attempt(require_options, type(problem), "numeric", method, None)
+    faults.attempt(require_comparison, kind, method, formulation)
     faults.require_none()
     with limits(budget_s, progress):
-        return Comparison(
-            _solve(problem, grid, "analytic", None), _solve(problem, grid, "numeric", method)
+        if len(problem.engines) == len(ENGINES):
+            return Comparison(
+                _solve(problem, grid, "analytic", None),
+                _solve(problem, grid, "numeric", method, formulation=formulation),
+            )
+        names = (kind.formulations[0], formulation or kind.formulations[1])
+        first, second = (
+            _solve(problem, grid, "numeric", method, formulation=name) for name in names
         )
+        return Comparison(first, second, names)
+
+
+def require_comparison(system: type[Problem], method: Any, formulation: Any) -> None:
+    """Raise InvalidInput unless motions of a system can be compared with this method and
+    formulation.
+    """
+    faults = Faults()
+    faults.attempt(require_options, system, "numeric", method, formulation)
+    if len(system.engines) < len(ENGINES) and formulation == system.formulations[0]:
+        others = ", ".join(system.formulations[1:])
+        required = f"another formulation than the first of system {system.system}: {others}"
+        faults.add(("formulation",), required, show(formulation))
+    faults.require_none()
 
 
 def from_torus(

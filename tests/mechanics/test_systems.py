@@ -13,6 +13,7 @@ import numpy as np
 import orjson
 import pytest
 
+import veselova
 from conftest import Server
 from hostile import BUDGET_S
 from veselova import (
@@ -290,15 +291,35 @@ def test_what_a_system_has_not_is_refused_by_name(change: dict[str, Any], messag
     assert message in str(caught.value)
 
 
-def test_a_system_of_one_engine_cannot_be_compared() -> None:
+@pytest.mark.parametrize("system", ["lr", "euler-poisson", "stiefel"])
+def test_a_system_of_one_engine_is_compared_in_two_formulations(system: str) -> None:
+    from veselova.service.api.json_documents import comparison_document, comparison_of
     from veselova.service.workers.tasks import compare_request
 
-    with pytest.raises(InvalidInput) as caught:
-        compare_request(
-            read_request(ComparisonRequest, {"problem": document("lr"), "times": TIMES})
-        )
-    assert (
-        str(caught.value)
-        == "problem: required a system that both engines solve; given lr, which numeric alone "
-        "solves."
-    )
+    stated = {"problem": document(system), "times": TIMES}
+    found = compare_request(read_request(ComparisonRequest, stated))
+    problem = found.first.problem
+    assert found.names == tuple(problem.formulations[:2])
+    assert found.agrees
+    assert found.drift.keys() == found.seconds.keys() == set(found.names)
+    for name, motion in found.trajectories.items():
+        assert motion.provenance.details["formulation"] == name
+    assert 0 < max(found.deviation.values()) < 1e-9
+    with pytest.raises(AttributeError, match=r"has \.first and \.second"):
+        _ = found.analytic
+    written = comparison_document(found)
+    assert list(written["formulations"]) == list(found.names)
+    again = comparison_of(problem, written)
+    assert again.names == found.names
+    assert again.deviation == found.deviation
+    with pytest.raises(InvalidInput, match="formulation: required another formulation"):
+        veselova.compare(problem, TIMES, formulation=problem.formulations[0])
+
+
+def test_a_comparison_of_engines_takes_another_formulation() -> None:
+    problem = veselova.EllipsoidGeodesic([3, 2, 1], [1, 1, 1], [1, -1, 0.2], normalize=True)
+    found = veselova.compare(problem, TIMES, formulation="gauss")
+    assert found.numeric.provenance.details["formulation"] == "gauss"
+    assert found.agrees
+    with pytest.raises(InvalidInput, match="formulation: required one of geodesic, gauss"):
+        veselova.compare(problem, TIMES, formulation="guass")

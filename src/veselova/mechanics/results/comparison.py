@@ -21,68 +21,89 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """Both engines' answers to one problem at the same times, and how they agree."""
+    """Two answers to one problem at the same times, and how they agree: those of both engines, or
+    of two formulations where the system has one engine.
 
-    analytic: Trajectory
-    numeric: Trajectory
+    - first, second: the trajectories. Those of the engines are ``analytic`` and ``numeric`` too
+    - names: what the two are called, the engines or the formulations
+    """
+
+    first: Trajectory
+    second: Trajectory
+    names: tuple[str, str] = ("analytic", "numeric")
+
+    @property
+    def trajectories(self) -> dict[str, Trajectory]:
+        """Return both trajectories by their names."""
+        return {self.names[0]: self.first, self.names[1]: self.second}
+
+    @property
+    def analytic(self) -> Trajectory:
+        """Return the motion in closed form; raises AttributeError for two formulations."""
+        return self._of_engine("analytic")
+
+    @property
+    def numeric(self) -> Trajectory:
+        """Return the integrated motion; raises AttributeError for two formulations."""
+        return self._of_engine("numeric")
+
+    def _of_engine(self, name: str) -> Trajectory:
+        if name not in self.names:
+            both = " and ".join(self.names)
+            raise AttributeError(f"a comparison of the formulations {both} has .first and .second")
+        return self.trajectories[name]
 
     def __repr__(self) -> str:
         agreement = "agree" if self.agrees else "disagree"
         gaps = ", ".join(
-            f"{name} by {self.deviation[name]:.2g}" for name in self.analytic.problem.bounded
+            f"{name} by {self.deviation[name]:.2g}" for name in self.first.problem.bounded
         )
         return (
-            f"<Comparison: {self.analytic!r} and {self.numeric!r} {agreement}, they differ in "
-            f"{gaps}>"
+            f"<Comparison: {self.first!r} and {self.second!r} {agreement}, they differ in {gaps}>"
         )
 
     def difference(self, name: str) -> Array:
         """Return the largest difference of one output over its components, at each time, shape
         (N,).
         """
-        gap = np.abs(self.analytic.series(name) - self.numeric.series(name))
+        gap = np.abs(self.first.series(name) - self.second.series(name))
         return np.asarray(np.max(gap.reshape(gap.shape[0], -1), axis=1, initial=0.0))
 
     @cached_property
     def deviation(self) -> dict[str, float]:
         """Return the largest difference of each output over all times and components."""
-        return {
-            name: float(np.max(self.difference(name))) for name in self.analytic.problem.outputs
-        }
+        return {name: float(np.max(self.difference(name))) for name in self.first.problem.outputs}
 
     @cached_property
     def conditioning_floor(self) -> Array:
         """Return how far one rounding of the data moves the state at each time: agreement below it
         is luck.
         """
-        return self.analytic.problem.conditioning_floor(self.analytic.times)
+        return self.first.problem.conditioning_floor(self.first.times)
 
     @cached_property
     def agrees(self) -> bool:
         """Return whether the bounded outputs differ, at every time, by no more than the sum of both
         errors.
         """
-        allowed = self.analytic.error + self.numeric.error
+        allowed = self.first.error + self.second.error
         return bool(
-            all(np.all(self.difference(name) <= allowed) for name in self.analytic.problem.bounded)
+            all(np.all(self.difference(name) <= allowed) for name in self.first.problem.bounded)
         )
 
     @property
     def drift(self) -> dict[str, dict[str, float]]:
-        """Return the largest change of each integral of motion, by engine and name."""
-        return {"analytic": self.analytic.drift, "numeric": self.numeric.drift}
+        """Return the largest change of each integral of motion, by the two ``names``."""
+        return {name: found.drift for name, found in self.trajectories.items()}
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Return the time that each engine took."""
-        return {
-            "analytic": self.analytic.provenance.seconds,
-            "numeric": self.numeric.provenance.seconds,
-        }
+        """Return the time that each of the two took."""
+        return {name: found.provenance.seconds for name, found in self.trajectories.items()}
 
     def summary(self) -> dict[str, Any]:
         """Return the comparison as a JSON-ready dictionary."""
-        engines = {"analytic": self.analytic, "numeric": self.numeric}
+        engines = self.trajectories
         return {
             "deviation": self.deviation,
             "agrees": self.agrees,
@@ -98,15 +119,17 @@ class Comparison:
         }
 
     def plot(self) -> Figure:
-        """Return a figure of the motion with the difference of the engines; raises BackendMissing
+        """Return a figure of the motion with the difference of the two; raises BackendMissing
         without matplotlib.
         """
         from veselova.mechanics.results.plot import picture
 
-        ordered = Comparison(self.analytic.in_order_of_time(), self.numeric.in_order_of_time())
-        differences = {name: ordered.difference(name) for name in self.analytic.problem.outputs}
-        errors = {"analytic": ordered.analytic.error, "numeric": ordered.numeric.error}
-        return picture(ordered.analytic, differences, errors, ordered.conditioning_floor)
+        ordered = Comparison(
+            self.first.in_order_of_time(), self.second.in_order_of_time(), self.names
+        )
+        differences = {name: ordered.difference(name) for name in self.first.problem.outputs}
+        errors = {name: found.error for name, found in ordered.trajectories.items()}
+        return picture(ordered.first, differences, errors, ordered.conditioning_floor)
 
     def _repr_html_(self) -> str:
         rows = "".join(

@@ -157,20 +157,22 @@ def comparison_document(
     comparison: Comparison, outputs: Iterable[str] | None = None
 ) -> dict[str, Any]:
     """Return the document of a comparison: both trajectories, and the largest deviation of every
-    output.
+    output. Those of two formulations are below ``formulations``.
     """
     outputs = None if outputs is None else tuple(outputs)
-    return {
-        **comparison.summary(),
-        "analytic": trajectory_document(comparison.analytic, outputs),
-        "numeric": trajectory_document(comparison.numeric, outputs),
+    both = {
+        name: trajectory_document(found, outputs) for name, found in comparison.trajectories.items()
     }
+    of_engines = comparison.names == ("analytic", "numeric")
+    return {**comparison.summary(), **(both if of_engines else {"formulations": both})}
 
 
 def comparison_of(problem: Problem, document: Mapping[str, Any]) -> Comparison:
     """Return the comparison of a document whose trajectories have the stored outputs."""
+    first, second = document.get("formulations", ("analytic", "numeric"))
+    both = document.get("formulations", document)
     return Comparison(
-        trajectory_of(problem, document["analytic"]), trajectory_of(problem, document["numeric"])
+        trajectory_of(problem, both[first]), trajectory_of(problem, both[second]), (first, second)
     )
 
 

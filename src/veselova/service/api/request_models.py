@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
-from veselova.engines import require_options
+from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import (
     Faults,
@@ -110,7 +110,7 @@ class TorusRequest(BudgetedRequest):
 
 
 class ComparisonRequest(TorusRequest):
-    """A motion asked of both engines."""
+    """A motion asked of both engines, or in two formulations of a system with one."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
 
@@ -182,14 +182,8 @@ class ComparisonRequest(TorusRequest):
 
     def _try_options(self, faults: Faults) -> None:
         """Collect what is wrong with the options of the engines."""
-        if self.method is not None:  # of the numerical engine
-            faults.attempt(
-                require_options,
-                SYSTEMS[self.problem.system].problem_class,
-                "numeric",
-                self.method,
-                None,
-            )
+        kind = SYSTEMS[self.problem.system].problem_class
+        faults.attempt(require_comparison, kind, self.method, self.formulation)
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""

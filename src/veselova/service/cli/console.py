@@ -140,27 +140,29 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     """Print how the engines agree, quantity by quantity, against their errors and the conditioning
     floor.
     """
-    console.print(_describe(comparison.analytic), highlight=False)
-    console.print(_describe(comparison.numeric), highlight=False)
-    _heading(console, "Largest difference of the two engines")
+    of_engines = comparison.names == ("analytic", "numeric")
+    kind = "engines" if of_engines else f"formulations {' and '.join(comparison.names)}"
+    console.print(_describe(comparison.first), highlight=False)
+    console.print(_describe(comparison.second), highlight=False)
+    _heading(console, f"Largest difference of the two {kind}")
     table = _table("output", "deviation")
     for name, value in comparison.deviation.items():
         table.add_row(name, f"{value:.1e}")
     console.print(table)
     _heading(console, "Bounds")
     table = _table("bound", "largest value")
-    table.add_row("error bound, analytic", f"{np.max(comparison.analytic.error):.1e}")
-    table.add_row("error bound, numeric", f"{np.max(comparison.numeric.error):.1e}")
+    for name, found in comparison.trajectories.items():
+        table.add_row(f"error bound, {name}", f"{np.max(found.error):.1e}")
     table.add_row(
         "conditioning floor (one rounding of the data)",
         f"{np.max(comparison.conditioning_floor):.1e}",
     )
     console.print(table)
-    _print_drift(console, {"analytic": comparison.analytic, "numeric": comparison.numeric})
+    _print_drift(console, comparison.trajectories)
     verdict = (
-        "The engines agree within their error bounds."
+        f"The {kind} agree within their error bounds."
         if comparison.agrees
-        else "The engines DISAGREE beyond their error bounds."
+        else f"The {kind} DISAGREE beyond their error bounds."
     )
     console.print(f"\n{verdict}", highlight=False)
 

@@ -210,7 +210,7 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     with _limits(request):
         comparison = compare_request(request)
     if output:
-        _write(comparison.analytic, output, request.outputs)
+        _write(comparison.first, output, request.outputs)
     if plot:
         _draw(comparison, plot)
     if json:

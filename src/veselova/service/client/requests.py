@@ -148,13 +148,16 @@ def compare_call(
     times: Any,
     method: str | None = None,
     *,
+    formulation: str | None = None,
     budget_s: float = 10.0,
 ) -> Call[Comparison]:
-    """Return both engines' motions and how they agree (see ``veselova.compare``)."""
+    """Return both engines' motions, or two formulations of a system with one engine, and how they
+    agree (see ``veselova.compare``).
+    """
     asked = _problem(problem)
     return Call(
         "/v1/comparisons",
-        _motion(asked, times, method, budget_s),
+        {"formulation": formulation, **_motion(asked, times, method, budget_s)},
         budget_s,
         partial(comparison_of, asked),
     )

@@ -145,7 +145,22 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "provenance": {"type": "object", "additionalProperties": _PROVENANCE},
             "analytic": {"$ref": f"{PREFIX}Trajectory"},
             "numeric": {"$ref": f"{PREFIX}Trajectory"},
-        }
+            "formulations": {
+                "type": "object",
+                "additionalProperties": {"$ref": f"{PREFIX}Trajectory"},
+                "description": "instead of analytic and numeric, for a system of one engine: two "
+                "formulations by name",
+            },
+        },
+        required=[
+            "deviation",
+            "agrees",
+            "conditioning_floor",
+            "error",
+            "drift",
+            "seconds",
+            "provenance",
+        ],
     ),
     "Torus": _object(
         {

@@ -54,7 +54,9 @@ def cost(request: ComparisonRequest) -> Cost:
     points = request.time_count()
     entries = float(points) * n * n
     if not isinstance(request, TrajectoryRequest):
-        return Cost(entries * sum(_SECONDS.values()), 2 * entries * _BYTES / MEGABYTE)
+        engines = request.problem.problem_class.engines
+        seconds = sum(_SECONDS.values()) if len(engines) > 1 else 2 * _SECONDS["numeric"]
+        return Cost(entries * seconds, 2 * entries * _BYTES / MEGABYTE)
     if beyond_double(request.digits, request.certified):
         length = max(request.digits, FEWEST_DIGITS) / FEWEST_DIGITS
         seconds = entries * length * _SECONDS_EXACT + n * length**_SET_UP_POWER * _SET_UP_EXACT

@@ -76,7 +76,7 @@ def _problem_and_times(request: ComparisonRequest) -> tuple[Problem, TimeGrid]:
 def compare_request(request: ComparisonRequest) -> Comparison:
     """Return the comparison that a request asks for."""
     problem, grid = _problem_and_times(request)
-    return compare(problem, grid, request.method)
+    return compare(problem, grid, request.method, formulation=request.formulation)
 
 
 def torus_request(request: TorusRequest) -> Torus:
