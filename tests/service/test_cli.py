@@ -21,8 +21,10 @@ import pytest
 from conftest import PATIENCE, wait_until
 from hostile import BUDGET_S, GOOD, INVALID, MALFORMED
 from veselova import __version__, solve
+from veselova.curves import RealHyperelliptic
 from veselova.service.api.examples import BODY4
 from veselova.service.cli.main import main
+from veselova.theta import riemann_theta
 
 BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
 
@@ -385,3 +387,44 @@ def test_a_reader_that_goes_away_is_no_failure_of_ours() -> None:
     command = f"{sys.executable} -m veselova solve {BODY4_FILE} --json | head -c 10"
     answer = subprocess.run(["bash", "-c", command], capture_output=True, timeout=PATIENCE)
     assert answer.stderr == b""
+
+
+@pytest.mark.parametrize("kind", ["curve", "theta"])
+def test_curves_and_theta_functions_have_commands(kind: str) -> None:
+    file = BODY4_FILE.parent / f"{kind}.json"
+    answer = run(kind, str(file), "--json")
+    assert answer.returncode == 0, answer.stderr
+    document = json.loads(answer.stdout)
+    shown = run(kind, str(file))
+    assert shown.returncode == 0, shown.stderr
+    text = shown.stdout.decode()
+    if kind == "curve":
+        curve = RealHyperelliptic([0, 1, "1.7", 3, "4.5"])
+        assert np.array_equal(document["riemann_matrix"], curve.riemann_matrix.imag)
+        assert document["points"]
+        for heading in ("Riemann matrix", "Abel–Jacobi map", "Quasi-periods eta", "Thomae"):
+            assert heading in text
+        assert f"{curve.riemann_matrix[0, 1].imag:.12g}" in text
+    else:
+        stated = json.loads(file.read_text())
+        tau = [[0.3 + 0.9j, 0.2], [0.2, 1.1j]]
+        value = complex(riemann_theta([0.1, 0.2j], tau, [[0.5, 0], [0, 0.5]]))
+        assert stated["characteristic"] == [[0.5, 0], [0, 0.5]]
+        assert document["values"][0] == pytest.approx([value.real, value.imag], rel=1e-14)
+        assert f"{value.real:.12g}" in text
+
+
+def test_commands_of_the_toolkit_refuse_in_a_sentence_and_keep_digits() -> None:
+    wrong = run("curve", "-", stdin=b'{"branch_points": [0, 1, 1, 2, 3], "sgn": 1}')
+    assert wrong.returncode == 2
+    assert b"Traceback" not in wrong.stderr
+    assert b"branch_points" in wrong.stderr
+    both = run("theta", "-", stdin=b'{"z": [[0]], "tau": [[[0, 1]]], "T": [[1]]}')
+    assert both.returncode == 2
+    assert b"tau: required tau, or T of " in both.stderr
+    precise = run("curve", "-", stdin=b'{"branch_points": [0, 1, 2], "digits": 40}')
+    assert precise.returncode == 0, precise.stderr
+    assert "1.0000000000000000000000000000000000000000" in precise.stdout.decode()
+    gradient = run("theta", "-", stdin=b'{"z": [[0.1], [0.2]], "T": [[1]], "derivatives": 1}')
+    assert gradient.returncode == 0, gradient.stderr
+    assert len(gradient.stdout.splitlines()) == 4

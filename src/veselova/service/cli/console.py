@@ -18,6 +18,8 @@ from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode
 
 __all__ = [
+    "heading",
+    "make_table",
     "print_comparison",
     "print_ensemble",
     "print_json",
@@ -46,14 +48,14 @@ def print_json(document: Mapping[str, Any]) -> None:
     sys.stdout.buffer.flush()
 
 
-def _table(*columns: str) -> Table:
+def make_table(*columns: str) -> Table:
     table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
     return table
 
 
-def _heading(console: Console, text: str) -> None:
+def heading(console: Console, text: str) -> None:
     console.print(f"\n{text}", style="bold", highlight=False)
 
 
@@ -97,7 +99,7 @@ def print_trajectory(
     further = [CONDITIONING] if CONDITIONING in (outputs or ()) else []
     neumann_time = ["tau1"] if "tau1" in problem.outputs else []
     shown_names = names[:_SHOWN_COMPONENTS]
-    table = _table(problem.time, *neumann_time, *shown_names, *more, "error", *further)
+    table = make_table(problem.time, *neumann_time, *shown_names, *more, "error", *further)
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
     for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
@@ -118,7 +120,7 @@ def print_ensemble(console: Console, ensemble: Ensemble) -> None:
         f"{np.count_nonzero(ensemble.together)} side by side; {ensemble.provenance.seconds:.3g} s",
         highlight=False,
     )
-    table = _table("outcome", "starts", "largest error")
+    table = make_table("outcome", "starts", "largest error")
     for outcome in np.unique(ensemble.outcome).tolist():
         rows = ensemble.outcome == outcome
         errors = ensemble.error[rows]
@@ -128,8 +130,8 @@ def print_ensemble(console: Console, ensemble: Ensemble) -> None:
 
 
 def _print_drift(console: Console, trajectories: dict[str, Trajectory]) -> None:
-    _heading(console, "Drift of the integrals of motion")
-    table = _table("integral", *trajectories)
+    heading(console, "Drift of the integrals of motion")
+    table = make_table("integral", *trajectories)
     drifts = [trajectory.drift for trajectory in trajectories.values()]
     for name in drifts[0]:
         table.add_row(name, *(f"{drift[name]:.1e}" for drift in drifts))
@@ -144,13 +146,13 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     kind = "engines" if of_engines else f"formulations {' and '.join(comparison.names)}"
     console.print(_describe(comparison.first), highlight=False)
     console.print(_describe(comparison.second), highlight=False)
-    _heading(console, f"Largest difference of the two {kind}")
-    table = _table("output", "deviation")
+    heading(console, f"Largest difference of the two {kind}")
+    table = make_table("output", "deviation")
     for name, value in comparison.deviation.items():
         table.add_row(name, f"{value:.1e}")
     console.print(table)
-    _heading(console, "Bounds")
-    table = _table("bound", "largest value")
+    heading(console, "Bounds")
+    table = make_table("bound", "largest value")
     for name, found in comparison.trajectories.items():
         table.add_row(f"error bound, {name}", f"{np.max(found.error):.1e}")
     table.add_row(
@@ -180,13 +182,13 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
         f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}",
         highlight=False,
     )
-    _heading(console, "Branch points")
-    table = _table("b", "origin", "value")
+    heading(console, "Branch points")
+    table = make_table("b", "origin", "value")
     for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
         table.add_row(f"b_{j}", origin, f"{value:.15g}")
     console.print(table)
-    _heading(console, "Phases (cycles)")
-    table = _table("s", "z⁰", "per unit τ₁", f"per unit {time}", "action J_s")
+    heading(console, "Phases (cycles)")
+    table = make_table("s", "z⁰", "per unit τ₁", f"per unit {time}", "action J_s")
     columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
     for s, row in enumerate(zip(*columns, strict=True), start=1):
         table.add_row(str(s), *(f"{x:.15g}" for x in row))
@@ -201,8 +203,8 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
 
 
 def _print_matrix(console: Console, title: str, matrix: Any) -> None:
-    _heading(console, title)
-    table = _table(*("" for _ in range(matrix.shape[1])))
+    heading(console, title)
+    table = make_table(*("" for _ in range(matrix.shape[1])))
     for row in matrix:
         table.add_row(*(f"{x: .12g}" for x in row))
     console.print(table)

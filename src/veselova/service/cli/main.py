@@ -261,6 +261,36 @@ def closed_form(
 
 
 @app.command()
+def curve(file: _File, json: _Json = False) -> None:
+    """Compute periods, Riemann matrix and Abel–Jacobi images of a hyperelliptic curve."""
+    from veselova.service.api.request_models import read_request
+    from veselova.service.api.toolkit_requests import CurveRequest
+    from veselova.service.cli.console import print_json, terminal
+    from veselova.service.cli.toolkit_console import print_curve
+    from veselova.service.workers.tasks import curve_document
+
+    request = read_request(CurveRequest, _document(file))
+    with _limits(request):
+        document = curve_document(request)
+    print_json(document) if json else print_curve(terminal(), document)
+
+
+@app.command()
+def theta(file: _File, json: _Json = False) -> None:
+    """Evaluate Riemann theta functions, with characteristics and derivatives."""
+    from veselova.service.api.request_models import read_request
+    from veselova.service.api.toolkit_requests import ThetaRequest
+    from veselova.service.cli.console import print_json, terminal
+    from veselova.service.cli.toolkit_console import print_theta
+    from veselova.service.workers.tasks import theta_document
+
+    request = read_request(ThetaRequest, _document(file))
+    with _limits(request):
+        document = theta_document(request)
+    print_json(document) if json else print_theta(terminal(), document)
+
+
+@app.command()
 def sweep(
     file: _File,
     json: _Json = False,

@@ -114,7 +114,8 @@ def _closed_form(request: Any) -> dict[str, Any]:
     return dict(closed_form_request(request).document)
 
 
-def _curve(request: CurveRequest) -> dict[str, Any]:
+def curve_document(request: CurveRequest) -> dict[str, Any]:
+    """Return the document of the curve that a request asks for."""
     from veselova.curves import RealHyperelliptic
 
     curve = RealHyperelliptic(
@@ -123,7 +124,8 @@ def _curve(request: CurveRequest) -> dict[str, Any]:
     return curve.data(*request.places, request.z, request.outputs or ()).as_dict()
 
 
-def _theta(request: ThetaRequest) -> dict[str, Any]:
+def theta_document(request: ThetaRequest) -> dict[str, Any]:
+    """Return the document of the theta functions that a request asks for."""
     from veselova.theta import evaluate_theta
 
     return evaluate_theta(request.arguments).as_dict()
@@ -136,8 +138,8 @@ TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]
     "ensemble": (EnsembleRequest, _ensemble),
     "torus": (TorusRequest, _torus),
     "closed_form": (ClosedFormRequest, _closed_form),
-    "curve": (CurveRequest, _curve),
-    "theta": (ThetaRequest, _theta),
+    "curve": (CurveRequest, curve_document),
+    "theta": (ThetaRequest, theta_document),
 }
 
 
@@ -148,5 +150,5 @@ def warm_up() -> None:
     request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
     encode(_comparison(request))
     _torus(request)
-    _curve(CurveRequest.model_validate(CURVE))
-    _theta(ThetaRequest.model_validate(THETA))
+    curve_document(CurveRequest.model_validate(CURVE))
+    theta_document(ThetaRequest.model_validate(THETA))

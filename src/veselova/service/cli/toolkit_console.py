@@ -1,0 +1,86 @@
+"""What the command line prints of a curve and of theta functions: tables on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from veselova.service.cli.console import heading, make_table
+
+__all__ = ["print_curve", "print_theta"]
+
+#: Matrices of a curve by their fields, with headings.
+_MATRICES = {
+    "riemann_matrix": "T, Riemann matrix iT",
+    "a_periods": "Periods ∮ λ^(k−1)dλ/w over a_s, column s",
+    "b_periods": "The same over b_s, without the factor i",
+    "normalized_differentials": "Normalised differentials c_jk",
+}
+
+#: Points of theta functions that a terminal is shown; JSON has all.
+_SHOWN_POINTS = 12
+
+
+def print_curve(console: Console, document: Mapping[str, Any]) -> None:
+    """Print a curve as ``POST /v1/curves`` describes it."""
+    console.print(
+        f"genus {document['genus']}, w² = {'−' if document['sign'] < 0 else ''}Π(λ−b_j), "
+        f"error of T {document['riemann_matrix_error']:.1e}",
+        highlight=False,
+    )
+    points = ", ".join(f"{point:.15g}" for point in document["branch_points"])
+    console.print(f"branch points {points}", highlight=False)
+    for name, title in _MATRICES.items():
+        if document.get(name) is not None:
+            _print_rows(console, title, document[name])
+    if "abel" in document:
+        _print_rows(console, "Abel–Jacobi map, one row a point", document["abel"])
+    if "points" in document:
+        _print_rows(console, "Points λ_s on the cuts, one row for each z", document["points"])
+        _print_rows(console, "Signs of w there", document["signs"])
+    for name, matrix in (document.get("quasi_periods") or {}).items():
+        _print_rows(console, f"Quasi-periods {name}", matrix)
+    if "thomae" in document:
+        heading(console, "Thomae's formula")
+        rows = make_table("subset", "characteristic", "|θ(0)|⁴")
+        for entry in document["thomae"]:
+            subset = " ".join(f"b_{j}" for j in entry["subset"])
+            halves = "; ".join(" ".join(f"{x:g}" for x in row) for row in entry["characteristic"])
+            rows.add_row(subset, f"[{halves}]", _number(entry["fourth_power"]))
+        console.print(rows)
+
+
+def print_theta(console: Console, document: Mapping[str, Any]) -> None:
+    """Print theta functions at the first points as ``POST /v1/theta`` gives them: θ = value ·
+    exp(exponent).
+    """
+    values = np.asarray(document["values"], dtype=np.float64)
+    exponents = np.asarray(document["exponent"], dtype=np.float64)
+    errors = np.asarray(document["error"], dtype=np.float64)
+    console.print(f"{exponents.size} values θ = value · exp(exponent)", highlight=False)
+    rows = make_table("point", "value", "exponent", "error")
+    for index in list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]:
+        pairs = values[index].reshape(-1, 2)
+        shown = "  ".join(f"{real:.12g} {imaginary:+.12g}i" for real, imaginary in pairs)
+        label = " ".join(str(i + 1) for i in index)
+        rows.add_row(label, shown, f"{exponents[index]:g}", f"{np.max(errors[index]):.1e}")
+    console.print(rows)
+
+
+def _print_rows(console: Console, title: str, matrix: Sequence[Sequence[Any]]) -> None:
+    heading(console, title)
+    rows = make_table(*("" for _ in matrix[0]))
+    for row in matrix:
+        rows.add_row(*(_number(entry) for entry in row))
+    console.print(rows)
+
+
+def _number(value: Any) -> str:
+    """Return a number, a decimal text, or a pair [real, imaginary] as a cell."""
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        real, imaginary = (_number(part) for part in value)
+        return f"{real} {imaginary}i" if imaginary.startswith("-") else f"{real} +{imaginary}i"
+    return value if isinstance(value, str) else f"{value:.12g}"
