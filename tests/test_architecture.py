@@ -37,6 +37,7 @@ ALLOWED_LATER = {
     # Decimals turn into numbers of the last two on request.
     "mechanics": {
         "matplotlib",
+        "mpl_toolkits",
         "orjson",
         "pandas",
         "pyarrow",

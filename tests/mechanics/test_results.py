@@ -270,13 +270,14 @@ def test_one_vector_in_space_has_a_picture() -> None:
 def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
     case = next(case for case in tagged("generic") if case.name == name)
     comparison = compare(case.problem(), np.linspace(0, 3, 31))
-    for subject, panels in ((comparison.analytic, 2), (comparison, 3)):
+    in_space = case.problem().n == 3
+    for subject, panels in ((comparison.first, 2 + in_space), (comparison, 3 + in_space)):
         figure = subject.plot()
         assert len(figure.axes) == panels
         figure.savefig(tmp_path / "picture.png", dpi=40)
         assert (tmp_path / "picture.png").stat().st_size > 5000
     assert figure.axes[-1].get_yscale() == "log"
-    assert figure.axes[0].name == ("3d" if case.problem().n == 3 else "rectilinear")
+    assert figure.axes[0].name == ("3d" if in_space else "rectilinear")
 
 
 def test_a_comparison_summarises_deviation_drift_and_seconds(comparison: Comparison) -> None:

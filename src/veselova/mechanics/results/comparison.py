@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["Comparison"]
@@ -118,7 +120,13 @@ class Comparison:
             },
         }
 
-    def plot(self) -> Figure:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        outputs: Iterable[str] | None = None,
+        style: Any = "screen",
+    ) -> Figure:
         """Return a figure of the motion with the difference of the two; raises BackendMissing
         without matplotlib.
         """
@@ -129,7 +137,15 @@ class Comparison:
         )
         differences = {name: ordered.difference(name) for name in self.first.problem.outputs}
         errors = {name: found.error for name, found in ordered.trajectories.items()}
-        return picture(ordered.first, differences, errors, ordered.conditioning_floor)
+        return picture(
+            ordered.first,
+            differences,
+            errors,
+            ordered.conditioning_floor,
+            ax=ax,
+            outputs=outputs,
+            style=style,
+        )
 
     def _repr_html_(self) -> str:
         rows = "".join(

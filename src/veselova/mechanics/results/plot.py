@@ -1,32 +1,73 @@
-"""Pictures of a motion. The one place that knows matplotlib, imported when a picture
+"""Pictures of a motion. This file and ``portrait`` alone know matplotlib, imported when a picture
 is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.errors import (
+    BackendMissing,
+    InvalidInput,
+    show,
+    unknown_name,
+)
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Portrayable", "picture"]
+__all__ = ["STYLES", "Portrayable", "picture"]
 
 Array = NDArray[np.float64]
 
-#: One colour per body axis or coordinate, told apart in print and by colour-blind readers (Okabe
-#: and Ito).
-_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"]
-
 #: Differences of zero are drawn at the bottom of the logarithmic axis.
 _LEAST_DRAWN = 1e-17
+
+#: Panels besides the series of a problem.
+_PANELS = ("portrait", "drift", "error", "difference")
+
+#: Style → settings of matplotlib. ``print`` is one column of a journal, 86 mm, with its text at 8
+#: points; fonts are embedded as outlines that journals take.
+STYLES: Mapping[str, Mapping[str, Any]] = {
+    "screen": {"figure.figsize": (9.0, 3.2), "font.size": 10.0, "lines.linewidth": 1.2},
+    "print": {
+        "figure.figsize": (3.39, 1.6),
+        "font.size": 8.0,
+        "axes.labelsize": 8.0,
+        "axes.titlesize": 8.0,
+        "legend.fontsize": 6.5,
+        "xtick.labelsize": 7.0,
+        "ytick.labelsize": 7.0,
+        "figure.titlesize": 8.0,
+        "axes.linewidth": 0.5,
+        "lines.linewidth": 0.8,
+        "pdf.fonttype": 42,
+        "figure.dpi": 300.0,
+    },
+}
+
+#: Names of series in formulas.
+_SYMBOLS = {
+    "gamma": r"\gamma",
+    "Omega": r"\Omega",
+    "omega": r"\omega",
+    "tau1": r"\tau_1",
+    "spheroconic": r"\lambda",
+    "q_dot": r"\dot q",
+    "q_prime": "q'",
+    "X_dot": r"\dot X",
+    "frame": r"\mathrm{frame}",
+}
+
+#: Components that a legend lists.
+_LISTED = 12
 
 
 class Portrayable(Protocol):
@@ -39,6 +80,10 @@ class Portrayable(Protocol):
     @property
     def times(self) -> Array:
         """Return the times, (N,)."""
+
+    @property
+    def error(self) -> Array:
+        """Return the error bound, (N,)."""
 
     @property
     def integrals(self) -> Mapping[str, Array]:
@@ -57,105 +102,196 @@ def picture(
     differences: Mapping[str, Array] | None = None,
     errors: Mapping[str, Array] | None = None,
     floor: Array | None = None,
+    *,
+    ax: Axes | None = None,
+    outputs: Iterable[str] | None = None,
+    style: Any = "screen",
 ) -> Figure:
-    """Return the picture of a motion.
+    """Return the picture of a motion, one panel for each of ``outputs``; ``Trajectory.plot`` says
+    what they are.
 
-    First the series that the problem calls its portrait: a curve on the sphere with the frame axes
-    at a few times where it has three components, else the components. Then the spheroconic
-    coordinates, or where there are none the drift of the integrals.
-    For a comparison: the ``differences`` of each output, the ``errors`` of each engine and the
-    conditioning ``floor``, (N,) each, on a logarithmic axis.
+    For a comparison: the ``differences`` of each output, the ``errors`` of both and the
+    conditioning ``floor``, (N,) each, make the panel ``difference``.
     """
     try:
+        import matplotlib as mpl
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    rows = 2 if differences is None else 3
+    settings = _settings(style)
+    panels = _panels(motion, outputs, ax, differences is not None)
+    named: Any = dict(settings)
+    with mpl.rc_context(named):
+        if ax is not None:
+            found: Any = ax.figure
+            all_axes = [ax]
+        else:
+            found, all_axes = _layout(Figure, panels, _section(motion) == slice(None))
+            problem = motion.problem
+            how = f"{motion.provenance.engine}, {motion.provenance.method}"
+            found.suptitle(f"{problem.title} ({how})", wrap=True)
+        for axes, panel in zip(all_axes, panels, strict=True):
+            if panel == "portrait":
+                _draw_curve(axes, motion)
+            elif panel == "difference":
+                _draw_difference(axes, motion.times, differences or {}, errors or {}, floor)
+            else:
+                _draw_in_time(axes, motion, panel)
+    return found  # type: ignore[no-any-return]
+
+
+def _settings(style: Any) -> Mapping[str, Any]:
+    if isinstance(style, Mapping):
+        return {**STYLES["screen"], **style}
+    if not isinstance(style, str) or style not in STYLES:
+        raise unknown_name(("style",), style, list(STYLES))
+    return STYLES[style]
+
+
+def _panels(
+    motion: Portrayable, outputs: Iterable[str] | None, ax: Any, compared: bool
+) -> list[str]:
+    """Return the panels that are asked for; raises InvalidInput for others."""
     problem = motion.problem
-    figure = Figure(figsize=(9, 3.2 * rows), layout="constrained")
-    portrait = motion.series(problem.portrait).reshape(motion.times.size, -1)
-    if portrait.shape[1] == 3:
-        grid = figure.add_gridspec(rows, 1, height_ratios=[2] + [1] * (rows - 1))
-        _draw_sphere(figure.add_subplot(grid[0], projection="3d"), motion)
-        axes = [figure.add_subplot(grid[row]) for row in range(1, rows)]
+    in_space = motion.series(problem.portrait)[:1].size == 3
+    if outputs is None and ax is not None:
+        return ["portrait" if ax.name == "3d" else problem.portrait]
+    if outputs is None:
+        last = ["difference"] if compared else []
+        middle = "spheroconic" if "spheroconic" in problem.outputs else "drift"
+        return [*(["portrait"] if in_space else []), problem.portrait, middle, *last]
+    chosen = [outputs] if isinstance(outputs, str) else list(outputs)
+    known = [*problem.outputs, *(_PANELS if compared else _PANELS[:-1])]
+    if not chosen or (ax is not None and len(chosen) > 1):
+        required = f"{'one' if ax is not None else 'one or more'} of {', '.join(known)}"
+        raise InvalidInput(("outputs",), required, show(chosen))
+    for i, name in enumerate(chosen):
+        if name not in known:
+            raise unknown_name(("outputs", i), name, known)
+    if "portrait" in chosen and not in_space:
+        required = "a series of three components for the panel portrait"
+        given = f"{problem.portrait} of {motion.series(problem.portrait)[:1].size}"
+        raise InvalidInput(("outputs",), required, given)
+    if ax is not None and (chosen == ["portrait"]) != (ax.name == "3d"):
+        required = "axes in space (projection='3d') for the panel portrait, plane ones for others"
+        raise InvalidInput(("ax",), required, f"{ax.name} axes for {chosen[0]}")
+    return chosen
+
+
+def _layout(figure_class: Any, panels: list[str], shared: bool) -> tuple[Figure, list[Any]]:
+    """Return a figure with one panel below the other; one in space is twice as high, and those in
+    time may share their axis.
+    """
+    import matplotlib as mpl
+
+    heights = [2 if panel == "portrait" else 1 for panel in panels]
+    width, height = mpl.rcParams["figure.figsize"]
+    figure = figure_class(figsize=(width, height * sum(heights)), layout="constrained")
+    grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
+    found: list[Any] = []
+    in_time: list[Any] = []
+    for i, panel in enumerate(panels):
+        if panel == "portrait":
+            found.append(figure.add_subplot(grid[i], projection="3d"))
+            continue
+        found.append(figure.add_subplot(grid[i], sharex=in_time[0] if shared and in_time else None))
+        in_time.append(found[-1])
+    return figure, found
+
+
+def _draw_curve(axes: Any, motion: Portrayable) -> None:
+    import matplotlib as mpl
+
+    problem = motion.problem
+    curve = motion.series(problem.portrait).reshape(-1, 3)
+    frames = motion.series("frame") if "frame" in problem.outputs else None
+    symbol = _SYMBOLS.get(problem.portrait, problem.portrait)
+    width = float(mpl.rcParams["lines.linewidth"])
+    draw_portrait(axes, curve, problem.semiaxes, frames, symbol, width)
+    title = f"${symbol}({_SYMBOLS.get(problem.time, problem.time)})$"
+    if is_dense(curve, problem.semiaxes):
+        title += ", darker where it is more often"
+    elif frames is not None:
+        title += " and frames at six times"
+        _add_legend(axes)
+    axes.set_title(title)
+
+
+def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
+    """Draw components of a series, the drift of the integrals, or the error, over time."""
+    times = motion.times
+    if panel == "drift":
+        _draw_drift(axes, motion)
+    elif panel == "error":
+        axes.semilogy(times, np.maximum(motion.error, _LEAST_DRAWN), color=COLOURS[0])
+        axes.set_ylabel("error bound")
     else:
-        axes = list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
-        _draw_lines(
-            axes[0], motion.times, portrait, problem.portrait, f"components of {problem.portrait}"
+        rows = _section(motion)
+        _draw_lines(axes, times[rows], motion.series(panel)[rows], panel)
+    problem = motion.problem
+    axes.set_xlabel(f"${_SYMBOLS.get(problem.time, problem.time)}$")
+    axes.margins(x=0)
+    if _section(motion) == slice(None):
+        axes.label_outer()
+
+
+def _section(motion: Portrayable) -> slice:
+    """Return the times over which components are drawn: all, or the first of a long motion."""
+    turning = motion.problem.turning / (2 * np.pi)
+    times = motion.times
+    if turning * float(times[-1] - times[0]) <= LONG:
+        return slice(None)
+    return slice(0, max(2, int(np.searchsorted(times, times[0] + LONG / 2 / turning))))
+
+
+def _draw_lines(axes: Axes, times: Array, values: Array, name: str) -> None:
+    symbol = _SYMBOLS.get(name, name)
+    indices = list(np.ndindex(values.shape[1:]))
+    for i, index in enumerate(indices):
+        digits = ("" if len(index) == 1 or max(values.shape[1:]) < 10 else ",").join(
+            str(part + 1) for part in index
         )
-        axes = axes[1:]
-    if "spheroconic" in problem.outputs:
-        _draw_lines(
-            axes[0],
-            motion.times,
-            motion.series("spheroconic"),
-            r"\lambda",
-            "spheroconic coordinates",
+        subscript = f"_{{{digits}}}" if index else ""
+        axes.plot(
+            times,
+            values[(slice(None), *index)],
+            color=COLOURS[i % len(COLOURS)],
+            linestyle=("-", "--", ":")[i // len(COLOURS) % 3],
+            label=f"${symbol}{subscript}$" if i < _LISTED else None,
         )
-    else:
-        _draw_drift(axes[0], motion)
-    if differences is not None:
-        _draw_difference(axes[1], motion.times, differences, errors or {}, floor)
-    axes[-1].set_xlabel(f"time {problem.time}")
-    figure.suptitle(f"{problem.title} ({motion.provenance.engine}, {motion.provenance.method})")
-    return figure
+    axes.set_ylabel(f"${symbol}$")
+    _add_legend(axes)
+
+
+def _add_legend(axes: Any) -> None:
+    """List what is drawn beside the axes, where it hides nothing."""
+    axes.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+        frameon=False,
+        handlelength=1.2,
+        borderaxespad=0.3,
+        labelspacing=0.25,
+    )
 
 
 def _draw_drift(axes: Axes, motion: Portrayable) -> None:
+    """Draw the largest change of each integral against its size at the first time, or against 1
+    where it vanishes.
+    """
     for i, (name, values) in enumerate(motion.integrals.items()):
-        change = np.max(
-            np.abs(values - values[:1]).reshape(values.shape[0], -1), axis=1, initial=0.0
-        )
+        rows = values.reshape(values.shape[0], -1)
+        change = np.max(np.abs(rows - rows[:1]), axis=1, initial=0.0)
+        size = float(np.max(np.abs(rows[:1]), initial=0.0))
+        relative = size > 0 and name not in motion.problem.vanishing
         axes.semilogy(
             motion.times,
-            np.maximum(change, _LEAST_DRAWN),
-            color=_COLOURS[i % len(_COLOURS)],
-            linewidth=1,
-            label=name,
+            np.maximum(change / (size if relative else 1.0), _LEAST_DRAWN),
+            color=COLOURS[i % len(COLOURS)],
+            label=name.replace("_", " "),
         )
-    axes.set_ylabel("change of the integrals")
-    axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)
-
-
-def _draw_lines(axes: Axes, times: Any, values: Any, symbol: str, label: str) -> None:
-    for i in range(values.shape[1]):
-        axes.plot(
-            times,
-            values[:, i],
-            color=_COLOURS[i % len(_COLOURS)],
-            linewidth=1.1,
-            label=f"${symbol}_{{{i + 1}}}$",
-        )
-    axes.set_ylabel(label)
-    axes.legend(loc="upper right", ncols=min(8, values.shape[1]), fontsize="small", framealpha=0.9)
-
-
-def _draw_sphere(axes: Any, motion: Portrayable) -> None:
-    """Draw the curve on its sphere or ellipsoid and, where there is a frame, its vectors at six
-    times, standing on the curve.
-    """
-    latitude, longitude = np.mgrid[0 : np.pi : 25j, 0 : 2 * np.pi : 49j]
-    name = motion.problem.portrait
-    curve = motion.series(name).reshape(-1, 3)
-    radii = motion.problem.semiaxes
-    a, b, c = np.full(3, np.max(np.linalg.norm(curve, axis=1))) if radii is None else radii
-    x = np.sin(latitude) * np.cos(longitude)
-    y = np.sin(latitude) * np.sin(longitude)
-    z = np.cos(latitude)
-    axes.plot_wireframe(a * x, b * y, c * z, color="0.85", linewidth=0.4)
-    axes.plot(*curve.T, color=_COLOURS[0], linewidth=1.2)
-    title = f"{name}({motion.problem.time})"
-    if "frame" in motion.problem.outputs:
-        title += ", with $e_1$ (blue), $e_2$ (red), $e_3$ (green) at six times"
-        frame = motion.series("frame")
-        for i in np.unique(np.linspace(0, motion.times.size - 1, 6).astype(int)):
-            for k, colour in enumerate(_COLOURS[i] for i in (0, 1, 2)):
-                axes.quiver(*curve[i], *(0.3 * frame[i, :, k]), color=colour, linewidth=1.4)
-    axes.set_aspect("equal")
-    axes.set_xlabel(f"{name}_1")
-    axes.set_ylabel(f"{name}_2")
-    axes.set_zlabel(f"{name}_3")
-    axes.set_title(title, fontsize="medium")
+    axes.set_ylabel("relative drift")
+    _add_legend(axes)
 
 
 def _draw_difference(
@@ -165,15 +301,15 @@ def _draw_difference(
     errors: Mapping[str, Array],
     floor: Array | None,
 ) -> None:
-    for (name, values), colour in zip(differences.items(), _COLOURS, strict=False):
-        axes.semilogy(
-            times, np.maximum(values, _LEAST_DRAWN), color=colour, linewidth=1, label=f"|Δ {name}|"
-        )
+    for (name, values), colour in zip(differences.items(), COLOURS, strict=False):
+        symbol = _SYMBOLS.get(name, name.replace("_", r"\_"))
+        label = rf"$|\Delta {symbol}|$"
+        axes.semilogy(times, np.maximum(values, _LEAST_DRAWN), color=colour, label=label)
     for (name, values), style in zip(errors.items(), ("--", ":"), strict=False):
-        axes.semilogy(
-            times, values, color="0.4", linestyle=style, linewidth=1, label=f"error, {name}"
-        )
+        axes.semilogy(times, values, color="0.4", linestyle=style, label=f"error, {name}")
     if floor is not None:
-        axes.semilogy(times, floor, color="0.7", linewidth=1, label="conditioning floor")
-    axes.set_ylabel("difference of engines")
-    axes.legend(loc="lower right", ncols=3, fontsize="small", framealpha=0.9)
+        axes.semilogy(times, floor, color="0.7", label="conditioning floor")
+    axes.set_ylabel("difference")
+    axes.set_xlabel("time")
+    axes.margins(x=0)
+    _add_legend(axes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -31,6 +31,7 @@ from veselova.mechanics.results.sampled_motion import SampledMotion
 from veselova.mechanics.results.table import Source, Target, read_parquet, stack_columns
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
@@ -292,11 +293,31 @@ class Trajectory(SampledMotion):
             self, times=times, error=error, arrays=arrays, decimals=None, remainders=None
         )
 
-    def plot(self) -> Figure:
-        """Return a matplotlib figure of the motion; raises BackendMissing without matplotlib."""
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        outputs: Iterable[str] | None = None,
+        times: Any = None,
+        style: Any = "screen",
+    ) -> Figure:
+        """Return a matplotlib figure of the motion, one panel below the other.
+
+        - ax: axes to draw one panel into; in space (``projection="3d"``) for the panel portrait
+        - outputs: the panels: any series, over time; ``portrait``, the curve in space of a series
+          with three components; ``drift``, the relative change of the integrals; ``error``. By
+          default the portrait, its components, and the spheroconic coordinates or the drift
+        - times: those to draw, as ``at`` takes them; None for the trajectory's own
+        - style: ``screen``, ``print`` (one column of 86 mm, 8 points), or settings of matplotlib
+
+        The side of the sphere away from the viewer is dim. A curve of more than 40 turns is drawn
+        as the density of its points. ``figure.savefig("motion.pdf")`` writes it. Raises
+        InvalidInput for bad arguments, BackendMissing without matplotlib.
+        """
         from veselova.mechanics.results.plot import picture
 
-        return picture(self.in_order_of_time())
+        motion = self if times is None else self.at(times)
+        return picture(motion.in_order_of_time(), ax=ax, outputs=outputs, style=style)
 
     def view(self, height: int = 640) -> Any:
         """Return a widget that plays the motion in a notebook, ``height`` pixels high (100 to

@@ -1,0 +1,184 @@
+"""Pictures, looked at by their pixels and their lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import proj3d
+
+import veselova as vs
+from veselova import InvalidInput, Trajectory, solve
+from veselova.mechanics.results.portrait import COLOURS
+
+START: Any = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
+
+
+@pytest.fixture(scope="module")
+def motion() -> Trajectory:
+    return solve(vs.VeselovaSO3([0.4, 0.5, 0.6], *START), {"start": 0, "stop": 20, "count": 800})
+
+
+def pixels(figure: Figure) -> Any:
+    """Return the picture as colours 0 … 1, rows from the top, (height, width, 3)."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3] / 255
+
+
+def colours_at(figure: Figure, axes: Any, points: Any) -> Any:
+    """Return the colours of a picture where points in space are seen, (N, 3)."""
+    image = pixels(figure)
+    x, y, _ = proj3d.proj_transform(*np.transpose(points), axes.get_proj())
+    places = np.rint(axes.transData.transform(np.stack([x, y], axis=1))).astype(int)
+    return image[image.shape[0] - 1 - places[:, 1], places[:, 0]]
+
+
+def is_coloured(image: Any, colour: str) -> Any:
+    return np.max(np.abs(image - np.array(to_rgb(colour))), axis=-1) < 0.08
+
+
+@pytest.mark.parametrize("shape", ["sphere", "ellipsoid"])
+def test_the_curve_is_above_the_wireframe_and_dim_on_the_far_side(
+    shape: str, motion: Trajectory
+) -> None:
+    if shape == "ellipsoid":
+        problem = vs.EllipsoidGeodesic([9, 4, 1], [1, 1, 1], [1, -1, 0.2], normalize=True)
+        motion = solve(problem, {"start": 0, "stop": 30, "count": 1500})
+    figure = motion.plot(outputs=["portrait"], style={"lines.linewidth": 4.0})
+    axes: Any = figure.axes[0]
+    radii = motion.problem.semiaxes
+    points = motion[motion.problem.portrait]
+    up, around = np.radians([axes.elev, axes.azim])
+    view = [np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)]
+    facing = points @ view if radii is None else (points / radii**2) @ view
+    limit = 0.2 * np.max(np.abs(facing))
+    found = colours_at(figure, axes, points)
+    blue = is_coloured(found, COLOURS[0])
+    # Arrows of the frames cover some of the near points, the near curve some of the far ones.
+    assert np.mean(blue[facing > limit]) > 0.75
+    assert np.mean(blue[facing < -limit]) < 0.25
+    dim = 1 - 0.22 * (1 - np.array(to_rgb(COLOURS[0])))
+    assert np.mean(np.max(np.abs(found[facing < -limit] - dim), axis=1) < 0.08) > 0.5
+
+
+def test_the_frame_stands_on_the_curve_in_three_colours(motion: Trajectory) -> None:
+    with_frames = pixels(motion.plot(outputs=["portrait"]))
+    neumann = vs.StiefelFlow({"special": [3, 2, 1]}, [[1], [0], [0]], [[0], [1], [0.5]])
+    without = pixels(solve(neumann, np.linspace(0, 9, 300)).plot(outputs=["portrait"]))
+    for colour in COLOURS[1:3]:
+        assert np.sum(is_coloured(with_frames, colour)) > 100
+        assert np.sum(is_coloured(without, colour)) == 0
+
+
+def test_labels_of_matrices_have_both_indices(motion: Trajectory) -> None:
+    axes = motion.plot(outputs=["frame"]).axes[0]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels[1] == r"$\mathrm{frame}_{12}$"
+    assert len(labels) == 9
+    eight = vs.Veselova(np.arange(1, 13), np.eye(12)[0], np.eye(12)[1])
+    texts = solve(eight, [0, 1]).plot(outputs=["frame"]).axes[0].get_legend().get_texts()
+    assert texts[11].get_text() == r"$\mathrm{frame}_{1,12}$"
+
+
+def test_drift_is_relative_to_what_each_integral_is_at_first(motion: Trajectory) -> None:
+    axes = motion.plot(outputs=["drift"]).axes[0]
+    drawn = {str(line.get_label()): np.max(line.get_ydata()) for line in axes.get_lines()}
+    assert len(drawn) == len(motion.drift)
+    for name, value in motion.drift.items():
+        assert drawn[name.replace("_", " ")] == pytest.approx(max(value, 1e-17), rel=1e-12)
+    large = vs.Veselova([3, 2, 1], START[0], np.multiply(1e4, START[1]))
+    axes = solve(large, np.linspace(0, 1e-3, 50)).plot(outputs=["drift"]).axes[0]
+    assert max(np.max(line.get_ydata()) for line in axes.get_lines()) < 1e-12
+
+
+def test_other_times_are_drawn_where_they_are_asked_for(motion: Trajectory) -> None:
+    figure = motion.plot(outputs=["gamma", "error"], times={"start": -3, "stop": 4, "count": 71})
+    line = figure.axes[0].get_lines()[1]
+    assert np.array_equal(line.get_xdata(), np.linspace(-3, 4, 71))
+    assert np.allclose(line.get_ydata(), motion.at(np.linspace(-3, 4, 71)).gamma[:, 1])
+    assert figure.axes[1].get_ylabel() == "error bound"
+
+
+def test_a_panel_goes_into_axes_of_ones_own(motion: Trajectory) -> None:
+    figure = Figure(figsize=(8, 4))
+    plane, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
+    assert motion.plot(plane) is figure
+    assert motion.plot(space) is figure
+    assert len(figure.axes) == 2
+    assert len(plane.get_lines()) == 3
+    half = pixels(figure).shape[1] // 2
+    image = pixels(figure)
+    for part in (image[:, :half], image[:, half:]):
+        assert np.sum(is_coloured(part, COLOURS[0])) > 100
+    with pytest.raises(InvalidInput, match="ax: required axes in space"):
+        motion.plot(plane, outputs=["portrait"])
+    with pytest.raises(InvalidInput, match="outputs: required one of"):
+        motion.plot(plane, outputs=["gamma", "drift"])
+
+
+def test_a_picture_for_print_has_the_width_of_a_column_and_cuts_nothing_off(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    figure = motion.plot(outputs=["portrait", "frame", "drift"], style="print")
+    assert figure.get_size_inches()[0] * 25.4 == pytest.approx(86, abs=0.5)
+    image = pixels(figure)
+    border = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+    assert np.all(border == 1)
+    sizes = {text.get_fontsize() for axes in figure.axes for text in axes.get_xticklabels()}
+    assert max(sizes) <= 8
+    figure.savefig(tmp_path / "motion.pdf")
+    written = (tmp_path / "motion.pdf").read_bytes()
+    assert written.startswith(b"%PDF")
+    assert b"/MediaBox" in written
+    assert len(written) < 1_000_000
+
+
+def test_a_long_motion_is_a_density_and_not_a_solid_ball() -> None:
+    problem = vs.VeselovaSO3([0.4, 0.5, 0.6], *START)
+    motion = solve(problem, {"start": 0, "stop": 4000, "count": 12_000})
+    figure = motion.plot(outputs=["portrait", "gamma"])
+    image = pixels(figure)
+    top = image[: image.shape[0] * 2 // 3]
+    blueish = top[(top[..., 2] > top[..., 0] + 0.02)]
+    shades = np.unique(np.round(blueish, 2), axis=0)
+    assert len(shades) > 15
+    assert np.mean(is_coloured(top, COLOURS[0])) < 0.01
+    # Components are drawn over the first turns alone, where one sees them.
+    drawn = figure.axes[1].get_lines()[0].get_xdata()
+    assert 20 < drawn[-1] < 400
+    assert np.mean(is_coloured(image, COLOURS[2])) < 0.05
+
+
+def test_comparisons_draw_their_difference_and_take_the_same_options() -> None:
+    found = vs.compare(vs.Veselova([3, 2, 1], *START), np.linspace(0, 5, 60))
+    figure = found.plot(outputs=["difference"], style="print")
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert labels[:2] == [r"$|\Delta q|$", r"$|\Delta \dot q|$"]
+    assert labels[-3:] == ["error, analytic", "error, numeric", "conditioning floor"]
+    assert len(found.plot().axes) == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"outputs": ["gama"]},
+            r"outputs\[0\]: required one of Omega, gamma, .*did you mean gamma",
+        ),
+        ({"outputs": []}, "outputs: required one or more of"),
+        ({"outputs": ["difference"]}, "outputs.0.: required one of"),
+        ({"style": "journal"}, "style: required one of screen, print"),
+    ],
+)
+def test_what_no_picture_has_is_refused(options: Any, message: str, motion: Trajectory) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        motion.plot(**options)
+    body4 = solve(vs.Veselova([4, 3, 2, 1], [1, 0, 0, 0], [0, 1, 0.5, 0]), [0, 1])
+    with pytest.raises(InvalidInput, match="three components for the panel portrait; given q of 4"):
+        body4.plot(outputs=["portrait"])
