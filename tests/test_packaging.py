@@ -5,6 +5,7 @@ core by itself.
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import subprocess
@@ -14,6 +15,7 @@ import tomllib
 import zipfile
 from importlib.metadata import packages_distributions
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -253,11 +255,11 @@ print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, many.strings("q")
 @pytest.mark.parametrize(
     ("statement", "library", "advice"),
     [
-        ("vs.Client()", "", ".[client]"),
-        ("vs.AsyncClient()", "", ".[client]"),
-        ("vs.sweep(problem, {'/A/0': [3, 4]})", "", ".[sweeps]"),
+        ("vs.Client()", "", "[client]"),
+        ("vs.AsyncClient()", "", "[client]"),
+        ("vs.sweep(problem, {'/A/0': [3, 4]})", "", "[sweeps]"),
         ("vs.solve(problem, [1]).plot()", "matplotlib", "matplotlib"),
-        ("vs.solve(problem, [1]).view()", "anywidget", ".[notebook]"),
+        ("vs.solve(problem, [1]).view()", "anywidget", "[notebook]"),
         ("vs.solve(problem, [1]).to_xarray()", "xarray", "xarray"),
         ("vs.solve(problem, [1]).to_parquet('motion.parquet')", "pyarrow", "pyarrow"),
         ("vs.solve(problem, [1], 'numeric', 'taylor')", "heyoka", "heyoka"),
@@ -289,8 +291,37 @@ def test_the_command_line_says_what_it_needs() -> None:
         )
         assert answer.returncode == 1
         assert answer.stderr.startswith("veselova: the command line needs ")
-        assert "pip install '.[service]'" in answer.stderr
+        assert f"pip install '{ROOT}[service]'" in answer.stderr
         assert "Traceback" not in answer.stderr
+
+
+class _Installed:
+    """Stands for the metadata of an installed package."""
+
+    version = "1.2.3"
+
+    def __init__(self, origin: object) -> None:
+        self.origin = origin
+
+    def read_text(self, name: str) -> str | None:
+        assert name == "direct_url.json"
+        return None if self.origin is None else json.dumps(self.origin)
+
+
+def test_an_extra_comes_from_where_the_package_came(tmp_path: Path) -> None:
+    from veselova.mechanics.core import installation
+
+    address = "https://example.org/veselova.git"
+    cases = [
+        (None, "veselova[plot]==1.2.3"),
+        ({"url": tmp_path.as_uri(), "dir_info": {"editable": True}}, f"{tmp_path}[plot]"),
+        ({"url": (tmp_path / "gone.whl").as_uri()}, "veselova[plot]==1.2.3"),
+        ({"url": address, "vcs_info": {"vcs": "git"}}, f"veselova[plot] @ git+{address}"),
+    ]
+    for origin, expected in cases:
+        found: Any = _Installed(origin)
+        assert installation._requirement(found, "plot") == expected
+    assert installation.install_extra("plot") == f"pip install '{ROOT}[plot]'"
 
 
 def test_the_client_needs_its_own_extra_alone() -> None:
@@ -344,9 +375,11 @@ def test_the_wheel_works_in_an_empty_environment(wheel: Path, tmp_path: Path) ->
     assert {_name(line) for line in installed} - {"pip", "setuptools", "veselova"} == _libraries(
         None
     )
-    assert "pip install '.[service]'" in run(environment / "bin" / "veselova", "demo").stderr
-
-    _pip(environment, f"{wheel}[service]")
+    refused = run(environment / "bin" / "veselova", "demo").stderr
+    advised = re.search(r"pip install '(.*)'", refused)
+    assert advised, refused
+    assert advised[1] == f"{wheel}[service]"
+    _pip(environment, advised[1])
     demo = run(environment / "bin" / "veselova", "demo")
     assert demo.returncode == 0, demo.stderr
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra, show
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.motion_page import page
 

@@ -36,7 +36,6 @@ __all__ = [
     "Unsolved",
     "VeselovaError",
     "did_you_mean",
-    "install_extra",
     "missing_fields",
     "show",
     "summary",
@@ -337,13 +336,6 @@ class BackendMissing(VeselovaError, ImportError):
         super().__init__(
             f"{purpose} needs {library}, which is not installed; install it with: {install}"
         )
-
-
-def install_extra(name: str) -> str:
-    """Return the command that installs an extra of this project. The project is on no index: only
-    its folder has it.
-    """
-    return f"pip install '.[{name}]' in the folder of this project"
 
 
 class InternalContradiction(VeselovaError):

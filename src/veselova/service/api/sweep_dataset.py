@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import BackendMissing, install_extra
+from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.problem_models import SYSTEMS

@@ -20,9 +20,9 @@ from veselova.mechanics.core.errors import (
     BackendMissing,
     InvalidInput,
     Unsolved,
-    install_extra,
     show,
 )
+from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request

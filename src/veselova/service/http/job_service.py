@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 import anyio
 from sqlalchemy.exc import DataError, SQLAlchemyError
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput
+from veselova.mechanics.core.installation import install_extra
 from veselova.service.access.database import is_outage, public_reason, reason_of
 from veselova.service.api.problem_details import Refused, problem_code
 from veselova.service.api.settings import Settings

@@ -15,7 +15,8 @@ from urllib.parse import urlsplit
 
 import anyio.to_thread
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput
+from veselova.mechanics.core.installation import install_extra
 from veselova.service.api.settings import MEGABYTE, Settings
 from veselova.service.sweeps.in_process_cluster import ThisProcess
 from veselova.service.workers.signals import ignore_interrupt_in_children
