@@ -5,6 +5,7 @@ core by itself.
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import os
 import re
@@ -117,6 +118,42 @@ def test_the_wheel_made_of_the_sdist_has_every_file_of_the_source(wheel: Path) -
         "mechanics",
         "migrations",
     }
+
+
+def _description(wheel: Path) -> str:
+    with zipfile.ZipFile(wheel) as files:
+        (name,) = (name for name in files.namelist() if name.endswith(".dist-info/METADATA"))
+        return files.read(name).decode()
+
+
+_RELATIVE = re.compile(r"\]\((?![a-z]+:|#)")
+
+
+def test_the_readme_of_a_package_has_no_relative_link(wheel: Path) -> None:
+    metadata = _description(wheel)
+    assert "Description-Content-Type: text/markdown" in metadata
+    assert "(Ω,γ) = 0" in metadata
+    assert not _RELATIVE.search(metadata)
+    assert "docs/python.md goes on from here" in metadata
+
+
+def test_links_of_the_readme_lead_to_the_tag_where_the_repository_is_known() -> None:
+    spec = importlib.util.spec_from_file_location("readme", ROOT / ".ci" / "readme.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    text = (ROOT / "README.md").read_text()
+    found = module.standalone(text, "https://example.org/us/veselova/", "1.2")
+    assert not _RELATIVE.search(found)
+    base = "https://example.org/us/veselova"
+    assert f"[docs/python.md]({base}/blob/v1.2/docs/python.md)" in found
+    assert f"]({base}/raw/v1.2/docs/explorer.png)" in found
+    links = re.findall(re.escape(base) + r"/(?:blob|raw)/v1\.2/([\w./-]+)", found)
+    assert len(links) > 20
+    assert all((ROOT / name).is_file() for name in links)
+    assert "arxiv.org" in found
+    assert "docs/explorer.png" not in module.standalone(text, "", "1.2")
 
 
 #: Folder of the source → the extra that brings what it imports at module level; None is the core.
