@@ -32,7 +32,7 @@ def measure(extra: str, folder: Path) -> tuple[int, float]:
     python = environment / "bin" / "python"
     requirement = f"{ROOT}[{extra}]" if extra else str(ROOT)
     settings = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    command = [python, "-m", "pip", "install", "--quiet", "--no-compile", requirement]
+    command = [str(python), "-m", "pip", "install", "--quiet", "--no-compile", requirement]
     subprocess.run(command, check=True, env=settings)
     (packages,) = environment.glob("lib/python*/site-packages")
     names = [path.name for path in packages.glob("*.dist-info") if not _is_tool(path.name)]

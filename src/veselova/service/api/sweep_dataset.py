@@ -25,7 +25,7 @@ def sweep_dataset(
     """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one
     file).
 
-    Dimensions: each parameter with given values, by its name (``A.0``), with them as coordinate
+    Dimensions: each parameter with given values, by its name (``A_1``), with them as coordinate
     where they are numbers, and
     ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn
     parameters, ``outcome``, ``detail`` and the findings; then the outputs, as ``trajectory.q``,

@@ -21,6 +21,7 @@ __all__ = [
     "Draw",
     "Parameter",
     "Path",
+    "column_name",
     "components",
     "is_double",
     "parameters",
@@ -40,6 +41,13 @@ _DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 _SPACINGS = ("linear", "log")
 
 
+def column_name(path: Path) -> str:
+    """Return the name of a column: fields joined by dots, and places in lists counted from 1, as in
+    the table of a trajectory.
+    """
+    return "".join(f"_{part + 1}" if isinstance(part, int) else f".{part}" for part in path)[1:]
+
+
 @dataclass(frozen=True)
 class Parameter(ABC):
     """A place in the problem, by the parts of its JSON pointer."""
@@ -48,8 +56,8 @@ class Parameter(ABC):
 
     @property
     def name(self) -> str:
-        """Return the place as tables name it: ``A.0`` for /A/0."""
-        return ".".join(str(part) for part in self.path)
+        """Return the place as tables name it: ``A_1`` for /A/0."""
+        return column_name(self.path)
 
 
 @dataclass(frozen=True)
@@ -140,10 +148,10 @@ def replace_values(document: Mapping[str, Any], values: Mapping[Path, Any]) -> d
 
 
 def components(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the scalars of a value by the names of their columns: ``q.0``, ``q.1`` …"""
+    """Yield the scalars of a value by the names of their columns: ``q_1``, ``q_2`` …"""
     if isinstance(value, (list, tuple)):
         for i, item in enumerate(value):
-            yield from components(f"{name}.{i}", item)
+            yield from components(f"{name}_{i + 1}", item)
     else:
         yield name, value
 

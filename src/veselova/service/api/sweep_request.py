@@ -31,6 +31,7 @@ from veselova.service.api.sweep_parameters import (
     Draw,
     Parameter,
     Path,
+    column_name,
     components,
     is_double,
     parameters,
@@ -264,7 +265,7 @@ class SweepRequest(TorusRequest):
         component by component.
         """
         for path, value in values.items():
-            for name, scalar in components(".".join(map(str, path)), value):
+            for name, scalar in components(column_name(path), value):
                 found = to_table_value(scalar)
                 yield name, str(found) if name in self._texts and found is not None else found
 
