@@ -121,8 +121,8 @@ def to_angles(semiaxes: Array, X: Array, V: Array, coordinates: Any) -> Geograph
 
 
 def _radians(degrees: Fraction) -> float:
-    turned = degrees - 360 * round(degrees / 360)
-    return float(np.radians(float(turned)))
+    rest_of_turn = degrees - 360 * round(degrees / 360)
+    return float(np.radians(float(rest_of_turn)))
 
 
 def _geodetic_axes(phi: Any, lam: Any) -> tuple[Array, Array, Array]:

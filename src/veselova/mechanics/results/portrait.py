@@ -192,12 +192,12 @@ def _draw_density(axes: Any, curve: Array, radii: Array) -> None:
     # The square root shows rare places too; white is where the curve never is.
     shades = colormaps["Blues"](np.sqrt(counts / np.max(counts)))
     shades[counts == 0] = (1.0, 1.0, 1.0, 1.0)
-    turned, height = np.meshgrid(around, heights, indexing="ij")
+    longitudes, height = np.meshgrid(around, heights, indexing="ij")
     ring = np.sqrt(np.maximum(1 - height**2, 0))
     x, y, z = (
         radius * part
         for radius, part in zip(
-            radii, (ring * np.cos(turned), ring * np.sin(turned), height), strict=True
+            radii, (ring * np.cos(longitudes), ring * np.sin(longitudes), height), strict=True
         )
     )
     axes.plot_surface(

@@ -49,6 +49,7 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 
 def make_table(*columns: str) -> Table:
+    """Return an empty table with these headings, the first column to the left."""
     table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
@@ -56,6 +57,7 @@ def make_table(*columns: str) -> Table:
 
 
 def heading(console: Console, text: str) -> None:
+    """Print a heading after an empty line."""
     console.print(f"\n{text}", style="bold", highlight=False)
 
 

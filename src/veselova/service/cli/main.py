@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from veselova.service.cli import server_commands
+from veselova.service.cli import files, server_commands
 from veselova.version import __version__
 
 __all__ = ["main"]
@@ -145,26 +145,26 @@ def solve(
     from veselova.service.cli.console import print_json, print_trajectory, terminal
     from veselova.service.workers.tasks import solve_request
 
-    document = _document(file)
+    document = files.read_document(file)
     if isinstance(document, dict) and "starts" in document:
         _solve_many(document, json, output, plot or animate)
         return
     request = read_request(TrajectoryRequest, document)
-    _check_files(output, plot)
-    _check_file("--animate", animate, _FILMS)
+    files.check_files(output, plot)
+    files.check_file("--animate", animate, files.FILMS)
     with _limits(request):
         trajectory = solve_request(request)
     if output:
-        _write(trajectory, output, request.outputs)
+        files.write_motion(trajectory, output, request.outputs)
     if plot:
-        _draw(trajectory, plot)
+        files.draw(trajectory, plot)
     if animate:
-        _film(trajectory, animate)
+        files.film(trajectory, animate)
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
         print_trajectory(terminal(), trajectory, request.outputs)
-        _say_written(output, plot)
+        files.say_written(output, plot)
         if animate:
             print(f"Film: {animate}")
 
@@ -174,7 +174,7 @@ def _solve_many(document: Any, json: bool, output: Path | None, plot: Path | Non
     from veselova.service.cli import ensemble_command
 
     request = ensemble_command.read(document)
-    _check_file("--output", output, ensemble_command.WRITERS)
+    files.check_file("--output", output, ensemble_command.WRITERS)
     if plot is not None:
         raise InvalidInput(("--plot",), "no picture and no film of many starts", str(plot))
     with _limits(request):
@@ -190,7 +190,7 @@ def compare(
     method: _Method = None,
 ) -> None:
     """Solve a motion with both engines and show how they agree."""
-    document = _document(file)
+    document = files.read_document(file)
     if method is not None and isinstance(document, dict):
         document = {**document, "method": method}
     _compare(document, json, output, plot)
@@ -206,18 +206,18 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
         # one file serves solve and compare
         document = {name: value for name, value in document.items() if name != "engine"}
     request = read_request(ComparisonRequest, document)
-    _check_files(output, plot)
+    files.check_files(output, plot)
     with _limits(request):
         comparison = compare_request(request)
     if output:
-        _write(comparison.first, output, request.outputs)
+        files.write_motion(comparison.first, output, request.outputs)
     if plot:
-        _draw(comparison, plot)
+        files.draw(comparison, plot)
     if json:
         print_json(comparison_document(comparison, request.outputs))
     else:
         print_comparison(terminal(), comparison)
-        _say_written(output, plot)
+        files.say_written(output, plot)
 
 
 @app.command()
@@ -227,7 +227,7 @@ def torus(file: _File, json: _Json = False) -> None:
     from veselova.service.cli.console import print_json, print_torus, terminal
     from veselova.service.workers.tasks import torus_request
 
-    document = _without_motion(_document(file))
+    document = files.without_motion(files.read_document(file))
     request = read_request(TorusRequest, document)
     with _limits(request):
         answer = torus_request(request)
@@ -248,9 +248,9 @@ def closed_form(
     from veselova.service.cli.console import print_json
     from veselova.service.workers.tasks import closed_form_request
 
-    document = _without_motion(_document(file), but=("digits",))
+    document = files.without_motion(files.read_document(file), but=("digits",))
     request = read_request(ClosedFormRequest, document)
-    _check_file("--output", output, (".json",))
+    files.check_file("--output", output, (".json",))
     with _limits(request):
         answer = closed_form_request(request)
     if output:
@@ -269,7 +269,7 @@ def curve(file: _File, json: _Json = False) -> None:
     from veselova.service.cli.toolkit_console import print_curve
     from veselova.service.workers.tasks import curve_document
 
-    request = read_request(CurveRequest, _document(file))
+    request = read_request(CurveRequest, files.read_document(file))
     with _limits(request):
         document = curve_document(request)
     print_json(document) if json else print_curve(terminal(), document)
@@ -284,7 +284,7 @@ def theta(file: _File, json: _Json = False) -> None:
     from veselova.service.cli.toolkit_console import print_theta
     from veselova.service.workers.tasks import theta_document
 
-    request = read_request(ThetaRequest, _document(file))
+    request = read_request(ThetaRequest, files.read_document(file))
     with _limits(request):
         document = theta_document(request)
     print_json(document) if json else print_theta(terminal(), document)
@@ -311,7 +311,7 @@ def sweep(
     """
     from veselova.service.cli.sweep_command import run
 
-    run(_document(file), json, output, folder, workers)
+    run(files.read_document(file), json, output, folder, workers)
 
 
 @app.command()
@@ -330,7 +330,7 @@ def explore(
     """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
     from veselova.service.cli.explore import explore as run
 
-    run(None if file is None else _document(file), port, browser)
+    run(None if file is None else files.read_document(file), port, browser)
 
 
 @app.command()
@@ -348,80 +348,3 @@ def bench(json: _Json = False) -> None:
 
 app.command()(server_commands.serve)
 app.add_typer(server_commands.keys, name="keys")
-
-
-def _document(file: str) -> Any:
-    from veselova.mechanics.core.errors import InvalidInput
-    from veselova.service.api.json_text import decode
-
-    if file == "-" and sys.stdin is None:
-        raise InvalidInput(("FILE",), "an open standard input", "a closed one")
-    try:
-        text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
-    except OSError as error:
-        raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
-    return decode(text)
-
-
-#: Fields of a motion's request that say nothing of its torus.
-_OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
-
-
-def _without_motion(document: Any, but: tuple[str, ...] = ()) -> Any:
-    """Return a request without the fields of a motion, but those named: its file serves for its
-    torus too.
-    """
-    if not isinstance(document, dict):
-        return document
-    left_out = set(_OF_MOTIONS) - set(but)
-    return {name: value for name, value in document.items() if name not in left_out}
-
-
-_WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
-_PICTURES = (".png", ".pdf", ".svg")
-_FILMS = (".mp4", ".gif", ".html")
-
-
-def _check_files(output: Path | None, plot: Path | None) -> None:
-    """Refuse file names before the work, not after it."""
-    for option, path, suffixes in (("--output", output, _WRITERS), ("--plot", plot, _PICTURES)):
-        _check_file(option, path, suffixes)
-
-
-def _check_file(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
-    from veselova.mechanics.core.errors import InvalidInput
-
-    if path is None:
-        return
-    if path.suffix.lower() not in suffixes:
-        raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
-    if not path.parent.is_dir():
-        raise InvalidInput((option,), "a file in an existing folder", str(path))
-    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InvalidInput((option,), "a file that can be written", str(path))
-
-
-def _write(trajectory: Any, path: Path, outputs: list[str] | None) -> None:
-    from veselova.service.api.json_documents import encode, trajectory_document
-
-    if path.suffix.lower() == ".json":
-        path.write_bytes(encode(trajectory_document(trajectory, outputs)))
-    else:
-        getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
-
-
-def _say_written(output: Path | None, plot: Path | None) -> None:
-    for name, path in (("Motion", output), ("Picture", plot)):
-        if path is not None:
-            print(f"{name}: {path}")
-
-
-def _draw(subject: Any, path: Path) -> None:
-    subject.plot().savefig(path, dpi=130)
-
-
-def _film(trajectory: Any, path: Path) -> None:
-    if path.suffix.lower() == ".html":
-        trajectory.to_html(path)
-    else:
-        trajectory.animate(path)
