@@ -106,14 +106,14 @@ def test_a_slider_changes_the_motion(visit: Visit) -> None:
 
 def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
     visit.open("#preset=ball&play=0")
-    visit.page.fill("#time", "12345.6789")
-    visit.page.keyboard.press("Enter")
-    visit.page.fill("#text-gamma-1", "1/7")
-    visit.page.keyboard.press("Enter")
+    for name, value in (("time", "12345.6789"), ("text-gamma-1", "1/7")):
+        before = visit.text("#facts td")
+        visit.page.fill(f"#{name}", value)
+        visit.page.keyboard.press("Enter")
+        visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
     visit.wait_for("document.getElementById('story').textContent === 'A start of your own.'")
     visit.page.click('[data-view="ball"] button:has-text("⤢")')
     visit.wait_for("location.hash.includes('view=ball') && location.hash.includes('12345')")
-    visit.wait_for("document.querySelector('#facts td').textContent !== ''")
     wanted = visit.state()
     assert wanted["t"] == "12345.6789"
     assert wanted["view"] == "ball"
@@ -293,10 +293,10 @@ def test_a_document_of_another_version_is_refused_in_a_sentence(
     browser: Any, server: Server
 ) -> None:
     with visiting(browser, server.url) as visit:
-        body = {"format": "veselova.closed-form/2"}
+        body = {"format": "veselova.closed-form/3"}
         visit.page.route("**/v1/closed-forms", lambda route: route.fulfill(json=body))
         visit.page.goto(visit.origin)
-        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/2')")
+        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/3')")
 
 
 def test_where_keys_are_required_the_page_asks_for_one(browser: Any, tmp_path: Path) -> None:
