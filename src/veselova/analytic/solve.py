@@ -27,7 +27,9 @@ from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -40,6 +42,10 @@ Array = NDArray[np.float64]
 #: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few
 #: roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
+
+#: Sine of the angle between momentum and γ below which an area constant has 15 digits: the axes of
+#: the torus are not defined there.
+_NEARLY_UPRIGHT = 1e-5
 
 #: The series that states are, along the principal axes; the last may be left to the problem. A
 #: displacement follows them.
@@ -85,7 +91,13 @@ def solve(
     if isinstance(problem, ChaplyginBall) or (
         isinstance(problem, VeselovaSO3) and problem.has_area_constant
     ):
-        _require_doubles(problem, digits, certified)
+        if beyond_double(digits, certified):
+            _require_digits(problem, digits, certified)
+            assert isinstance(problem, VeselovaSO3)
+            _require_options(method, time_map, digits, certified)
+            from veselova.analytic.motion.area_digits import AreaMotionInBalls
+
+            return AreaMotionInBalls(problem, digits, method)(grid)
         if problem.moves:
             on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
             return motion_with_area(problem, on_torus.evaluate(grid))
@@ -106,6 +118,16 @@ def solve(
         return _separable_motion(problem, grid, method, time_map, beyond_double(digits, certified))
     if not beyond_double(digits, certified):
         return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
+    _require_options(method, time_map, digits, certified)
+    from veselova.analytic.motion.motion_balls import MotionInBalls
+
+    return MotionInBalls(problem, digits, certified, method)(grid)
+
+
+def _require_options(
+    method: str | None, time_map: str | None, digits: int, certified: bool
+) -> None:
+    """Raise InvalidInput for a method or time map that answers in balls do not have."""
     served = ("angles",) if certified else ("theta", "angles")
     if method is not None and method not in served:
         precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
@@ -116,16 +138,25 @@ def solve(
             f"none, where digits > {FEWEST_DIGITS} or errors are certified",
             show(time_map),
         )
-    from veselova.analytic.motion.motion_balls import MotionInBalls
-
-    return MotionInBalls(problem, digits, certified, method)(grid)
 
 
-def _require_doubles(problem: AreaBody, digits: int, certified: bool) -> None:
-    """Raise InvalidInput where more than doubles are asked for with an area constant."""
-    if beyond_double(digits, certified):
-        of = "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
+def _require_digits(problem: AreaBody, digits: int, certified: bool) -> None:
+    """Raise InvalidInput where more than doubles are asked for with an area constant, and there are
+    none.
+    """
+    of = "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
+    if isinstance(problem, RollingBall):
         raise _needs_doubles(digits, f"system {problem.system}{of}")
+    _require_exact_axes(problem, digits, certified)
+    if certified:
+        raise InvalidInput(("certified",), f"false for system {problem.system}{of}", "true")
+    if not problem.moves:
+        raise _needs_doubles(digits, f"system {problem.system}{of} at rest")
+    torus = problem.on_torus()
+    assert isinstance(torus, AreaVeselova)
+    if torus.angle < _NEARLY_UPRIGHT:
+        what = f"system {problem.system} where the momentum is along γ to {_NEARLY_UPRIGHT:g}"
+        raise _needs_doubles(digits, what)
 
 
 def _needs_doubles(digits: int, what: str) -> InvalidInput:

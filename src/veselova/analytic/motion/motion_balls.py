@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import Balls, balls
+from veselova.analytic.motion.area_solution import solution_of
+from veselova.analytic.motion.area_solution_balls import solution_in_balls
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.rest_balls import resting_series
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later, Pair
@@ -85,7 +86,7 @@ class MotionInBalls:
             any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)
         ):
             return self._resting(asked, began)
-        solution = Solution(self.problem)
+        solution = solution_of(self.problem)
         plan = EvaluationPlan.of(solution, grid)
         time_map = plan.make_time_map(solution)
         reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
@@ -164,7 +165,7 @@ class MotionInBalls:
         time_map: TimeMap,
         reach: float,
     ) -> tuple[_Found, Any]:
-        solution = SolutionInBalls(coarse, working, self.certified, method, reach)
+        solution = solution_in_balls(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
             series, details = solution.series(xp.array(exact), time_map)
             return _Found.of(self.problem, series, xp), details

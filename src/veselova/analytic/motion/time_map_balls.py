@@ -93,6 +93,7 @@ def choose_time_map(
     by_modes = math.inf
     # Of a direction that doubles do not see they say nothing.
     known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
+    known = known and orbit.has_fourier_map
     if known and modes <= MOST_MODES and not xp.certified:
         by_modes = costs.modes(modes, max(coarse.rate.needed_nodes), approximate.size)
     has_modes = costs.is_affordable(by_modes + further)

@@ -117,7 +117,7 @@ class SolutionInBalls:
             self._angles = begin.angles[None, :]
             rate = TimeRate.of(self.spectrum, inversion, problem.time)
             origin = inversion.map(self._angles)[0]
-            frequencies = inversion.periods.frequencies
+            frequencies = self._frequencies(inversion.periods)
             self.quotients: ThetaQuotients | None = None
             if costs.by_theta:
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
@@ -131,7 +131,26 @@ class SolutionInBalls:
                 if coarse.moving.size == self.moving.size
                 else None
             )
-            self.orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rate)
+            orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rate)
+            self.orbit = self._adapt(orbit)
+
+    def _frequencies(self, periods: Periods) -> Values:
+        """Return f."""
+        return periods.frequencies
+
+    def _adapt(self, orbit: Orbit) -> Orbit:
+        """Return the orbit with the rates of this motion: those of the rank-one problem."""
+        return orbit
+
+    def _time_rate(self, attitude: Attitude) -> Values:
+        """Return dτ₁/d(time) at attitudes, (N,)."""
+        return time_rate(self.spectrum, self.problem.time, self.arithmetic)(attitude.q)
+
+    def attitude(self, z: Values) -> Attitude:
+        """Return the attitude at phases z (N, g), by theta functions or by inversion."""
+        if self.quotients is not None:
+            return self.quotients.at(z)
+        return self.frame.at(self.orbit.rate.inversion.invert(z))
 
     def series(
         self, times: Values, coarse: TimeMap
@@ -144,9 +163,7 @@ class SolutionInBalls:
         xp = self.arithmetic
         problem = self.problem
         tau1, attitude, details = self._motion(times, coarse)
-        velocity = (
-            attitude.q_prime * time_rate(self.spectrum, problem.time, xp)(attitude.q)[:, None]
-        )
+        velocity = attitude.q_prime * self._time_rate(attitude)[:, None]
         points = attitude.spheroconic
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
@@ -228,15 +245,9 @@ class SolutionInBalls:
             self.orbit, approximate, self._coarse, self.moving, self._costs, states + interpolation
         )
         tau1 = time_map.tau1(times, approximate)
-        z = self.orbit.phases(tau1)
-        attitude = (
-            self.quotients.at(z)
-            if self.quotients is not None
-            else self.frame.at(self.orbit.rate.inversion.invert(z))
-        )
         return (
             tau1,
-            attitude,
+            self.attitude(self.orbit.phases(tau1)),
             {"time_map": time_map.name, "time_map_size": time_map.size, "evaluations": len(times)},
         )
 

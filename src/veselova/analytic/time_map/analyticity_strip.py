@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,9 @@ class Orbit:
     frequencies: Values
     time_rate: Callable[[Values], Values] | None
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
+
+    #: Whether the Fourier series of the rate is that of ``rate``.
+    has_fourier_map: ClassVar[bool] = True
 
     def phases(self, tau1: Values) -> Values:
         """Return z modulo 2 at Neumann times (N,), shape (N, g): however far they are, doubles tell

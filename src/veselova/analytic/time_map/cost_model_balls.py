@@ -60,12 +60,14 @@ class CostsInBalls:
     - digits: the working ones
     - terms: of the longest angle series
     - by_theta: whether rate and attitude come from theta functions
+    - rate_of_state: whether dt/dτ₁ takes an attitude
     """
 
     genus: int
     digits: int
     terms: int
     by_theta: bool
+    rate_of_state: bool = False
 
     @property
     def _kind(self) -> int:
@@ -84,6 +86,8 @@ class CostsInBalls:
     @property
     def rate(self) -> float:
         """Return the seconds of dt/dτ₁ at one point."""
+        if self.rate_of_state:
+            return self.state
         return self._by_theta("rate") if self.by_theta else self._inversion
 
     @property

@@ -30,7 +30,7 @@ digits.
 from __future__ import annotations
 
 import decimal
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -53,6 +53,9 @@ Vector = tuple[Decimal, ...]
 #: Digits of the data, and where K is within _NEAR of γ.
 _DIGITS = 110
 _MORE_DIGITS = 260
+
+#: Digits of the data for each digit asked for: squares of gaps, and what they lose on the way.
+_PER_DIGIT = 5
 _NEAR = Decimal("1e-5")
 
 #: Sine of the angle between K and γ that counts as zero, and is taken in its place.
@@ -107,8 +110,14 @@ class AreaVeselova(Veselova):
     - tilt: L₁₀/L₀₀
     - uniform: μ₁k_h in the units of the body
     - across: (μ₁−μ₂)k_h in the units of the body
-    - u: (3,) n at the start
-    - normal: (3,) the horizontal e_⊥ at the start
+    - u: (3,) at the start
+    - normal: (3,) n at the start
+    - horizontal: (3,) e_⊥ at the start
+    - angle: the sine of the angle between K and γ
+    - exact_tilt, columns: the tilt, and [v u −n] at the start by its columns, rationals
+
+    With ``digits`` the data are rounded so far below them that nothing is lost. The frame is then
+    [v u −n], otherwise the natural one. Where K is along γ, to 1e-5, they are not served.
     """
 
     body_energy: float
@@ -122,10 +131,13 @@ class AreaVeselova(Veselova):
     u: Array
     normal: Array
     horizontal: Array
+    angle: float
+    exact_tilt: Fraction
+    columns: tuple[tuple[Fraction, ...], ...]
 
-    def __init__(self, data: AreaData) -> None:
+    def __init__(self, data: AreaData, digits: int = 0) -> None:
         with decimal.localcontext() as context:
-            context.prec = _DIGITS
+            context.prec = _DIGITS + _PER_DIGIT * digits
             context.Emin, context.Emax = decimal.MIN_EMIN, decimal.MAX_EMAX
             momentum = _momentum(data)
             if momentum.angle < _NEAR:
@@ -140,13 +152,15 @@ class AreaVeselova(Veselova):
             w = [x - slope * y for x, y in zip(found.u, found.v, strict=True)]
             q_dot = [x / found.L[0] for x in _cross(found.v, _times(A, w))]
             q, q_dot = _moving(found.v, q_dot, momentum.angle)
+            normal = _cross(found.u, found.v)
+            columns = (q, found.u, [-x for x in normal])
             super().__init__(
                 [Fraction(a / unit) for a in A],
                 [Fraction(x) for x in q],
                 [Fraction(x) for x in q_dot],
+                _exact(zip(*columns, strict=True)) if digits else None,
                 normalize=True,
             )
-            normal = _cross(found.u, found.v)
             self._set(
                 body_energy=data.energy,
                 spin=float(np.linalg.norm(_floats(data.Omega))),
@@ -154,6 +168,9 @@ class AreaVeselova(Veselova):
                 sign=found.sign,
                 mu2=Fraction(found.mu[1] / unit),
                 tilt=float(found.L[1] / found.L[0]),
+                exact_tilt=Fraction(found.L[1] / found.L[0]),
+                columns=_exact(columns),
+                angle=float(momentum.angle),
                 uniform=float(found.mu[0] * momentum.horizontal),
                 across=float((found.mu[0] - found.mu[1]) * momentum.horizontal),
                 u=_floats(found.u),
@@ -295,7 +312,8 @@ def _moving(
     q: Sequence[Decimal], q_dot: Sequence[Decimal], angle: Decimal
 ) -> tuple[list[Decimal], list[Decimal]]:
     """Return q and q̇ with zeros where both entries are rounding, or come of the turn of K."""
-    least = _TILT if angle < _LEAST_ANGLE else _ROUNDING
+    rounding = Decimal(10) ** (10 - decimal.getcontext().prec)
+    least = _TILT if angle < _LEAST_ANGLE else min(_ROUNDING, rounding)
     speed = max(abs(x) for x in q_dot)
     rests = [abs(x) < least and abs(y) < least * speed for x, y in zip(q, q_dot, strict=True)]
     return tuple(
@@ -311,6 +329,10 @@ def _separated(inverse: Sequence[Decimal]) -> list[Decimal]:
         count = sum(other == value for other in inverse[:i])
         result[i] = value * (1 - count * _APART)
     return result
+
+
+def _exact(rows: Iterable[Iterable[Decimal]]) -> tuple[tuple[Fraction, ...], ...]:
+    return tuple(tuple(Fraction(x) for x in row) for row in rows)
 
 
 def _decimal(number: Fraction) -> Decimal:

@@ -63,7 +63,8 @@ class VeselovaSO3(RigidBody):
     (4.2a).
 
     Without a potential engine ``analytic`` has every motion, and is the default: where (Ω,γ) = 0
-    that of the rank-one problem, otherwise on the torus of ``AreaVeselova``, with 15 digits. With a
+    that of the rank-one problem, otherwise on the torus of ``AreaVeselova``. More
+    digits are served there too, certified errors only where (Ω,γ) = 0. With a
     potential of (3.5) (``clebsch``, ``family``) and (Ω,γ) = 0 it has it by quadratures, method
     ``angles``. ``without_closed_form`` is the reason for every other problem.
     """
@@ -140,6 +141,10 @@ class VeselovaSO3(RigidBody):
             self._require_geodesic()
         return self.area_class(AreaData.of(self))
 
+    def with_digits(self, digits: int) -> AreaVeselova:
+        """Return the ``AreaVeselova`` of (Ω,γ) ≠ 0 with data for so many digits."""
+        return AreaVeselova(AreaData.of(self), digits)
+
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0."""
         start = momentum(self.inertia, self.Omega, self.gamma, constrained=True)
@@ -168,8 +173,8 @@ class VeselovaSO3(RigidBody):
     def derive_decimals(
         self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
     ) -> Pair:
-        """Return gamma, momentum or multiplier with their radii, where V = 0 and (Ω,γ) = 0 and the
-        moments are exact.
+        """Return gamma, momentum or multiplier with their radii, where V = 0 and the moments are
+        exact.
         """
         if name == "gamma":
             return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
@@ -182,7 +187,10 @@ class VeselovaSO3(RigidBody):
         M = Omega * moments
         across = gamma / moments
         if name == "momentum":
-            return balls.pair(M - np.sum(M * gamma, axis=1)[:, None] * gamma)
+            along = np.sum(M * gamma, axis=1)
+            if self.linear != 0:
+                along = along - np.sum(Omega * gamma, axis=1)
+            return balls.pair(M - along[:, None] * gamma)
         return balls.pair(
             -np.sum(cross(M, Omega) * across, axis=1) / np.sum(gamma * across, axis=1)
         )

@@ -1,0 +1,95 @@
+"""The motion of ``VeselovaSO3`` with (Ω,γ) ≠ 0 to more digits than a double has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.motion.motion_balls import MotionInBalls
+from veselova.mechanics.core.decimal_balls import DecimalBalls
+from veselova.mechanics.core.decimals import Decimals, Later, Pair
+from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.area_start import AreaStart, exact_start
+from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
+
+__all__ = ["AreaMotionInBalls"]
+
+#: Digits beyond those asked for that the frame of the torus has: the constant rotation to the frame
+#: of the body adds three errors.
+_FURTHER = 1
+
+
+@dataclass(frozen=True)
+class AreaMotionInBalls:
+    """A motion with an area constant that can be asked for times, with ``digits`` correct digits
+    after the point in the frame.
+
+    E(t) = [v u −n](t) [v u −n](0)ᵀ E(0), and Ω = B(K + σγ) with K fixed in space.
+    """
+
+    problem: VeselovaSO3
+    digits: int
+    method: str | None
+
+    def __call__(self, times: Any) -> Trajectory:
+        """Return the trajectory at times; raises Unsolved as ``MotionInBalls`` does."""
+        point = MotionInBalls(self._torus, self.digits + _FURTHER, False, self.method)(times)
+        assert point.decimals is not None
+        decimals = self._decimals(point.decimals)
+        arrays = {name: decimals.midpoints[name].astype(np.float64) for name in self.problem.stored}
+        spread = np.nextafter(decimals.error.astype(np.float64), np.inf)
+        error = spread + np.finfo(float).eps / 2
+        return Trajectory(
+            self.problem,
+            point.times,
+            error,
+            arrays,
+            replace(point.provenance, digits=self.digits),
+            self,
+            decimals,
+            point.remainders,
+        )
+
+    @cached_property
+    def _torus(self) -> AreaVeselova:
+        return self.problem.with_digits(self.digits)
+
+    @cached_property
+    def _start(self) -> AreaStart:
+        return exact_start(self.problem, self.digits)
+
+    def _decimals(self, point: Decimals) -> Decimals:
+        """Return the decimals of the body; Ω and what follows from it are made when they are asked
+        for.
+        """
+        problem = self.problem
+        balls = DecimalBalls(self.digits)
+        columns = np.array(self._torus.columns, dtype=object)
+        rotation = balls.of(columns @ np.array(self._start.frame, dtype=object))
+        frame = balls.array(point.midpoints["frame"], point.radii["frame"]) @ rotation
+        pairs: dict[str, Pair | Callable[[], Pair]] = {
+            "Omega": partial(self._angular_velocity, balls, frame),
+            "frame": partial(balls.pair, frame),
+        }
+        middles = Later(pairs, 0)
+        radii = Later(pairs, 1)
+        for name in problem.derived:
+            pairs[name] = partial(problem.derive_decimals, name, middles, radii, self.digits)
+        ordered = {name: pairs[name] for name in problem.outputs}
+        return Decimals(self.digits, False, Later(ordered, 0), Later(ordered, 1), problem.bounded)
+
+    def _angular_velocity(self, balls: DecimalBalls, frame: Any) -> Pair:
+        """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ)."""
+        momentum = balls.of(self._start.momentum)
+        moments = balls.of(self.problem.moments)
+        gamma = frame[:, :, 0]
+        free = (frame @ momentum) / moments
+        across = gamma / moments
+        share = momentum[:1] - np.sum(free * gamma, axis=1)
+        share = share / np.sum(across * gamma, axis=1)
+        return balls.pair(free + share[:, None] * across)

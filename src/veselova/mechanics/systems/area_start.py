@@ -1,0 +1,130 @@
+"""The start of a body with an area constant to any number of digits: its frame, made exactly
+orthonormal, and its momentum in space.
+"""
+
+from __future__ import annotations
+
+import decimal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+
+from veselova.mechanics.systems.rigid_body import RigidBody
+
+__all__ = ["AreaStart", "exact_start"]
+
+#: Digits beyond those asked for.
+_SPARE = 60
+
+#: A column of the natural frame in double precision this near to one of many digits is that one.
+_NEARLY_NATURAL = 1e-9
+
+Vector = tuple[Decimal, ...]
+
+
+@dataclass(frozen=True)
+class AreaStart:
+    """The state at t = 0 along the principal axes, rationals whose error is below 10^−digits.
+
+    - frame: (3, 3) rows of [e_1 e_2 e_3], orthonormal
+    - momentum: (3,) the components of K along e_1, e_2, e_3; the first is the area constant
+    """
+
+    frame: tuple[tuple[Fraction, ...], ...]
+    momentum: tuple[Fraction, ...]
+
+
+def exact_start(body: RigidBody, digits: int) -> AreaStart:
+    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ.
+
+    The frame is the natural one of γ and γ̇ = γ×Ω where none was given and double precision knows
+    it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
+    orthonormal.
+    """
+    with decimal.localcontext() as context:
+        context.prec = digits + _SPARE
+        context.Emin, context.Emax = decimal.MIN_EMIN, decimal.MAX_EMAX
+        gamma, Omega, moments = (
+            tuple(_decimal(x) for x in values)
+            for values in (body.exact_gamma, body.exact_Omega, body.moments)
+        )
+        gamma = _unit(gamma)
+        columns = None
+        if body.exact_frame is None:
+            columns = _natural(gamma, Omega, moments, body)
+        if columns is None:
+            columns = _orthonormal(gamma, body)
+        M = _times(Omega, moments)
+        shift = _dot(Omega, gamma) - _dot(M, gamma)
+        K = tuple(x + shift * y for x, y in zip(M, gamma, strict=True))
+        momentum = tuple(Fraction(_dot(column, K)) for column in columns)
+        rows = tuple(tuple(map(Fraction, row)) for row in zip(*columns, strict=True))
+        return AreaStart(rows, momentum)
+
+
+def _natural(
+    gamma: Vector, Omega: Vector, moments: Vector, body: RigidBody
+) -> tuple[Vector, ...] | None:
+    """Return the columns γ, ±p×γ/|p|, ±p/|p| in the order and with the signs of the frame in
+    double precision; None where it is another.
+    """
+    rate = _cross(gamma, Omega)
+    A = tuple(1 / moment for moment in moments)
+    Aq = _times(A, gamma)
+    Av = _times(A, rate)
+    along, across = _dot(gamma, Aq), _dot(rate, Aq)
+    p = tuple(along * x - across * y for x, y in zip(Av, Aq, strict=True))
+    if not any(p):
+        return None
+    p = _unit(p)
+    found = [gamma]
+    for near in body.frame.T[1:]:
+        for vector in (p, _cross(p, gamma)):
+            cosine = float(np.dot(near, [float(x) for x in vector]))
+            if abs(cosine) > 1 - _NEARLY_NATURAL:
+                found.append(vector if cosine > 0 else tuple(-x for x in vector))
+    return tuple(found) if len(found) == 3 else None
+
+
+def _orthonormal(gamma: Vector, body: RigidBody) -> tuple[Vector, ...]:
+    """Return γ and the polar factor of the given columns across it: the nearest orthonormal
+    vectors, by Newton–Schulz steps X(3 − XᵀX)/2.
+    """
+    given = body.frame.tolist() if body.exact_frame is None else body.exact_frame
+    second, third = (tuple(_decimal(Fraction(row[k])) for row in given) for k in (1, 2))
+    second, third = (_across(vector, gamma) for vector in (second, third))
+    for _ in range(decimal.getcontext().prec.bit_length() + 3):
+        a, b, c = _dot(second, second), _dot(second, third), _dot(third, third)
+        pairs = list(zip(second, third, strict=True))
+        second = tuple(((3 - a) * x - b * y) / 2 for x, y in pairs)
+        third = tuple(((3 - c) * y - b * x) / 2 for x, y in pairs)
+    return gamma, second, third
+
+
+def _across(vector: Vector, gamma: Vector) -> Vector:
+    share = _dot(vector, gamma)
+    return tuple(x - share * y for x, y in zip(vector, gamma, strict=True))
+
+
+def _decimal(number: Fraction) -> Decimal:
+    return Decimal(number.numerator) / Decimal(number.denominator)
+
+
+def _dot(a: Sequence[Decimal], b: Sequence[Decimal]) -> Decimal:
+    return sum((x * y for x, y in zip(a, b, strict=True)), Decimal(0))
+
+
+def _times(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
+    return tuple(x * y for x, y in zip(a, b, strict=True))
+
+
+def _cross(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
+    return tuple(a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3))
+
+
+def _unit(vector: Sequence[Decimal]) -> Vector:
+    length = _dot(vector, vector).sqrt()
+    return tuple(x / length for x in vector)
