@@ -32,7 +32,7 @@ def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: An
     off = np.abs(truth.frame - ensemble.frame[i]).max(axis=(1, 2)) - truth.error
     assert np.all(off <= ensemble.error[i])
     speed = np.abs(truth.q_dot).max()
-    assert np.abs(truth.q_dot - ensemble.q_dot[i]).max() <= 20 * speed * ensemble.error[i].max()
+    assert np.abs(truth.q_dot - ensemble.q_dot[i]).max() <= 8 * speed * ensemble.error[i].max()
     elapsed = 1 + np.abs(truth.tau1)
     assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
 
@@ -58,7 +58,7 @@ def test_errors_bound_the_truth_of_adversarial_starts(n: int, rng: np.random.Gen
         _, drawn = adversarial_start(rng, n)
         problems.append(vs.Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True))
     ensemble = vs.solve_many(problems, TIMES)
-    assert np.count_nonzero(ensemble.together) > 50
+    assert np.count_nonzero(ensemble.together) > 25
     for i in np.flatnonzero(ensemble.together):
         require_truth(ensemble, i, problems[i], TIMES)
 

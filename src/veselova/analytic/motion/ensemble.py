@@ -216,7 +216,7 @@ class _Motions:
         served &= np.max(error, axis=1) < _LARGEST_ERROR  # no number is not less
         frame = entries[:, 0].reshape(count, number, genus + 1, genus + 1).copy()
         first = at.components.reshape(count, 1 + genus, number, genus)[:, 0]
-        rate = 1 / (slopes * self.maps.mean[:, None])
+        rate = self._time_rate(frame[..., 0])
         q_dot = (frame[..., 1:] @ (first * rate[..., None])[..., None])[..., 0]
         frame[..., 1:] = frame[..., 1:] @ self._rotation[:, None]
         axes = np.argsort(stack.spectra.axes, axis=1)
@@ -228,6 +228,14 @@ class _Motions:
             error,
         )
         return found, served
+
+    def _time_rate(self, q: Array) -> Array:
+        """Return dτ₁/dt at positions (N, T, n), (N, T): from (q,Aq), relative to itself."""
+        spectra = self.stack.spectra
+        A = 1 / spectra.inverse.high
+        at_start = np.sum(A * self._at_start.q**2, axis=1)
+        ratio = at_start[:, None] / np.sum(A[:, None] * q * q, axis=2)
+        return np.asarray(spectra.time_rate[:, None] * np.sqrt(ratio))
 
     def _error(self, times: Array, tau1: Array, slopes: Array, quotients: Array) -> Array:
         """Return the bound at each time, (N, T), as analytic.motion.error_bound makes it of the
