@@ -17,12 +17,12 @@ sys.path.insert(0, str(ROOT / "src"))
 # One thread, as everywhere in the checks: a gallery example is small.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from veselova import __version__  # noqa: E402
+import veselova  # noqa: E402
 
 project = "veselova"
 author = "The veselova developers"
 project_copyright = author
-version = release = __version__
+version = release = veselova.__version__
 
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**"]
@@ -83,7 +83,7 @@ plot_html_show_formats = False
 plot_html_show_source_link = False
 
 html_theme = "pydata_sphinx_theme"
-html_title = f"veselova {__version__}"
+html_title = f"veselova {veselova.__version__}"
 html_static_path = ["_static", "../build/guide/static"]
 html_favicon = "_static/icon.svg"
 html_context = {"default_mode": "auto"}
@@ -149,7 +149,24 @@ def _adapt_docstring(
     lines[:] = adapted
 
 
+def _add_further_names(app: Any, name: str, source: list[str]) -> None:
+    """Add the public names that no page of the API has to the page of functions."""
+    if name != "docs/reference/api/functions":
+        return
+    app.env.note_dependency(str(ROOT / "src" / "veselova" / "__init__.py"))
+    pages = "".join(path.read_text() for path in (ROOT / "docs/reference/api").glob("*.md"))
+    entries = []
+    for public in veselova.__all__[1:]:
+        if not re.search(rf"veselova\.{public}\b", pages):
+            kind = "class" if isinstance(getattr(veselova, public), type) else "function"
+            members = "\n   :members:" if kind == "class" else ""
+            entries.append(f".. auto{kind}:: veselova.{public}{members}\n")
+    if entries:
+        source[0] += "\n```{eval-rst}\n" + "\n".join(entries) + "```\n"
+
+
 def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
+    app.connect("source-read", _add_further_names)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _drop_downloads)
