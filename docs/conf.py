@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import re
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "src"))
 # One thread, as everywhere in the checks: a gallery example is small.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from sphinxcontrib import katex  # noqa: E402
 
 import veselova  # noqa: E402
 
@@ -62,6 +66,8 @@ python_maximum_signature_line_length = 90
 katex_prerender = True
 katex_js_path = str(ROOT / "explorer" / "node_modules" / "katex" / "dist" / "katex.min.js")
 katex_css_path = "katex/katex.min.css"
+# Node starts slowly on a busy machine.
+katex.STARTUP_TIMEOUT = katex.RENDER_TIMEOUT = 60.0
 nodejs_binary = os.environ.get("VESELOVA_NODE", "node")
 
 sphinx_gallery_conf = {
@@ -165,8 +171,18 @@ def _add_further_names(app: Any, name: str, source: list[str]) -> None:
         source[0] += "\n```{eval-rst}\n" + "\n".join(entries) + "```\n"
 
 
+def _start_katex(app: Any) -> None:
+    """Start KaTeX, again where its socket is there before it listens."""
+    for _ in range(20):
+        with suppress(ConnectionRefusedError):
+            katex.KaTeXServer.get()
+            return
+        time.sleep(0.5)
+
+
 def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
+    app.connect("builder-inited", _start_katex, priority=900)
     app.connect("source-read", _add_further_names)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _drop_downloads)
