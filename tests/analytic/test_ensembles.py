@@ -126,6 +126,14 @@ def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> No
     assert np.array_equal(found.error, whole.error[chosen])
 
 
+def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:
+    given = starts(rng, 3, 3)
+    given["q_dot"] *= np.array([1.0, 1e7, 1e34])[:, None]
+    ensemble = vs.solve_many({**given, "normalize": True}, [0.0, 1e4])
+    assert ensemble.together.tolist() == [True, False, False]
+    assert ensemble.outcome.tolist() == ["solved", "solved", "too-far"]
+
+
 def test_series_are_those_of_a_trajectory(rng: np.random.Generator) -> None:
     given = starts(rng, 3, 3)
     names = ("q", "omega", "spheroconic", "tau1")

@@ -59,6 +59,9 @@ _PHASE, _START_PHASE, _EVALUATION, _SAFETY = 4.0, 4.0, 9.0, 2.0
 #: Errors above this are left out: second orders would count, and one problem has guard digits.
 _LARGEST_ERROR = 1e-6
 
+#: Cycles of the fastest phase at which doubles leave an error of about that.
+_MOST_CYCLES = 1e9
+
 
 @dataclass(frozen=True)
 class States:
@@ -136,7 +139,8 @@ def states_of_stack(
 ) -> Iterator[States]:
     """Yield the states at the times of a grid of those problems of a stack that can be served."""
     maps = TimeMaps(tables, stack.phases, stack.frequencies, stack.mean)
-    rows = np.flatnonzero(~maps.has_slow_modes)
+    cycles = maps.fastest / maps.mean * np.max(np.abs(times.doubles))
+    rows = np.flatnonzero(~maps.has_slow_modes & (cycles < _MOST_CYCLES))
     size = max(1, _POINT_BLOCK // times.doubles.size)
     for first in range(0, rows.size, size):
         checkpoint()
