@@ -13,11 +13,11 @@ a few thousand steps, whichever is tried first (FIRST_INTEGRATED). Where neither
 potentials, the closed form is compared with heyoka's Taylor series: the difference, against the sum
 of both errors.
 Prints per class how many there were, how many were refused by name and how many failed, the largest
-true error of the bounded series, the largest reported one, the median of reported over true errors,
-and the largest true error over the one reported at the same time (at most 1); then the starts that
-broke a promise. "Without truth" are those for which none could be had. A true error counts
-as half a unit in the last place of the largest number there at least. Ctrl-C prints what has been
-seen.
+true error of the bounded series, the largest reported one, the median and the largest of reported
+over true errors, and the largest true error over the one reported at the same time (at most 1);
+then the starts that broke a promise. "Without truth" are those for which none could be had. A true
+error counts as half a unit in the last place of the largest number there at least. Ctrl-C prints
+what has been seen.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def main(count: int, seed: int, patience: int, system: str) -> None:
             pool.terminate()
     print(
         f"{system:28s} starts  refused  failed  without truth  largest error  largest "
-        "reported  reported/true  true/reported"
+        "reported  reported/true        largest  true/reported"
     )
     for name in CLASSES if system == "veselova" else CLASSES_OF[system]:
         others = [ended[name, how] for how in (REFUSED, "failed", NO_TRUTH)]
@@ -120,8 +120,8 @@ def main(count: int, seed: int, patience: int, system: str) -> None:
             np.array(rows[name]).reshape(-1, 4).T if rows[name] else np.zeros((4, 1))
         )
         figures = (
-            f"{np.max(errors):13.1e}  {np.max(reported):16.1e}  {np.median(pessimism):13.1f} "
-            f" {np.max(ratios):13.2f}"
+            f"{np.max(errors):13.1e}  {np.max(reported):16.1e}  {np.median(pessimism):13.1f}  "
+            f"{np.max(pessimism):13.4g}  {np.max(ratios):13.2f}"
         )
         print(
             f"{name:28s} {len(rows[name]) + sum(others):6d}  {others[0]:7d}  {others[1]:6d}  "

@@ -41,7 +41,7 @@ _EVALUATION = 16.0
 _PHASE = 8.0
 _RATE = 4.0
 
-#: Points at which turning is sampled.
+#: Points at which slopes are sampled.
 _SAMPLES = 48
 
 #: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at once, and by
@@ -115,7 +115,7 @@ class SeparableOrbit:
 
     @cached_property
     def sample(self) -> Array:
-        """Return points of the torus at which turning is looked at, phases modulo 2."""
+        """Return points of the torus at which slopes are looked at, phases modulo 2."""
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
