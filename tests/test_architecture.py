@@ -383,3 +383,32 @@ def test_no_name_is_a_private_word() -> None:
         found = {name for name in names if name.strip("_").lower() in private}
         found -= CONTRACTS.get(path.name, set())
         assert not found, f"{path.name} names {sorted(found)}"
+
+
+#: What the comment of a constant begins with; CONVENTIONS.md says what each means.
+KINDS = ("Derived: ", "Calibrated: ", "Budget: ", "Tuning: ")
+
+
+def _is_number(node: ast.expr | None) -> bool:
+    if isinstance(node, ast.UnaryOp):
+        return _is_number(node.operand)
+    if isinstance(node, ast.BinOp):
+        return _is_number(node.left) and _is_number(node.right)
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def test_constants_of_the_engines_say_of_what_kind_they_are() -> None:
+    for path in FILES:
+        if not {"analytic", "numeric"} & set(path.parts):
+            continue
+        lines = path.read_text().splitlines()
+        for node in ast.parse(path.read_text()).body:
+            if not (isinstance(node, (ast.Assign, ast.AnnAssign)) and _is_number(node.value)):
+                continue
+            place = node.lineno - 2
+            while not lines[place].startswith("#:"):  # constants with one comment stand together
+                assert lines[place].strip(), f"{path.name}:{node.lineno} has no comment"
+                place -= 1
+            while lines[place - 1].startswith("#:"):
+                place -= 1
+            assert lines[place].removeprefix("#: ").startswith(KINDS), f"{path.name}:{node.lineno}"

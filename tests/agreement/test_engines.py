@@ -16,9 +16,19 @@ from conftest import slow
 from draws import adversarial_start, random_problem
 from problems import TABLE, Case, tagged
 from truth import true_motion
-from veselova import EulerPoisson, Unsolved, Veselova, compare, solve, torus
+from veselova import (
+    EllipsoidGeodesic,
+    EulerPoisson,
+    Unsolved,
+    Veselova,
+    VeselovaSO3,
+    compare,
+    solve,
+    torus,
+)
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
+from veselova.mechanics.core.problem import Problem
 
 METHODS = [
     ("analytic", "theta"),
@@ -220,6 +230,52 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)
     with pytest.raises(Unsolved, match="no-digit-left"):
         solve(case.problem(), [1.0, 100.0])
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        Veselova([3, 2, 1], [0, 1, 0], [1, 0, 3]),
+        EllipsoidGeodesic([3, 2, 1], [0, 1, 0], [1, 0, 1], normalize=True),
+    ],
+    ids=["veselova", "ellipsoid-geodesic"],
+)
+def test_a_separatrix_through_the_middle_axis_is_served(problem: Problem) -> None:
+    # alone on its axis, q has no scale that would open the closed gap
+    times = np.array([-4.0, -1.0, 0.0, 1.0, 4.0])
+    found = solve(problem, times)
+    assert found.provenance.details["regime"] == "separatrix"
+    integrated = solve(problem, times, engine="numeric", method="taylor")
+    off = np.max(np.abs(found.frame - integrated.frame), axis=(1, 2))
+    assert np.all(off <= found.error + integrated.error)
+    assert np.max(found.error) < 1e-11
+
+
+@pytest.mark.parametrize("method", ["taylor", slow("dop853")])
+@pytest.mark.parametrize(
+    ("inertia", "gamma", "Omega"),
+    [
+        (
+            ["0.05514807257486351", "2.301471983045774e-08", "4.167951611415536e-05"],
+            ["0.317", "0.308", "0.257"],
+            ["0.193419", "-0.218073", "0.022773"],
+        ),
+        (
+            ["1.5365228272384487e-08", "0.14239740267137527", "1.0314595152140278"],
+            ["-0.47", "0.096", "-0.467"],
+            ["-0.035969", "-0.739991", "-0.115918"],
+        ),
+    ],
+)
+def test_integration_of_wide_inertia_is_honest(
+    method: str, inertia: Any, gamma: Any, Omega: Any
+) -> None:
+    problem = VeselovaSO3(inertia, gamma, Omega, normalize=True)
+    times = np.array([-10, -3, -1.5, 0, 0.1, 0.7, 1, 3, 4, 7, 10]) / problem.turning / 2
+    exact = solve(problem, times)
+    found = solve(problem, times, engine="numeric", method=method)
+    off = np.max(np.abs(found.frame - exact.frame), axis=(1, 2))
+    assert np.all(off <= found.error + exact.error)
 
 
 def test_errors_grow_where_guard_digits_end() -> None:

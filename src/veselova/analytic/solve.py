@@ -43,8 +43,8 @@ Array = NDArray[np.float64]
 #: roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
 
-#: Sine of the angle between momentum and γ below which an area constant has 15 digits: the axes of
-#: the torus are not defined there.
+#: Calibrated: sine of the angle between momentum and γ below which an area constant has 15 digits:
+#: the axes of the torus are not defined there.
 _NEARLY_UPRIGHT = 1e-5
 
 #: The series that states are, along the principal axes; the last may be left to the problem. A

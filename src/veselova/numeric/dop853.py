@@ -28,9 +28,11 @@ class Dop853(Integrator):
     #: tenth more steps.
     tolerance: ClassVar[float] = 2.3e-14
     method: ClassVar[str] = "dop853"
+    neighbours: ClassVar[tuple[float, ...]] = (1.0,)
+    safety: ClassVar[float] = 8.0
 
     #: Of the neighbours: the looser tolerance shows the error of the method.
-    looser: ClassVar[float] = 1e-12
+    looser: ClassVar[float] = 2e-13
 
     def __init__(self, flows: Sequence[Flow], tolerance: float = tolerance) -> None:
         self._runs = [_Run(flow, self.looser if i else tolerance) for i, flow in enumerate(flows)]

@@ -20,14 +20,14 @@ __all__ = ["HeyokaPeer"]
 
 Array = NDArray[np.float64]
 
-#: Radians between two projections, the starting speed being one.
+#: Tuning: radians between two projections, the starting speed being one.
 _SEGMENT = 10.0
 
-#: States that turn into attitudes at once: their arrays stay in the processor's cache.
+#: Budget: states that turn into attitudes at once: their arrays stay in the processor's cache.
 _BLOCK = 4096
 
-#: From this many equations on the compact mode, which compiles in a second where unrolled code
-#: takes minutes.
+#: Tuning: from this many equations on the compact mode, which compiles in a second where unrolled
+#: code takes minutes.
 _COMPACT_FROM = 20
 
 

@@ -19,11 +19,17 @@ Array = NDArray[np.float64]
 
 
 class Integrator(ABC):
-    """A back end: integrates a flow and its neighbour side by side, over one segment at a time."""
+    """A back end: integrates a flow and its neighbours side by side, over one segment at a time."""
 
     #: Tolerance of the answer.
     tolerance: ClassVar[float]
     method: ClassVar[str]
+    #: How far the neighbours start from the answer, and on which side: rounding may agree by chance
+    #: in one of them, and hardly in all.
+    neighbours: ClassVar[tuple[float, ...]]
+    #: By how much the error may be larger than their largest difference: the starts differ in one
+    #: direction, which need not be the one in which errors grow most.
+    safety: ClassVar[float]
 
     @abstractmethod
     def __init__(self, flows: Sequence[Flow]) -> None:

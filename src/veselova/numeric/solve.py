@@ -1,5 +1,5 @@
-"""The numerical engine's answer: integrate the motion and a neighbour, project every ten radians,
-report the difference.
+"""The numerical engine's answer: integrate the motion and its neighbours, project every ten
+radians, report the largest difference.
 """
 
 from __future__ import annotations
@@ -33,32 +33,30 @@ METHODS: Mapping[str, tuple[str, str]] = {
     "taylor": ("veselova.numeric.taylor", "Taylor"),
 }
 
-#: Scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut the error
-#: from 1e-5 to 3.5e-10.
+#: Tuning: scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut
+#: the error from 1e-5 to 3.5e-10.
 _SEGMENT = 10.0
 
-#: Scaled time that an integration is begun for: hours at n = 3, and by then one rounding of the
-#: data has grown to 1e-7.
+#: Budget: scaled time that an integration is begun for: hours at n = 3, and by then one rounding of
+#: the data has grown to 1e-7.
 _FARTHEST = 1e9
 
-#: How far from the data, in ε, the check run starts: rounding of the start and of each projection
-#: is common to equal starts.
+#: Calibrated: how far from the data, in ε, the check run starts: rounding of the start and of each
+#: projection is common to equal starts.
 _DATA_ROUNDING = 32.0
 
-#: What the difference of two runs may hide: rounding that happens to agree, in ε·(1 + turning), and
-#: three quarters of the rest (the two starts differ in one direction, which need not be the one in
-#: which errors grow most; 2.8 was seen in 1400 draws).
+#: Calibrated: what the difference of runs may hide: rounding that happens to agree, in ε·(1 +
+#: turning).
 _SHARED_ROUNDING = 16.0
-_DIFFERENCE_SAFETY = 4.0
 
-#: Of the fixed instants, every so many-th is looked at: half a radian apart at first.
+#: Budget: of the fixed instants, every so many-th is looked at: half a radian apart at first.
 _EVERY = 2
 
 #: Why an error leaves no digit.
 _PARTED = "two integrations whose starts differ by a few roundings part by as much"
 
-#: What the estimate may still miss: with it the true error is at most the reported one. Largest
-#: true error over an estimate without it, in all draws of ``benchmarks/honesty.py``: 0.66.
+#: Calibrated: what the estimate may still miss: with it the true error is at most the reported one.
+#: Largest true error over an estimate without it, in all draws of ``benchmarks/honesty.py``: 0.66.
 _SAFETY = 2.0
 
 
@@ -106,7 +104,7 @@ def solve(
             "too-far",
             f"{farthest:.3g} radians of turning; integration goes to {_FARTHEST:.0e}{further}",
         )
-    series, error, steps = _integrate_twice(flow, problem.bounded, grid, backend)
+    series, error, steps = _integrate_with_neighbours(flow, problem.bounded, grid, backend)
     series = problem.complete(series)
     details = {**details, "steps": steps}
     provenance = Provenance.since(began, "numeric", method, details)
@@ -115,7 +113,7 @@ def solve(
     return Trajectory.on_grid(problem, grid, error, series, provenance, again)
 
 
-def _integrate_twice(
+def _integrate_with_neighbours(
     flow: Flow, bounded: tuple[str, ...], grid: TimeGrid, backend: type[Integrator]
 ) -> tuple[Series, Array, int]:
     asked = grid.doubles / flow.time_unit
@@ -124,20 +122,23 @@ def _integrate_twice(
     before = -fixed_instants_until(max(-asked[0], 0.0), _EVERY)
     fixed = np.concatenate([before[:0:-1], fixed_instants_until(max(asked[-1], 0.0), _EVERY)])
     scaled = np.union1d(asked, fixed)
-    neighbour = flow.neighbour(_DATA_ROUNDING * np.finfo(float).eps)
-    integrator = backend((flow, neighbour))
-    states, others = _integrate((flow, neighbour), scaled, integrator)
+    moved = _DATA_ROUNDING * np.finfo(float).eps
+    neighbours = [flow.neighbour(part * moved) for part in backend.neighbours]
+    flows = (flow, *neighbours)
+    integrator = backend(flows)
+    states, *others = _integrate(flows, scaled, integrator)
     series = flow.unpack(states)
-    other = neighbour.unpack(others)
+    unpacked = [run.unpack(found) for run, found in zip(neighbours, others, strict=True)]
+    names = [name for name in bounded if name in series]
     difference = np.max(
-        [_largest(series[name] - other[name]) for name in bounded if name in series], axis=0
+        [_largest(series[name] - other[name]) for other in unpacked for name in names], axis=0
     )
     rounding = flow.size * _SHARED_ROUNDING * np.finfo(float).eps * (1 + np.abs(scaled))
     # One step's own error, and that of interpolating inside it, is in both runs where their first
     # steps coincide.
     truncation = flow.size * backend.tolerance
     error = _SAFETY * (
-        _DIFFERENCE_SAFETY * _largest_until(scaled, difference, fixed) + rounding + truncation
+        backend.safety * _largest_until(scaled, difference, fixed) + rounding + truncation
     )
     kept = np.searchsorted(scaled, asked)
     if grid.remainders is None:

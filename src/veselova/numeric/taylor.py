@@ -19,13 +19,13 @@ __all__ = ["Taylor"]
 
 Array = NDArray[np.float64]
 
-#: From this many equations, or operations in them (shared ones counted wherever they occur), on the
-#: compact mode: it compiles in a second where unrolled code takes minutes, and runs up to 2×
-#: slower.
+#: Tuning: from this many equations, or operations in them (shared ones counted wherever they
+#: occur), on the compact mode: it compiles in a second where unrolled code takes minutes, and runs
+#: up to 2× slower.
 _COMPACT_FROM = 22
 _COMPACT_OPERATIONS = 4000
 
-#: Compiled fields that are kept.
+#: Budget: compiled fields that are kept.
 _MOST_COMPILED = 64
 
 
@@ -37,6 +37,9 @@ class Taylor(Integrator):
     #: At 2⁻⁵² the method's own error is below rounding.
     tolerance: ClassVar[float] = 2.0**-52
     method: ClassVar[str] = "taylor"
+
+    neighbours: ClassVar[tuple[float, ...]] = (1.0, -1.0)
+    safety: ClassVar[float] = 4.0
 
     def __init__(self, flows: Sequence[Flow]) -> None:
         self._flows = flows

@@ -38,12 +38,13 @@ Values = NDArray[Any]
 #: A sum of waves as a function of angles.
 Sums = Callable[[Values], Values]
 
-#: Tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at most.
+#: Budget: tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at
+#: most.
 _MOST_KEPT = 64
 _LARGEST_KEPT = 256
 
-#: Coefficients at the end of a series that show how far it has fallen; _TAIL times their sum is
-#: taken for what it leaves out where that is not bounded.
+#: Calibrated: coefficients at the end of a series that show how far it has fallen; _TAIL times
+#: their sum is taken for what it leaves out where that is not bounded.
 LAST_COEFFICIENTS = 3
 _TAIL = 4
 
@@ -231,7 +232,8 @@ class Double(Arithmetic):
         return np.linalg.det(matrix)
 
 
-#: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
+#: Derived: guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or
+#: three.
 _GUARD = 6
 
 

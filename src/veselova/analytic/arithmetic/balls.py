@@ -24,29 +24,29 @@ from veselova.mechanics.core.budget import acquire, checkpoint, iterate
 
 __all__ = ["Balls", "balls"]
 
-#: Guard digits within the working precision.
+#: Derived: guard digits within the working precision.
 _GUARD = 6
 
-#: Digits of quantities that only bound others, and terms beyond those that the decay of a series
-#: asks for.
+#: Derived: digits of quantities that only bound others, and terms beyond those that the decay of a
+#: series asks for.
 _COARSE_DIGITS = 20
 _EXTRA_TERMS = 6
 
-#: Entries of an array that are computed between two checkpoints.
+#: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000
 
-#: Nodes from which series are formed by products of polynomials.
+#: Tuning: nodes from which series are formed by products of polynomials.
 _MANY_NODES = 300
 
-#: log10 √2: what a complex product of balls loses.
+#: Derived: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
 
 #: Where midpoints are formed, and radii rounded, whatever the caller's context of decimals.
 _EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 _UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
 
-#: Digits that Arb gives beyond those it is asked for, the last of them rounded towards zero, and
-#: their power of ten.
+#: Derived: digits that Arb gives beyond those it is asked for, the last of them rounded towards
+#: zero, and their power of ten.
 _UNASKED_DIGITS = 5
 _UNASKED = 10**5
 _HALF = _UNASKED // 2

@@ -21,7 +21,7 @@ __all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves", "stack_double
 
 Array = NDArray[np.float64]
 
-#: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
+#: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
 _SPLITTER = 134217729.0
 
 

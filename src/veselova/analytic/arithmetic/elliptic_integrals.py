@@ -15,19 +15,20 @@ __all__ = ["carlson_rf", "quarter_period"]
 
 Array = NDArray[np.float64]
 
-#: Relative distance of both means from which one more step leaves its square, below a rounding.
+#: Derived: relative distance of both means from which one more step leaves its square, below a
+#: rounding.
 _NEAR_MEAN = 1e-8
 
-#: Relative distances of the arguments of R_F from their mean from which its series of the eighth
-#: order leaves 1e-17.
+#: Derived: relative distances of the arguments of R_F from their mean from which its series of the
+#: eighth order leaves 1e-17.
 _NEAR = 7e-3
 
-#: Steps from any doubles: exponents are halved ten times, and digits doubled five times; arguments
-#: come nearer by a factor of four.
+#: Derived: steps from any doubles: exponents are halved ten times, and digits doubled five times;
+#: arguments come nearer by a factor of four.
 _MOST_MEANS = 20
 _MOST_DUPLICATIONS = 20
 
-#: Arrays with so few entries are done one by one: a call costs more than an entry.
+#: Tuning: arrays with so few entries are done one by one: a call costs more than an entry.
 _FEW = 16
 
 

@@ -20,27 +20,27 @@ __all__ = ["LARGEST", "LEAST", "UPWARDS", "FixedPoint"]
 
 Array = NDArray[np.float64]
 
-#: Bits of a limb.
+#: Derived: bits of a limb.
 _BITS = 22
 _BASE = 2.0**_BITS
 _OF_BASE = 2.0**-_BITS
 
-#: A product with L limbs, one of the factors a sum, drops (L−1) 2^(21 − 22L), the products beyond
-#: the limb after the last, and that limb. With so many bits beyond those asked for, 22(L−1) or more
-#: in all, that is below 2^−bits for any L up to 2⁷.
+#: Derived: a product with L limbs, one of the factors a sum, drops (L−1) 2^(21 − 22L), the products
+#: beyond the limb after the last, and that limb. With so many bits beyond those asked for, 22(L−1)
+#: or more in all, that is below 2^−bits for any L up to 2⁷.
 _DROPPED_BITS = 6
 
-#: Bits of a double that is one part of a number.
+#: Derived: bits of a double that is one part of a number.
 _PART_BITS = 52
 
-#: Products of limbs up to 2²¹ of which a sum is exact.
+#: Derived: products of limbs up to 2²¹ of which a sum is exact.
 _EXACT = 2**11
 
-#: Doubles of the weights that are spread out at once.
+#: Budget: doubles of the weights that are spread out at once.
 _SPREAD = 4_000_000
 
-#: Sizes that doubles can be scaled from to one, and what makes up for rounding in bounds of
-#: doubles.
+#: Derived: sizes that doubles can be scaled from to one, and what makes up for rounding in bounds
+#: of doubles.
 LEAST = 1e-150
 LARGEST = 1e150
 UPWARDS = 1 + 1e-6

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
-#: Waves of which each takes its own sine and cosine: the fewer calls are worth more than what they
-#: cost.
+#: Tuning: waves of which each takes its own sine and cosine: the fewer calls are worth more than
+#: what they cost.
 _FEW = 600
 
 

@@ -20,9 +20,9 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["BodyFrame"]
 
-#: A column of the natural frame in double precision this near to a normal, or to a direction that
-#: rests, is that one. Beyond, constants of motion are so close together that the frame in double
-#: precision is taken for a given one.
+#: Derived: a column of the natural frame in double precision this near to a normal, or to a
+#: direction that rests, is that one. Beyond, constants of motion are so close together that the
+#: frame in double precision is taken for a given one.
 _NEARLY_NATURAL = 1e-9
 
 

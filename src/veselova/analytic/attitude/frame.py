@@ -31,10 +31,10 @@ from veselova.analytic.curve.periods import Periods
 
 __all__ = ["Attitude", "Differences", "Frame", "PointRoots", "orthogonal", "slopes"]
 
-#: Step of the difference quotients: truncation and rounding both near 1e-8.
+#: Derived: step of the difference quotients: truncation and rounding both near 1e-8.
 _STEP = 1e-8
 
-#: Distances |λ_s−b_i| held at once: 16 MB.
+#: Budget: distances |λ_s−b_i| held at once: 16 MB.
 _BLOCK = 2_000_000
 
 

@@ -11,13 +11,13 @@ __all__ = ["MOST_LOCAL", "Sensitivity", "combine_bounds"]
 
 Array = NDArray[np.float64]
 
-#: Times up to which an error is that by the sensitivities at the times themselves; for more times
-#: it is that by the largest sensitivity on the torus. A budget: at so many points they cost less
-#: than the periods do.
+#: Budget: times up to which an error is that by the sensitivities at the times themselves; for more
+#: times it is that by the largest sensitivity on the torus. A budget: at so many points they cost
+#: less than the periods do.
 MOST_LOCAL = 24
 
-#: The largest second derivative over the square of the largest first one, with some to spare: one
-#: for a cosine, 0.8 for a hyperbolic tangent.
+#: Derived: the largest second derivative over the square of the largest first one, with some to
+#: spare: one for a cosine, 0.8 for a hyperbolic tangent.
 _CURVATURE = 4.0
 
 

@@ -22,14 +22,14 @@ __all__ = ["BETWEEN", "FEW", "SensitivitySampling", "sample_phases"]
 
 Array = NDArray[np.float64]
 
-#: Points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer points
-#: in as many directions.
+#: Budget: points at which the steepness of the attitude is sampled; beyond a genus of FEW, at fewer
+#: points in as many directions.
 _SAMPLES = 48
 FEW = 16
 _FEW_SAMPLES = 4
 
 
-#: By how much the steepness between the sampled points may be larger than at them.
+#: Calibrated: by how much the steepness between the sampled points may be larger than at them.
 BETWEEN = 1.25
 
 

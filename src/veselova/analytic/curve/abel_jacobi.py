@@ -20,26 +20,26 @@ from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["NARROW_GAP", "AbelJacobi"]
 
-#: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly reaches
-#: its neighbour.
+#: Budget: Newton steps before giving up; 4 to 8 are usual, a few dozen appear where a cut nearly
+#: reaches its neighbour.
 _MOST_STEPS = 100
 
-#: Relative gaps from which a failure to settle is the curve's, not ours: with both neighbours near
-#: such a gap, phases hardly move with the angles.
+#: Calibrated: relative gaps from which a failure to settle is the curve's, not ours: with both
+#: neighbours near such a gap, phases hardly move with the angles.
 NARROW_GAP = 1e-6
 
-#: Digits of the angles from which an inversion in balls starts, and those that a doubling by
-#: Newton's method loses to the slopes.
+#: Derived: digits of the angles from which an inversion in balls starts, and those that a doubling
+#: by Newton's method loses to the slopes.
 _COARSE_DIGITS = 12
 _LOST_DIGITS = 2
 
-#: A residual of this many ε per unit of z is rounding, and one of this many times that, which no
-#: step betters.
+#: Calibrated: a residual of this many ε per unit of z is rounding, and one of this many times that,
+#: which no step betters.
 _CONVERGED = 8.0
 _STALLED = 1e4
 
-#: Part of the way that a continuation tries at once, first and at least, and Newton's steps at each
-#: of its stations.
+#: Tuning: part of the way that a continuation tries at once, first and at least, and Newton's steps
+#: at each of its stations.
 _FIRST_STRETCH = 0.25
 _LEAST_STRETCH = 1e-9
 _NEAR_STEPS = 12

@@ -19,15 +19,15 @@ __all__ = ["AngleMaps"]
 
 Array = NDArray[np.float64]
 
-#: Newton's steps: from ψ = 2πz four to eight are usual. Points that need more are named.
+#: Budget: Newton's steps: from ψ = 2πz four to eight are usual. Points that need more are named.
 _MOST_STEPS = 24
 
-#: A residual of this many ε is rounding; one of this many times that, which no step betters, is
-#: that of long sums (as in analytic.curve.abel_jacobi).
+#: Calibrated: a residual of this many ε is rounding; one of this many times that, which no step
+#: betters, is that of long sums (as in analytic.curve.abel_jacobi).
 _CONVERGED = 8.0
 _STALLED = 1e3
 
-#: Radians by which one step may move an angle: far from the solution slopes say little.
+#: Tuning: radians by which one step may move an angle: far from the solution slopes say little.
 _LONGEST_STEP = 1.5
 
 

@@ -20,7 +20,8 @@ from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
 __all__ = ["FAR", "FourPoints"]
 
-#: The distance of a neighbour at infinity among others: to all digits its ratios are one and zero.
+#: Derived: the distance of a neighbour at infinity among others: to all digits its ratios are one
+#: and zero.
 FAR = 1e300
 
 

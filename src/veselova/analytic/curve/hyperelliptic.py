@@ -16,7 +16,7 @@ from veselova.analytic.spectrum.branch_points import Spectrum
 
 __all__ = ["BranchPoint", "Curve", "Layout", "places_of"]
 
-#: Layouts that are kept, and the most branch points of such.
+#: Budget: layouts that are kept, and the most branch points of such.
 _MOST_KEPT = 64
 _LARGEST_KEPT = 33
 

@@ -23,7 +23,7 @@ from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
 __all__ = ["Interval"]
 
-#: Genera with their intervals of which layouts are kept.
+#: Budget: genera with their intervals of which layouts are kept.
 _MOST_KEPT = 1024
 
 

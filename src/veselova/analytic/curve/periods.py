@@ -31,18 +31,18 @@ from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Periods", "resolve_periods"]
 
-#: Nodes beyond those that the convergence rate asks for: the constant in front of it.
+#: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
-#: Entries at one node of the forms of intervals that are evaluated side by side: with all nodes
-#: they stay in the cache.
+#: Budget: entries at one node of the forms of intervals that are evaluated side by side: with all
+#: nodes they stay in the cache.
 _BLOCK = 10_000
 
-#: Branch points nearer than 10 to minus this count as one where two narrower intervals are
+#: Derived: branch points nearer than 10 to minus this count as one where two narrower intervals are
 #: neighbours: their widths then have a product, as moduli ask for.
 _COINCIDE_BESIDE = 140
 
-#: Nodes of an interval in balls: a minute.
+#: Budget: nodes of an interval in balls: a minute.
 _MOST_NODES = 100_000
 
 

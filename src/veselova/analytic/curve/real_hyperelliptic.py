@@ -36,8 +36,8 @@ __all__ = ["RealCurve"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Nodes of Gauss' rule on a path, at first and at most, and the relative change at which it has
-#: converged.
+#: Budget: nodes of Gauss' rule on a path, at first and at most, and the relative change at which it
+#: has converged.
 _FEWEST_NODES = 32
 _MOST_NODES = 1024
 _QUADRATURE = 1e-13

@@ -24,8 +24,8 @@ from veselova.mechanics.results.curve import QUASI_PERIODS
 
 __all__ = ["CurveDecimals"]
 
-#: Working digits beyond those asked for, attempts, each with twice as many of them, and digits of
-#: the midpoints beyond those asked for.
+#: Calibrated: working digits beyond those asked for, attempts, each with twice as many of them, and
+#: digits of the midpoints beyond those asked for.
 _SPARE = 10
 _ATTEMPTS = 6
 _SHOWN = 3

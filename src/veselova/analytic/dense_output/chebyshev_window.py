@@ -23,14 +23,14 @@ Array = NDArray[np.float64]
 #: From τ₁ (N,) and the phases there (N, g) to dt/dτ₁, (N,), and the series, each with first axis N.
 Evaluation = Callable[[Array, Array], tuple[Array, tuple[Array, ...]]]
 
-#: Chebyshev points of a window.
+#: Tuning: Chebyshev points of a window.
 NODES = 48
 
-#: Windows evaluated at once, and how often those that are not resolved are halved.
+#: Budget: windows evaluated at once, and how often those that are not resolved are halved.
 _AT_ONCE = 64
 MOST_HALVINGS = 16
 
-#: Last coefficients of a window below this may be rounding of the evaluation.
+#: Calibrated: last coefficients of a window below this may be rounding of the evaluation.
 _NOISE_TAIL = 1e-12
 
 #: What a sum of polynomials rounds to.

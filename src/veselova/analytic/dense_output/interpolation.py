@@ -31,11 +31,11 @@ __all__ = ["FEW_TIMES", "Windows"]
 
 Array = NDArray[np.float64]
 
-#: Times below which windows are not worth their overhead.
+#: Tuning: times below which windows are not worth their overhead.
 FEW_TIMES = 500
 
-#: Cycles of the fastest phase in a window at first; lengths that are tried, and how many before
-#: they are halved.
+#: Tuning: cycles of the fastest phase in a window at first; lengths that are tried, and how many
+#: before they are halved.
 _CYCLES = 2.0
 _MOST_LENGTHS = 16
 _CLOSE_LENGTHS = 6
@@ -43,10 +43,11 @@ _CLOSE_LENGTHS = 6
 #: Pieces of a window, the fewest that serve.
 _PARTS = (6, 8, 16, 32)
 
-#: Lengths of a window from t = 0 at which times have too few bits left to lie densely in one.
+#: Derived: lengths of a window from t = 0 at which times have too few bits left to lie densely in
+#: one.
 _FARTHEST = 2.0**32
 
-#: Windows tried before all of the same length.
+#: Tuning: windows tried before all of the same length.
 _FIRST_WINDOWS = 8
 
 

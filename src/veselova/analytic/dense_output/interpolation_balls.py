@@ -26,19 +26,19 @@ __all__ = ["WindowsInBalls"]
 
 Array = NDArray[np.float64]
 
-#: Windows looked at for that, and times below which none is.
+#: Tuning: windows looked at for that, and times below which none is.
 _SAMPLED = 40
 _FEW_TIMES = 300
 
-#: What a motion at a node costs, and a term of the series at a time, in motions at a time: from n =
-#: 3 to 6, 30 to 100 digits.
+#: Tuning: what a motion at a node costs, and a term of the series at a time, in motions at a time:
+#: from n = 3 to 6, 30 to 100 digits.
 _NODE = 1.2
 _TERM = 1 / 600
 
-#: Nodes taken over those expected, at so many working digits: series fall more slowly than they
-#: begin, so it grows with the logarithm of the digits, and is below one at fewer than 32. Of 330
-#: random motions with n = 3 … 5 and 30 … 100 digits, 8 needed more, 1.22 times those expected at
-#: most.
+#: Calibrated: nodes taken over those expected, at so many working digits: series fall more slowly
+#: than they begin, so it grows with the logarithm of the digits, and is below one at fewer than 32.
+#: Of 330 random motions with n = 3 … 5 and 30 … 100 digits, 8 needed more, 1.22 times those
+#: expected at most.
 _SPARE = 1.08
 _SPARE_DIGITS = 59
 _SPARE_GROWTH = 0.13

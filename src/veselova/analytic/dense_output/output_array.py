@@ -25,7 +25,7 @@ __all__ = ["AT_ONCE", "OutputArray", "Samples"]
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-#: Times evaluated one by one at once. It bounds the memory.
+#: Budget: times evaluated one by one at once. It bounds the memory.
 AT_ONCE = 32768
 
 

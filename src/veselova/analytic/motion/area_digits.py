@@ -19,8 +19,8 @@ from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["AreaMotionInBalls"]
 
-#: Digits beyond those asked for that the frame of the torus has: the constant rotation to the frame
-#: of the body adds three errors.
+#: Calibrated: digits beyond those asked for that the frame of the torus has: the constant rotation
+#: to the frame of the body adds three errors.
 _FURTHER = 1
 
 

@@ -24,8 +24,8 @@ AreaBody = VeselovaSO3 | ChaplyginBall
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Roundings of the constant rotation between both frames, of its product with one, and of the
-#: principal axes.
+#: Derived: roundings of the constant rotation between both frames, of its product with one, and of
+#: the principal axes.
 _ROUNDINGS = 8.0
 
 

@@ -32,11 +32,11 @@ __all__ = ["AreaSolution", "solution_of"]
 
 Array = NDArray[np.float64]
 
-#: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, are those of extended
-#: precision.
+#: Calibrated: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, are those of
+#: extended precision.
 _CANCELLED = 8.0
 
-#: By how much more than at the sampled phases dt/dτ₁ may vary.
+#: Calibrated: by how much more than at the sampled phases dt/dτ₁ may vary.
 _BETWEEN = 2.0
 
 

@@ -42,31 +42,32 @@ __all__ = ["Atlas"]
 
 Array = NDArray[np.float64]
 
-#: Degree of the interpolants, and points at which each is compared with the tori themselves.
+#: Tuning: degree of the interpolants, and points at which each is compared with the tori
+#: themselves.
 _DEGREE = 18
 _TESTS = 7
 
-#: Halvings of panels towards the separatrix, and largest |m_k| there: nearer tori are computed by
-#: themselves.
+#: Budget: halvings of panels towards the separatrix, and largest |m_k| there: nearer tori are
+#: computed by themselves.
 _HALVINGS = 11
 _BOXES = (12, 18, 28, 42)
 
-#: Part of the other end, where a cut closes, that panels leave out.
+#: Tuning: part of the other end, where a cut closes, that panels leave out.
 _CLOSED = 2.0**-20
 
-#: Interpolation errors of a panel that is kept: of series and modes, and relative ones of
+#: Budget: interpolation errors of a panel that is kept: of series and modes, and relative ones of
 #: frequencies; one that has more is cut in two, so often.
 _ALLOWED = 4e-15
 _ALLOWED_OF_RATES = 4e-15
 _MOST_CUTS = 4
 
-#: The part of a largest difference, seen at a few points, that may lie between them.
+#: Calibrated: the part of a largest difference, seen at a few points, that may lie between them.
 _BETWEEN = 2.0
 
-#: Relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
+#: Calibrated: relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
 _RATE_ROUNDING = 2.0
 
-#: Starts that are evaluated at once.
+#: Budget: starts that are evaluated at once.
 _BLOCK = 4000
 
 

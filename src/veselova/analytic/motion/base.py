@@ -22,8 +22,8 @@ __all__ = ["Motion"]
 
 Array = NDArray[np.float64]
 
-#: What bounds made of samples and of typical rounding may miss: with it the true error is at most
-#: the reported one. Largest true error over an error without it, in all draws of
+#: Calibrated: what bounds made of samples and of typical rounding may miss: with it the true error
+#: is at most the reported one. Largest true error over an error without it, in all draws of
 #: ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
 _SAFETY = 2.0
 

@@ -42,19 +42,19 @@ __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
 
-#: Modes from which a document is refused: some ten megabytes.
+#: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
 
-#: Least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above exp(−π/(4·0.2))
-#: = 0.02 of θ(0).
+#: Derived: least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above
+#: exp(−π/(4·0.2)) = 0.02 of θ(0).
 _LEAST_EIGENVALUE = 0.2
 
-#: Cycles of the fastest phase over which the growth of the error is taken: fewer than those from
-#: which the engine carries frequencies with more digits than a document has.
+#: Derived: cycles of the fastest phase over which the growth of the error is taken: fewer than
+#: those from which the engine carries frequencies with more digits than a document has.
 _CYCLES = 100.0
 
-#: By how much the document's own arithmetic may be off more than the engine's: products of times
-#: and rates are rounded once more.
+#: Calibrated: by how much the document's own arithmetic may be off more than the engine's: products
+#: of times and rates are rounded once more.
 _OWN_ROUNDING = 2.0
 
 

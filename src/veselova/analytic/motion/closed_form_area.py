@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Roundings of the constant rotation between the frames and of its product, as in area_motion, and
-#: once more in the evaluator.
+#: Derived: roundings of the constant rotation between the frames and of its product, as in
+#: area_motion, and once more in the evaluator.
 _ROUNDINGS = 16.0
 
 

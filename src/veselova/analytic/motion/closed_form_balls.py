@@ -22,15 +22,16 @@ from veselova.mechanics.core.errors import InvalidInput, Unsolved
 
 __all__ = ["FAR_DIGITS", "decimal_fields"]
 
-#: Digits of every number beyond those of the document: a time of 10^12 takes 12 of them.
+#: Derived: digits of every number beyond those of the document: a time of 10^12 takes 12 of them.
 FAR_DIGITS = 15
 
-#: Working digits beyond those of the numbers, and attempts, each with twice as many of them.
+#: Calibrated: working digits beyond those of the numbers, and attempts, each with twice as many of
+#: them.
 _SPARE = 15
 _ATTEMPTS = 4
 
-#: By how much the least coefficient is below the accuracy, at first: slow modes, and many of them,
-#: move τ₁ by more than their coefficients.
+#: Tuning: by how much the least coefficient is below the accuracy, at first: slow modes, and many
+#: of them, move τ₁ by more than their coefficients.
 _FEWER_MODES = 200.0
 
 

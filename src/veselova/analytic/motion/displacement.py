@@ -23,10 +23,11 @@ __all__ = ["Displacement", "WithAreaConstant", "displacement_of"]
 
 Array = NDArray[np.float64]
 
-#: Roundings of a displacement: of the speed, of its product with the time, and of those with ℜ.
+#: Derived: roundings of a displacement: of the speed, of its product with the time, and of those
+#: with ℜ.
 _ROUNDINGS = 6.0
 
-#: How large a function may be that is at most one at the half periods.
+#: Calibrated: how large a function may be that is at most one at the half periods.
 _BETWEEN = 2.0
 
 

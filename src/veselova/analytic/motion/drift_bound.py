@@ -27,11 +27,11 @@ from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 
 __all__ = ["PerturbationBound", "estimate_growth"]
 
-#: More than what a dozen operations in double precision round.
+#: Derived: more than what a dozen operations in double precision round.
 _UP = 1 + 1e-12
 
-#: Digits in which starts are compared, in digits of the arithmetic and besides: they differ by
-#: 10^(−2·digits−20) or less.
+#: Derived: digits in which starts are compared, in digits of the arithmetic and besides: they
+#: differ by 10^(−2·digits−20) or less.
 _TIMES = 6
 _BESIDE = 120
 

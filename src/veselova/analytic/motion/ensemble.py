@@ -37,29 +37,31 @@ _BOXES = {1: (12, 18, 28, 42), 2: (12, 18, 28, 42)}
 _NODE_COUNTS = (16, 24, 36, 64)
 _PACES = (1.6, 2.6, 4.0, 7.0)
 
-#: Entries of tables formed at once, and points of motions: temporaries of a few megabytes.
+#: Budget: entries of tables formed at once, and points of motions: temporaries of a few megabytes.
 _TABLE_BLOCK = 200_000
 _POINT_BLOCK = 3_000
 
-#: Narrowest cut and gap against what is around them, and the most cancellation in the Abel map.
+#: Calibrated: narrowest cut and gap against what is around them, and the most cancellation in the
+#: Abel map.
 _NARROWEST_CUT = 1e-6
 _NARROWEST_GAP = 1e-4
 _MOST_CANCELLATION = 10.0
 
-#: A component of q' along a normal from which its sign is certain, relative to |q'|.
+#: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 _CERTAIN = 1e-9
 
-#: Step of the difference quotients, as in analytic.attitude.frame.
+#: Derived: step of the difference quotients, as in analytic.attitude.frame.
 _STEP = 1e-8
 
 #: The constants of analytic.motion.error_bound and analytic.motion.base, in ε where they are
 #: roundings: of a phase, of the start's phases, of one evaluation, and the factor of the whole.
 _PHASE, _START_PHASE, _EVALUATION, _SAFETY = 4.0, 4.0, 9.0, 2.0
 
-#: Errors above this are left out: second orders would count, and one problem has guard digits.
+#: Derived: errors above this are left out: second orders would count, and one problem has guard
+#: digits.
 _LARGEST_ERROR = 1e-6
 
-#: Cycles of the fastest phase at which doubles leave an error of about that.
+#: Derived: cycles of the fastest phase at which doubles leave an error of about that.
 _MOST_CYCLES = 1e9
 
 

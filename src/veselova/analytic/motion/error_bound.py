@@ -22,43 +22,44 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Rounding of one evaluation of the attitude, in ε, largest seen over the problem tables: 8 by
-#: angles, 20 by theta quotients, and there for each unit of the largest entry of T, whose rounding
-#: stands in an exponent.
+#: Calibrated: rounding of one evaluation of the attitude, in ε, largest seen over the problem
+#: tables: 8 by angles, 20 by theta quotients, and there for each unit of the largest entry of T,
+#: whose rounding stands in an exponent.
 _EVALUATION = {
     "angles": 8.0,
     "theta": 20.0,
 }
 
-#: The same for each factor of a product of n ratios, by angles, where that is more; largest seen
-#: 1.6, beside an equilibrium.
+#: Calibrated: the same for each factor of a product of n ratios, by angles, where that is more;
+#: largest seen 1.6, beside an equilibrium.
 _FOR_EACH_FACTOR = 3.0
 
-#: The same of the point of a geodesic, relative to the longest semi-axis, or n where that is more;
-#: largest seen 2, at the tips of needles.
+#: Calibrated: the same of the point of a geodesic, relative to the longest semi-axis, or n where
+#: that is more; largest seen 2, at the tips of needles.
 _EVALUATION_OF_POINT = 8.0
 
-#: Rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those of
-#: different phases add in squares.
+#: Calibrated: rounding of a phase in ε: the reduced advance, and in angles Newton's residual. Those
+#: of different phases add in squares.
 _PHASE = {"angles": 4.0, "theta": 2.0}
 
-#: Rounding of a phase at the start in ε, the Abel map, as time maps take it.
+#: Calibrated: rounding of a phase at the start in ε, the Abel map, as time maps take it.
 _START_PHASE = 4.0
 
-#: Relative rounding of f, F_0 and the time map in ε; periods of random problems agree with extended
-#: precision to 2 ε.
+#: Calibrated: relative rounding of f, F_0 and the time map in ε; periods of random problems agree
+#: with extended precision to 2 ε.
 _RATE = 2.0
 
-#: The same where they carry guard digits: 30 digits in the leading and the following double.
+#: Derived: the same where they carry guard digits: 30 digits in the leading and the following
+#: double.
 _GUARDED_RATE = 1e-30
 
-#: By how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so many of
-#: them.
+#: Tuning: by how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so
+#: many of them.
 _WIDE = 10.0
 _MANY = 10_000
 
-#: Rounding of the principal axes and of a given frame along them, in ε, besides one for each term
-#: of a scalar product.
+#: Derived: rounding of the principal axes and of a given frame along them, in ε, besides one for
+#: each term of a scalar product.
 _AXES_ROUNDING = 8.0
 
 

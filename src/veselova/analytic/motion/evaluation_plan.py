@@ -24,7 +24,7 @@ __all__ = ["EvaluationPlan"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which frequencies in extended precision leave no digit of the phases.
+#: Derived: cycles from which frequencies in extended precision leave no digit of the phases.
 _MOST_CYCLES = 1e28
 
 

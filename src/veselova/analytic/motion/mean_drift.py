@@ -20,7 +20,7 @@ __all__ = ["drift"]
 
 Array = NDArray[np.float64]
 
-#: Roundings of Σ|M_s f_s| below which M·f counts as zero.
+#: Derived: roundings of Σ|M_s f_s| below which M·f counts as zero.
 _ROUNDINGS = 32.0
 
 

@@ -35,19 +35,19 @@ from veselova.version import __version__
 
 __all__ = ["MotionInBalls"]
 
-#: Working digits beyond those asked for: what inversion, time map and frame of a generic motion
-#: lose.
+#: Calibrated: working digits beyond those asked for: what inversion, time map and frame of a
+#: generic motion lose.
 _SPARE = 8
 
-#: Digits added beyond those that were missing, and attempts.
+#: Tuning: digits added beyond those that were missing, and attempts.
 _MORE = 4
 _ATTEMPTS = 6
 
-#: Moving directions up to which theta sums are shorter than inversions.
+#: Tuning: moving directions up to which theta sums are shorter than inversions.
 _THETA_SIZE = 3
 
-#: Significant digits of the numbers given out, beyond those asked for: the radius of a component of
-#: size one is not rounding.
+#: Derived: significant digits of the numbers given out, beyond those asked for: the radius of a
+#: component of size one is not rounding.
 _SHOWN = 3
 
 #: −x to the last digit, whatever the caller's context of decimals.

@@ -11,7 +11,7 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["close_orbit"]
 
-#: An attitude that is not back differs by signs of whole components.
+#: Derived: an attitude that is not back differs by signs of whole components.
 _BACK = 1e-4
 
 

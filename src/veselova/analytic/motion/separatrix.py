@@ -20,11 +20,11 @@ __all__ = ["DepartureBound"]
 
 Array = NDArray[np.float64]
 
-#: Instants evaluated at once.
+#: Budget: instants evaluated at once.
 _BLOCK = 128
 
-#: Between instants a difference may be larger than at both; largest seen there over that at the
-#: later one: 1.3.
+#: Calibrated: between instants a difference may be larger than at both; largest seen there over
+#: that at the later one: 1.3.
 _BETWEEN = 2.0
 
 

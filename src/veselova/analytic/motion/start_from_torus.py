@@ -24,8 +24,8 @@ __all__ = ["start_on_torus"]
 
 Array = NDArray[np.float64]
 
-#: Digits in which branch points are compared; gaps narrower than that part of the largest are no
-#: gaps here.
+#: Derived: digits in which branch points are compared; gaps narrower than that part of the largest
+#: are no gaps here.
 _DIGITS = 60
 
 

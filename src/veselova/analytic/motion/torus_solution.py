@@ -41,23 +41,26 @@ __all__ = ["WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude has no
-#: use for it; and the terms of a sum that cost as much as an inversion.
+#: Tuning: cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude
+#: has no use for it; and the terms of a sum that cost as much as an inversion.
 _RATE_CYCLES = {5: 10.0, 6: 40.0}
 _RATE_TERMS = 6e4
 
-#: Entries of T from which angles are the more accurate route: a cut of relative width 1e-10 has 8.
+#: Calibrated: entries of T from which angles are the more accurate route: a cut of relative width
+#: 1e-10 has 8.
 _LARGE_PERIOD = 8.0
 
-#: Cancellation in the Abel map from which angles, which undo it, are the more accurate route.
+#: Calibrated: cancellation in the Abel map from which angles, which undo it, are the more accurate
+#: route.
 _LARGE_CANCELLATION = 10.0
 
-#: Above THETA_GENUS a gap goes to theta quotients below this, up to there below NARROW_GAP: at
-#: 1e-12 angles still give 1e-12; and the largest genus at which theta sums are taken there.
+#: Calibrated: above THETA_GENUS a gap goes to theta quotients below this, up to there below
+#: NARROW_GAP: at 1e-12 angles still give 1e-12; and the largest genus at which theta sums are taken
+#: there.
 _NARROW_GAP_HIGH_GENUS = 1e-12
 _SEPARATRIX_GENUS = 7
 
-#: By how much dt/dτ₁ may vary for a Fourier time map.
+#: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
 WIDEST_RATE = 1e10
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.

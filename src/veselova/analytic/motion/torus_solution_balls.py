@@ -40,19 +40,20 @@ from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SolutionInBalls"]
 
-#: Relative gap below which no inversion in doubles begins one in balls.
+#: Calibrated: relative gap below which no inversion in doubles begins one in balls.
 _NARROWEST = 1e-20
 
-#: Digits of a share in |q|² and |q̇|² that doubles see.
+#: Derived: digits of a share in |q|² and |q̇|² that doubles see.
 _SMALL_SHARE = 200
 
-#: The smallest movement along a direction that is followed, beside those along others.
+#: Budget: the smallest movement along a direction that is followed, beside those along others.
 _LEAST_DIGITS = 500
 
-#: Least distance of two branch points in doubles, whose squares of roots are to be doubles too.
+#: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
+#: too.
 _LEAST_WIDTH = 1e-290
 
-#: Digits by which motions may part before a start that was moved is given up.
+#: Budget: digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
 _MOVED = (
     f"the start had to be moved, and the bound of its drift grows beyond 1e{_MOST_GROWTH} "

@@ -37,23 +37,23 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Neighbouring branch points nearer than this part of the largest are left to analytic.torus. Down
-#: to here, their differences have twenty digits.
+#: Derived: neighbouring branch points nearer than this part of the largest are left to
+#: analytic.torus. Down to here, their differences have twenty digits.
 _NARROWEST = 1e-12
 
 #: Numbers of nodes are rounded up to one of these; who needs more has a gap that is worth a call of
 #: its own.
 NODE_COUNTS = (12, 16, 20, 24, 32, 40, 52, 64)
 
-#: Largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i: products of
-#: them, and what these round, stay floats.
+#: Derived: largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i:
+#: products of them, and what these round, stay floats.
 _MOST_BINARY_DIGITS = 150
 
-#: Largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
+#: Tuning: largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
 _MOST_DIMENSIONS = 9
 
 
-#: Relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
+#: Calibrated: relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
 _RATE_ROUNDING = 2.0
 
 #: What a stack knows of each of its tori, once it is asked for.

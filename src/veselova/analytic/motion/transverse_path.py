@@ -18,7 +18,7 @@ __all__ = ["FourierPath", "PanelPath", "TransversePath"]
 
 Array = NDArray[np.float64]
 
-#: By how much farther panels go than they are asked for.
+#: Tuning: by how much farther panels go than they are asked for.
 _FARTHER = 1.25
 
 

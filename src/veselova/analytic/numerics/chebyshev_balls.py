@@ -15,10 +15,10 @@ from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ChebyshevSeriesInBalls"]
 
-#: Points at once: their polynomials stay in the cache.
+#: Tuning: points at once: their polynomials stay in the cache.
 _POINTS = 1000
 
-#: Digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
+#: Derived: digits that recurrence loses in T_m: half a bit for every doubling of m, twice.
 _RECURRENCE_DIGITS = 6
 
 

@@ -16,13 +16,13 @@ __all__ = ["MORE", "SAMPLE", "are_resolved", "estimate_terms"]
 
 Array = NDArray[np.float64]
 
-#: Nodes of a series in double precision that shows how fast one falls, and the digits down to which
-#: it does.
+#: Tuning: nodes of a series in double precision that shows how fast one falls, and the digits down
+#: to which it does.
 SAMPLE = 64
 _SAMPLE_DIGITS = 11
 
-#: How much larger than the precision the last coefficients of a series may be (they are rounding
-#: there), and how many times as many nodes are taken where they are larger.
+#: Calibrated: how much larger than the precision the last coefficients of a series may be (they are
+#: rounding there), and how many times as many nodes are taken where they are larger.
 _NEARLY = 1e3
 MORE = 1.25
 

@@ -22,31 +22,31 @@ __all__ = ["SumsOverPoints", "sums_over_modes"]
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Digits up to which the last limbs of numbers of size one are doubles.
+#: Derived: digits up to which the last limbs of numbers of size one are doubles.
 _MOST_FIXED = 250
 
-#: Digits of fixed-point numbers beyond those of the sums and of their terms.
+#: Derived: digits of fixed-point numbers beyond those of the sums and of their terms.
 _SPARE_DIGITS = 4
 
-#: Points, places of the box along all axes but the first, and rows of modes that are looked at
-#: together; and limbs of a table of sums along the first axis, which fewer points take where a
+#: Budget: points, places of the box along all axes but the first, and rows of modes that are looked
+#: at together; and limbs of a table of sums along the first axis, which fewer points take where a
 #: place of the second axis has many behind it.
 _POINTS = 500
 _PLACES = 300
 _ROWS = 30
 _TABLE = 4_000_000
 
-#: Waves in balls that are in memory at once.
+#: Budget: waves in balls that are in memory at once.
 _EXPONENTIALS = 1_000_000
 
-#: What rounding makes of a power, in both parts (see Fixed.turns); and of a term of a sum with all
-#: products behind it: up to four axes 12 at most, and a third of that, since no operation is off by
-#: more than a third of its bound at 250 digits.
+#: Derived: what rounding makes of a power, in both parts (see Fixed.turns); and of a term of a sum
+#: with all products behind it: up to four axes 12 at most, and a third of that, since no operation
+#: is off by more than a third of its bound at 250 digits.
 _OF_POWER = 4.5
 _OF_TERM = 10
 
-#: Largest error of e^{2πi m·z}, m the corner of the box, at which products of errors are below this
-#: part of errors.
+#: Derived: largest error of e^{2πi m·z}, m the corner of the box, at which products of errors are
+#: below this part of errors.
 _OPEN = 1e-3
 
 

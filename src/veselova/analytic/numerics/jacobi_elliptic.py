@@ -20,8 +20,8 @@ from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 
 __all__ = ["Jacobi"]
 
-#: Of many moduli, which have as many terms as the largest nome takes, cosh 2y stops here: terms are
-#: below e^−200 of the first.
+#: Derived: of many moduli, which have as many terms as the largest nome takes, cosh 2y stops here:
+#: terms are below e^−200 of the first.
 _LARGEST_WAVE = 1e86
 
 

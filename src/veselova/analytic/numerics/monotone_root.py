@@ -29,14 +29,14 @@ Array = NDArray[np.float64]
 #: Entries along the first axis: all of them, or some by their places.
 Rows = slice | NDArray[np.intp]
 
-#: Newton's steps double the digits from those of a double, but for what they lose.
+#: Derived: Newton's steps double the digits from those of a double, but for what they lose.
 _FIRST_DIGITS = 12
 _LOST_DIGITS = 2
 
-#: Part of the slope at an approximate root that is certain next to it.
+#: Derived: part of the slope at an approximate root that is certain next to it.
 _SLOPE = 0.5
 
-#: Bisection alone needs 53 steps from any bracket to one rounding.
+#: Derived: bisection alone needs 53 steps from any bracket to one rounding.
 _MOST_STEPS = 80
 
 

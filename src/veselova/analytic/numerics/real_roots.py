@@ -28,7 +28,7 @@ Polynomial = list[Fraction]
 #: Numbers nearer than this, relative to those around, count as one: roots have more digits.
 NEAR = Fraction(1, 10**40)
 
-#: Digits of the roots, and more where they are asked for.
+#: Derived: digits of the roots, and more where they are asked for.
 _DIGITS = 77
 
 

@@ -35,7 +35,7 @@ __all__ = ["BodyMotion"]
 
 Array = NDArray[np.float64]
 
-#: Step of a difference quotient in a phase.
+#: Derived: step of a difference quotient in a phase.
 _STEP = 1e-6
 
 

@@ -22,14 +22,14 @@ __all__ = ["Arrival", "CollisionOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Cycles of a swing of the phases from which the angles are led along the orbit.
+#: Tuning: cycles of a swing of the phases from which the angles are led along the orbit.
 _WIDE_SWING = 100.0
 
-#: Points among which the first is looked for that is beyond a plane, and how often.
+#: Budget: points among which the first is looked for that is beyond a plane, and how often.
 _POINTS = 16
 _ROUNDS = 4
 
-#: Newton's steps to the time of a collision, and the last of them, in ε.
+#: Budget: Newton's steps to the time of a collision, and the last of them, in ε.
 _MOST_STEPS = 30
 _LAST_STEP = 64.0
 

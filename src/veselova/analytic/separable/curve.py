@@ -42,19 +42,19 @@ __all__ = ["AnyCut", "SeparableStart", "SeparatedCut", "find_cuts", "moving_axes
 
 Array = NDArray[np.float64]
 
-#: Digits of λ_s at the start, beyond those by which the I's are apart.
+#: Derived: digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
 
 #: I's nearer than this part of themselves are separated by it: far below any digit, and products
 #: of such differences are floats.
 _APART = Fraction(1, 10**30)
 
-#: A root nearer to the end of a cut than this part of the cut makes its period nearly infinite: a
-#: separatrix.
+#: Calibrated: a root nearer to the end of a cut than this part of the cut makes its period nearly
+#: infinite: a separatrix.
 _SEPARATRIX = 1e-12
 
-#: What R's leading coefficient, its reciprocal, and the squares of its roots multiplied may be: a
-#: float, and so their products.
+#: Derived: what R's leading coefficient, its reciprocal, and the squares of its roots multiplied
+#: may be: a float, and so their products.
 _LARGEST = 10**150
 
 

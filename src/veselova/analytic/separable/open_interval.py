@@ -22,8 +22,8 @@ __all__ = ["OpenInterval"]
 
 Array = NDArray[np.float64]
 
-#: The distance from a plane that counts as none, in widths: with it quotients of roots of zero are
-#: numbers.
+#: Derived: the distance from a plane that counts as none, in widths: with it quotients of roots of
+#: zero are numbers.
 _LEAST = 1e-40
 
 

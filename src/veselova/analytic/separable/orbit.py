@@ -27,8 +27,8 @@ __all__ = ["PHASES_LOST", "SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Cycles from which the Fourier time map is cheaper, to genus three; and those that panels are
-#: willing to cover.
+#: Tuning: cycles from which the Fourier time map is cheaper, to genus three; and those that panels
+#: are willing to cover.
 _FOURIER_FROM = 10.0
 _FOURIER_GENUS = 3
 _MOST_CYCLES = 5e4
@@ -36,21 +36,23 @@ _MOST_CYCLES = 5e4
 #: Why an error leaves no digit.
 PHASES_LOST = "phases in double precision are not known better"
 
-#: Rounding in ε: of one evaluation; of a phase; of frequencies and the time map, relative.
+#: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies and the time map,
+#: relative.
 _EVALUATION = 16.0
 _PHASE = 8.0
 _RATE = 4.0
 
-#: Points at which slopes are sampled.
+#: Budget: points at which slopes are sampled.
 _SAMPLES = 48
 
-#: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at once, and by
-#: how much they may be steeper within a panel than in its mean.
+#: Calibrated: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at
+#: once, and by how much they may be steeper within a panel than in its mean.
 _GAUSS = 16
 _BLOCK = 4096
 _STEEPEST = 8.0
 
-#: Step of a difference quotient in a phase, over what the slowest phase takes along a panel.
+#: Derived: step of a difference quotient in a phase, over what the slowest phase takes along a
+#: panel.
 _STEP = 1e-3
 
 

@@ -23,24 +23,24 @@ __all__ = ["OrbitSection", "OrbitSections", "Passage"]
 
 Array = NDArray[np.float64]
 
-#: Cycles of the fastest phase that panels are willing to cover, those up to which they cover the
-#: whole orbit, whatever times are asked for, and panels per cycle to begin with.
+#: Budget: cycles of the fastest phase that panels are willing to cover, those up to which they
+#: cover the whole orbit, whatever times are asked for, and panels per cycle to begin with.
 _MOST_CYCLES = 5e4
 _WHOLE = 200.0
 _PANELS = 2
 
-#: Rounding in ε: of one evaluation; of a phase; of frequencies, τ and t, relative.
+#: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies, τ and t, relative.
 _EVALUATION = 16.0
 _PHASE = 4.0
 _RATE = 4.0
 
-#: Next to a collision the coordinate lines turn like 1/q_i, which is rounded to ε/q_i² of itself:
-#: series end at coefficients of this part of their sizes, all of which are rounded, not the last
-#: alone.
+#: Derived: next to a collision the coordinate lines turn like 1/q_i, which is rounded to ε/q_i² of
+#: itself: series end at coefficients of this part of their sizes, all of which are rounded, not the
+#: last alone.
 _NOISE = 1e-5
 _ROUNDED = 24.0
 
-#: Points per panel at which effects of errors are summed.
+#: Budget: points per panel at which effects of errors are summed.
 _SUMMED = 8
 
 

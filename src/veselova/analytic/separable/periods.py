@@ -25,11 +25,11 @@ __all__ = ["SeparatedPeriods"]
 
 Array = NDArray[np.float64]
 
-#: Nodes to begin with, and where a cut is too near another root.
+#: Budget: nodes to begin with, and where a cut is too near another root.
 _FEWEST_NODES = 16
 _MOST_NODES = 8192
 
-#: A series is complete when its last two coefficients are below this part of the largest.
+#: Derived: a series is complete when its last two coefficients are below this part of the largest.
 _RESOLVED = 1e-15
 
 

@@ -33,16 +33,16 @@ __all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "
 #: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
 _InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
-#: Branch points nearer than 10 to minus this part of the largest count as one, where doubles are to
-#: hold their differences, and squares of roots of them.
+#: Derived: branch points nearer than 10 to minus this part of the largest count as one, where
+#: doubles are to hold their differences, and squares of roots of them.
 COINCIDE = 290
 
-#: Digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns it by
-#: 1e-16) for the sums themselves.
+#: Derived: digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns
+#: it by 1e-16) for the sums themselves.
 _SPARE = 12
 
-#: Sums can cancel to the square of the smallest coordinate: digits go to this many times what the
-#: widths ask for.
+#: Derived: sums can cancel to the square of the smallest coordinate: digits go to this many times
+#: what the widths ask for.
 _MOST_ROUNDS = 4
 
 

@@ -20,21 +20,21 @@ from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
 __all__ = ["enclose_spectrum", "resting_spheroconic", "spheroconic"]
 
-#: Digits of the balls against those in which the zeros were found: differences of nearby zeros and
-#: poles enter what follows.
+#: Derived: digits of the balls against those in which the zeros were found: differences of nearby
+#: zeros and poles enter what follows.
 _FINER = 2
 
-#: Digits of zeros found in double precision.
+#: Derived: digits of zeros found in double precision.
 _DOUBLE_DIGITS = 12
 
-#: How much more than perturbation theory the balls may leave open.
+#: Calibrated: how much more than perturbation theory the balls may leave open.
 _ROOM = 16
 
-#: Newton's steps from the zeros found to those digits.
+#: Derived: Newton's steps from the zeros found to those digits.
 _STEPS = 2
 
-#: A zero is looked for within this many times what its value leaves open, then within so many times
-#: that, so often.
+#: Tuning: a zero is looked for within this many times what its value leaves open, then within so
+#: many times that, so often.
 _FIRST_REACH = 4
 _WIDER = 1000
 _WIDENINGS = 5

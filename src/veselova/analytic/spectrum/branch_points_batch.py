@@ -20,7 +20,7 @@ __all__ = ["Spectra"]
 
 Array = NDArray[np.float64]
 
-#: How far 1 − Σ x_s²/λ_s may be from zero, which it is where c_1 = 0.
+#: Derived: how far 1 − Σ x_s²/λ_s may be from zero, which it is where c_1 = 0.
 _CONTRADICTION = 1e-18
 
 

@@ -146,8 +146,8 @@ class Moving:
         """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇|
         where it is smaller than that.
 
-        Where q̇ is Neumann's q' it is scaled in place of q_i: alone on its axis, q is a unit vector
-        whatever its scale.
+        Alone on its axis, q is a unit vector whatever its scale. There a component of q̇ is scaled
+        in its place, and all of q̇ where it is Neumann's q'.
         """
         q_squared = list(self.q_squared)
         qv = list(self.qv)
@@ -159,6 +159,11 @@ class Moving:
             if self.time == "tau1":
                 v_scaled = tuple(v * (1 + distance) ** 2 for v in self.v_squared)
                 return replace(self, v_squared=v_scaled, qv=tuple(x * (1 + distance) for x in qv))
+            if not any(x for i, x in enumerate(q_squared) if i != axis):
+                other = next(i for i in range(self.size) if i != axis)
+                v_one = [*self.v_squared]
+                v_one[other] *= (1 + distance) ** 2
+                return replace(self, v_squared=tuple(v_one))
             q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
         else:
             s = distance / _near_root(sum(self.v_squared, Fraction()))

@@ -22,30 +22,33 @@ __all__ = ["TooFewDigits", "zeros_between_poles", "zeros_of_many"]
 
 Array = NDArray[np.float64]
 
-#: Newton's method doubles the digits; where it leaves the bracket, that is halved in the logarithm.
+#: Derived: Newton's method doubles the digits; where it leaves the bracket, that is halved in the
+#: logarithm.
 _MOST_STEPS = 300
 
 #: Where a bracket still begins at zero, its logarithm is halved down to this part of its end.
 _LEAST_PART = Decimal("1e-30")
 
-#: A bracket over more than this is not one in which Newton's method converges quadratically.
+#: Derived: a bracket over more than this is not one in which Newton's method converges
+#: quadratically.
 _WIDE_BRACKET = 1000
 
 #: Newton's method that changes less than this part of the distance converges, however wide the
 #: bracket.
 _CONVERGING = Decimal("1e-3")
 
-#: Iterations settle at this relative change, or at so many roundings; from there every plain Newton
-#: step doubles the digits.
+#: Derived: iterations settle at this relative change, or at so many roundings; from there every
+#: plain Newton step doubles the digits.
 _CONVERGED = Decimal("1e-300")
 _SETTLED_DIGITS = 300
 _ROUNDINGS = 4
 
-#: Steps in doubles for many functions at once; one that has not settled by then goes its own way.
+#: Budget: steps in doubles for many functions at once; one that has not settled by then goes its
+#: own way.
 _FEW_STEPS = 40
 
-#: Steps with twice the digits: from eight digits to sixteen to all, and one that shows that they
-#: are.
+#: Derived: steps with twice the digits: from eight digits to sixteen to all, and one that shows
+#: that they are.
 _FINE_STEPS = 3
 _FINE_SETTLED = 1e-25
 

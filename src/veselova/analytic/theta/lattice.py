@@ -53,17 +53,17 @@ Families: TypeAlias = Mapping[Halves, Mapping[Halves, list[Member]]]
 #: are left out.
 RADIUS = math.sqrt(39.0 / math.pi)
 
-#: Least eigenvalue of S for waves: there θ(z)/θ(0) stays above ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| =
-#: 0.42^|F|.
+#: Derived: least eigenvalue of S for waves: there θ(z)/θ(0) stays above
+#: ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| = 0.42^|F|.
 _WAVE_FLOOR = 0.5
 
-#: A Gaussian, and a wave with its cosine and sine, cost this many terms; functions with the same
-#: shifts share them.
+#: Tuning: a Gaussian, and a wave with its cosine and sine, cost this many terms; functions with the
+#: same shifts share them.
 _BELL = 8.0
 _WAVE = 25.0
 
-#: A vector is shortened where the multiple of another that does it differs from ½ by more than
-#: rounding.
+#: Derived: a vector is shortened where the multiple of another that does it differs from ½ by more
+#: than rounding.
 _HALF = 0.5 + 1e-9
 
 

@@ -42,17 +42,17 @@ __all__ = ["Theta"]
 
 Array = NDArray[np.float64]
 
-#: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a hundred
-#: times slower.
+#: Derived: e^−630 = 1e-274: smaller Gaussians are zero, since products with subnormal numbers are a
+#: hundred times slower.
 _VANISHING = -630.0
 
 #: i^m.
 _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
-#: Entries of one block of (points × lattice): temporaries that stay in the cache.
+#: Budget: entries of one block of (points × lattice): temporaries that stay in the cache.
 _BLOCK = 100_000
 
-#: Classes ε_F that are few enough for all of them to be found when the first is asked for.
+#: Tuning: classes ε_F that are few enough for all of them to be found when the first is asked for.
 _FEW_CLASSES = 8
 
 

@@ -32,11 +32,11 @@ __all__ = ["ThetaInBalls"]
 
 Array = NDArray[np.float64]
 
-#: Terms below e^(−nats−4) of the largest are left out: as many as there are near the edge add less
-#: than the precision.
+#: Derived: terms below e^(−nats−4) of the largest are left out: as many as there are near the edge
+#: add less than the precision.
 _BEYOND_PRECISION = 4.0
 
-#: Most terms of one sum: a second for each point.
+#: Budget: most terms of one sum: a second for each point.
 _MOST_TERMS = 300_000
 
 

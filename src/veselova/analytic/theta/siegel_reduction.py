@@ -31,13 +31,13 @@ Wide = NDArray[np.clongdouble]
 WideReal = NDArray[np.longdouble]
 Integers = NDArray[np.int64]
 
-#: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that rounding
-#: does not go to and fro.
+#: Derived: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that
+#: rounding does not go to and fro.
 _LOVASZ = 0.99
 _INSIDE = 1 - 1e-9
 
-#: Each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by matrices of
-#: doubles.
+#: Derived: each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by
+#: matrices of doubles.
 _MOST_STEPS = 2000
 
 

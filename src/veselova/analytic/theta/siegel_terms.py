@@ -26,8 +26,8 @@ _EPSILON = float(np.finfo(float).eps)
 #: Rounding of a long double over that of a double.
 WIDE_RATIO = float(np.finfo(np.longdouble).eps / np.finfo(float).eps)
 
-#: Rounding of a term in ε: that of its factors, and that of their exponents for each unit of
-#: these. Largest seen over random τ: a quarter of both together.
+#: Calibrated: rounding of a term in ε: that of its factors, and that of their exponents for each
+#: unit of these. Largest seen over random τ: a quarter of both together.
 _FACTOR_ROUNDING = 4.0
 _EXPONENT_ROUNDING = 1.0
 

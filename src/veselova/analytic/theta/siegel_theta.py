@@ -38,13 +38,13 @@ _PI = np.longdouble("3.14159265358979323846264338327950288")
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Largest exponent of W up to which W and powers are multiplied: 2^±1022 = e^±708.
+#: Derived: largest exponent of W up to which W and powers are multiplied: 2^±1022 = e^±708.
 _LARGEST_EXPONENT = 200.0
 
-#: Im τ' from which exponents leave the range of a double.
+#: Derived: im τ' from which exponents leave the range of a double.
 _LARGEST_TAU = 1e200
 
-#: Entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
+#: Budget: entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
 _BLOCK = 50_000
 _MOST_TERMS = 100_000_000
 

@@ -29,11 +29,11 @@ __all__ = ["ThetaQuotients"]
 
 Array = NDArray[np.float64]
 
-#: Terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
+#: Budget: terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
 _MOST_TERMS = 2.5e8
 _LARGEST_GENUS = 18
 
-#: Orders of branch points of which the characteristics are kept.
+#: Budget: orders of branch points of which the characteristics are kept.
 _MOST_KEPT = 64
 
 

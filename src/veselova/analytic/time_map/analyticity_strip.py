@@ -31,9 +31,9 @@ from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 
 __all__ = ["Orbit"]
 
-#: By the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what makes up
-#: for the rounding of the half width to a double; and by how much d(time)/dτ₁ may be above its real
-#: maximum.
+#: Derived: by the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what
+#: makes up for the rounding of the half width to a double; and by how much d(time)/dτ₁ may be above
+#: its real maximum.
 _LARGEST_TURN = {"t": 0.4142, "s": 0.2247}
 _ABOVE_REAL = {"t": math.sqrt(2), "s": 2.0}
 

@@ -13,15 +13,15 @@ __all__ = ["TAIL", "Panels", "are_settled"]
 
 Array = NDArray[np.float64]
 
-#: A series whose last coefficients fall below this part of its size is resolved; what it leaves out
-#: counts as no less.
+#: Calibrated: a series whose last coefficients fall below this part of its size is resolved; what
+#: it leaves out counts as no less.
 TAIL = 4e-15
 
-#: Last coefficients that have not fallen to this part of what they were on a longer panel are
-#: rounding, if they are small.
+#: Calibrated: last coefficients that have not fallen to this part of what they were on a longer
+#: panel are rounding, if they are small.
 _STALLED = 0.25
 
-#: A Newton step of this size, in half panels, leaves an error of its square.
+#: Derived: a Newton step of this size, in half panels, leaves an error of its square.
 _CONVERGED = 1e-9
 
 

@@ -55,7 +55,7 @@ _LAST_RESORT_GENUS = 5
 _BODY = 2.34 * 36 / math.pi
 _COUNTED_GENUS = 5
 
-#: Modes of a time map that nobody takes: e to this, and no more are counted.
+#: Derived: modes of a time map that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
 
 #: Tuning: modes that take as long as what a Fourier time map begins with, at its set-up and at

@@ -48,7 +48,7 @@ _IN_BALLS = 10.0
 #: Tuning: seconds of a time, whatever the modes.
 _TIME = 1e-4
 
-#: Largest genus of the formulas: higher ones cost as much.
+#: Tuning: largest genus of the formulas: higher ones cost as much.
 _HIGHEST_GENUS = 4
 
 

@@ -46,32 +46,32 @@ Array = NDArray[np.float64]
 
 T = TypeVar("T")
 
-#: Modes below this part of F_0 are left out: there the determinants are rounding.
+#: Derived: modes below this part of F_0 are left out: there the determinants are rounding.
 SMALLEST_MODE = 4e-16
 
 #: Rounding of a column of a determinant, for a unit of its weights and of its angles, that is
 #: hardly ever exceeded.
 COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: Radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
+#: Tuning: radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
 _SPARE_PACE = 16
 
-#: Modes that bring the inverse time map near its answer before all of them are summed: the fewest,
-#: and their part.
+#: Tuning: modes that bring the inverse time map near its answer before all of them are summed: the
+#: fewest, and their part.
 _FIRST_MODES = 64
 _FIRST_PART = 1 / 16
 
-#: Smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
+#: Tuning: smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
 _LEAST_SLOPE = 0.05
 
-#: Cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
+#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
 _SLOW = 4.0
 
-#: Entries of one block of (times × modes): temporaries that stay in the cache.
+#: Budget: entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
 
-#: Cycles that the last step of the inverse time map may leave open; and a step that leaves so much
-#: where no slope is known to be the least, and the error is of the order of its square.
+#: Derived: cycles that the last step of the inverse time map may leave open; and a step that leaves
+#: so much where no slope is known to be the least, and the error is of the order of its square.
 _OPEN = 1e-17
 _CONVERGED = 1e-9
 

@@ -21,20 +21,20 @@ from veselova.analytic.time_map.fourier_modes import find_significant_modes
 
 __all__ = ["MOST_MODES", "FourierTimeMapInBalls"]
 
-#: Modes looked at before giving up: minutes.
+#: Budget: modes looked at before giving up: minutes.
 MOST_MODES = 200_000
 
-#: A step of Newton's method in double precision, in cycles, that leaves the rounding of a double;
-#: and waves in memory at once.
+#: Derived: a step of Newton's method in double precision, in cycles, that leaves the rounding of a
+#: double; and waves in memory at once.
 _CONVERGED = 1e-7
 _BLOCK = 2_000_000
 
-#: Digits of modes, and of slopes, beyond those of a step.
+#: Derived: digits of modes, and of slopes, beyond those of a step.
 _MODE_DIGITS = 2
 _SLOPE_DIGITS = 2
 
-#: What the modes left out add up to, in units of the smallest kept for 1/(m·f) or for the time
-#: elapsed, those kept and those next to them: others fall off as fast as they came.
+#: Calibrated: what the modes left out add up to, in units of the smallest kept for 1/(m·f) or for
+#: the time elapsed, those kept and those next to them: others fall off as fast as they came.
 _TAIL = 4
 
 

@@ -19,7 +19,7 @@ __all__ = ["Integers", "TorusSeries", "find_significant_modes"]
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Modes looked at before giving up.
+#: Budget: modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
 

@@ -21,7 +21,7 @@ from veselova.analytic.time_map.rate import TimeRate
 
 __all__ = ["extended_precision_flows"]
 
-#: Digits that balls may lose on the way to the frequencies.
+#: Derived: digits that balls may lose on the way to the frequencies.
 _SPARE = 6
 
 

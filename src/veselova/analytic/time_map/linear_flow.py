@@ -17,10 +17,10 @@ __all__ = ["LinearFlow"]
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Bits of the largest rate that products with the orders of modes leave exact.
+#: Derived: bits of the largest rate that products with the orders of modes leave exact.
 _COARSE_BITS = 30
 
-#: What a combination that stands still moves by.
+#: Derived: what a combination that stands still moves by.
 _STANDING = 1e-60
 
 

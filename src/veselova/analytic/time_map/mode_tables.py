@@ -25,23 +25,23 @@ __all__ = ["ModeTables", "TimeMaps", "form_tables", "fourier_coefficients", "ord
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Largest |m_k| of the first steps towards τ₁.
+#: Tuning: largest |m_k| of the first steps towards τ₁.
 _COARSE = 3
 
-#: Cycles of the fastest phase of which a last step of Newton's method leaves its square.
+#: Derived: cycles of the fastest phase of which a last step of Newton's method leaves its square.
 _CONVERGED = 1e-10
 
-#: Slowest pace of a mode that is divided by.
+#: Derived: slowest pace of a mode that is divided by.
 _STANDING = 1e-300
 
-#: Steps before a torus is left to others: four to six are usual.
+#: Budget: steps before a torus is left to others: four to six are usual.
 _MOST_STEPS = 30
 
-#: Smallest dt/dτ₁, as a part of its mean, that the first step divides by.
+#: Tuning: smallest dt/dτ₁, as a part of its mean, that the first step divides by.
 _LEAST_SLOPE = 0.05
 
-#: Cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start: beyond,
-#: m·z has to be a phase of its own, as analytic.time_map.fourier has it.
+#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start:
+#: beyond, m·z has to be a phase of its own, as analytic.time_map.fourier has it.
 _SLOW = 4.0
 
 

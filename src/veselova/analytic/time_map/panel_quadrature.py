@@ -20,34 +20,34 @@ __all__ = ["integrate_between", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
-#: Points per panel, of a short stretch and of a long one.
+#: Tuning: points per panel, of a short stretch and of a long one.
 _FEW_NODES = 24
 _NODES = 48
 
-#: Panels beyond an end, as ends come from means; none beyond one so near that going on, where it is
-#: short, costs little.
+#: Tuning: panels beyond an end, as ends come from means; none beyond one so near that going on,
+#: where it is short, costs little.
 _MARGIN = 2
 _NEAR = 4
 
-#: Panels of few nodes from which it pays to look for longer ones; lengths of these in those, and
-#: how many are looked at.
+#: Tuning: panels of few nodes from which it pays to look for longer ones; lengths of these in
+#: those, and how many are looked at.
 _MANY_PANELS = 200
 _LONGER = (7, 6, 5, 4, 3.5, 3, 2.5)
 _PROBED = 8
 
-#: Last coefficients below this part of the first may be rounding of the phases.
+#: Calibrated: last coefficients below this part of the first may be rounding of the phases.
 _NOISE_TAIL = 1e-11
 
-#: Halvings of a panel before giving up: a jump, where a weak wall throws the point back, then
-#: counts for less than the rounding of the integral.
+#: Derived: halvings of a panel before giving up: a jump, where a weak wall throws the point back,
+#: then counts for less than the rounding of the integral.
 _MOST_HALVINGS = 56
 
-#: Panels that may be halved at once, beyond some times those to begin with: a jump halves two each
-#: time, and values without a digit halve all.
+#: Budget: panels that may be halved at once, beyond some times those to begin with: a jump halves
+#: two each time, and values without a digit halve all.
 _MOST_HALVED = 2000
 _MOST_HALVED_AGAIN = 8
 
-#: Nodes evaluated at once.
+#: Budget: nodes evaluated at once.
 _BLOCK = 4096
 
 

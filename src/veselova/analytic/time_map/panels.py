@@ -26,8 +26,8 @@ _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 #: matter.
 _TURN = 3 * np.pi
 
-#: Cycles over which all other parts average out, and the highest order at which some are looked
-#: for.
+#: Tuning: cycles over which all other parts average out, and the highest order at which some are
+#: looked for.
 _AVERAGED = 16.0
 _HIGHEST = 8
 

@@ -30,38 +30,39 @@ from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["ChebyshevTimeMapInBalls", "estimate_nodes"]
 
-#: Half length of a panel in half widths of the strip: longer ones take hardly fewer nodes for a
-#: length.
+#: Tuning: half length of a panel in half widths of the strip: longer ones take hardly fewer nodes
+#: for a length.
 _PANEL_IN_STRIPS = 3.0
 
-#: Half length of a panel in cycles of the fastest phase, where truncation is judged by the
+#: Tuning: half length of a panel in cycles of the fastest phase, where truncation is judged by the
 #: coefficients themselves; at most so many half widths of the strip.
 _PANEL_IN_CYCLES = 1.0
 _LONGEST_IN_STRIPS = 8.0
 
-#: Nodes per cycle and digit.
+#: Tuning: nodes per cycle and digit.
 _NODES_PER_DIGIT = 2.6
 
-#: Nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the rest.
+#: Budget: nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the
+#: rest.
 _MOST_NODES = 1_000_000
 _BLOCK = 5000
 
-#: Panels looked at to see how fast series fall.
+#: Budget: panels looked at to see how fast series fall.
 _SAMPLED_PANELS = 200
 
-#: Terms beyond those that the digits of a step ask for.
+#: Derived: terms beyond those that the digits of a step ask for.
 _EXTRA_TERMS = 6
 
-#: Panels end a little beyond the last time, by a part of it and by cycles of the fastest phase: the
-#: end comes from a time map in doubles, which has a relative and an absolute error.
+#: Derived: panels end a little beyond the last time, by a part of it and by cycles of the fastest
+#: phase: the end comes from a time map in doubles, which has a relative and an absolute error.
 _BEYOND = 1 + 1e-9
 _CYCLES_BEYOND = 1e-12
 
-#: By how much panels are made longer where they end before the last time, at the least.
+#: Tuning: by how much panels are made longer where they end before the last time, at the least.
 _LONGER = 1.25
 
-#: A root in double precision is taken where its residual is below this, in half lengths of the
-#: panel.
+#: Derived: a root in double precision is taken where its residual is below this, in half lengths of
+#: the panel.
 _NEAR = 1e-6
 
 

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 P = TypeVar("P", bound=AngleSeries)
 
-#: d(time)/dτ₁ is a constant times this power of √(q,Aq).
+#: Derived: d(time)/dτ₁ is a constant times this power of √(q,Aq).
 TIME_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 

@@ -39,13 +39,13 @@ __all__ = ["NormalComponent", "SeriesComponent", "SeriesIntegral", "find_series"
 
 Array = NDArray[np.float64]
 
-#: Coefficients below this are left out; those functions are at most one.
+#: Derived: coefficients below this are left out; those functions are at most one.
 _SMALLEST = 1e-17
 
-#: Roundings of a sum over modes, for a unit of their amplitudes.
+#: Calibrated: roundings of a sum over modes, for a unit of their amplitudes.
 _SUM_ROUNDING = 4.0
 
-#: Entries of one block of (times × modes).
+#: Budget: entries of one block of (times × modes).
 _BLOCK = 400_000
 
 
