@@ -77,7 +77,7 @@ def _widget() -> Any:
         install = install_extra("notebook")
         raise BackendMissing("anywidget", "a motion in a notebook", install) from None
 
-    class MotionWidget(anywidget.AnyWidget):  # type: ignore[misc]
+    class MotionWidget(anywidget.AnyWidget):
         """A motion that plays; ``t``, ``speed`` and ``playing`` follow the page, and it them."""
 
         _esm = FRONT
