@@ -42,6 +42,10 @@ __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
 
+#: Derived: what a mode that stands still may move τ₁ by: multiples of it, and its inverse, are
+#: doubles.
+_FARTHEST = 1e250
+
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
 
@@ -190,6 +194,7 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
         / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate)
         * solution.sensitivity.along_flow
     )
+    reach = np.minimum(reach, _FARTHEST)
     effects = np.abs(coefficients) * reach
     order = np.argsort(-effects)
     left_out = np.cumsum(effects[order][::-1])[::-1]
