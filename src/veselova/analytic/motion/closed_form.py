@@ -150,6 +150,22 @@ def _attitude(solution: Solution) -> dict[str, Any]:
     }
 
 
+def _without_standing_modes(frequencies: Array) -> Array:
+    """Return the frequencies, one of them moved by a rounding where a low combination of them is
+    exactly zero: evaluators divide by it.
+    """
+    g = len(frequencies)
+    if g > 3:
+        return frequencies
+    orders = np.stack(np.meshgrid(*[np.arange(-40, 41)] * g, indexing="ij"), axis=-1)
+    orders = orders.reshape(-1, g)
+    orders = orders[orders.any(axis=1)]
+    moved = frequencies.copy()
+    while not (orders @ moved).all():
+        moved[0] = np.nextafter(moved[0], np.inf)
+    return moved
+
+
 def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
     unit = solution.tau1_unit
@@ -158,7 +174,7 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
         "phases": solution.in_tau1.start.tolist(),
-        "frequencies": (solution.in_tau1.rates / unit).tolist(),
+        "frequencies": _without_standing_modes(solution.in_tau1.rates / unit).tolist(),
         "mean_rate": solution.mean_rate / unit,
         "modes": modes.tolist(),
         "coefficients": coefficients,
