@@ -42,9 +42,8 @@ __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
 
-#: Derived: what a mode that stands still may move τ₁ by: multiples of it, and its inverse, are
-#: doubles.
-_FARTHEST = 1e250
+#: Derived: Σ|m_k f_k| in roundings below which m·f counts as zero.
+_STANDING = 4.0
 
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
@@ -170,12 +169,12 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
     unit = solution.tau1_unit
     time = solution.problem.time
-    modes, coefficients = _modes(solution, accuracy)
+    modes, coefficients, standing = _modes(solution, accuracy)
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
         "phases": solution.in_tau1.start.tolist(),
         "frequencies": _without_standing_modes(solution.in_tau1.rates / unit).tolist(),
-        "mean_rate": solution.mean_rate / unit,
+        "mean_rate": (solution.mean_rate + standing) / unit,
         "modes": modes.tolist(),
         "coefficients": coefficients,
         "rate": {
@@ -191,9 +190,10 @@ def _units(time: str) -> dict[str, str]:
     return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
-def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
-    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
-    problem's τ₁.
+def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float], float]:
+    """Return the modes m (M, g) that the accuracy asks for, largest first, F_m per unit of the
+    problem's τ₁, and what modes that stand still to rounding add to F_0: at a resonance dt/dτ₁ has
+    another mean on the orbit than on the torus.
 
     A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow
     times that. The smallest are left out as long as their sum is below the accuracy. Coefficients
@@ -201,16 +201,16 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
-        return np.empty((0, g), dtype=np.int64), []
+        return np.empty((0, g), dtype=np.int64), [], 0.0
     solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
     modes, coefficients, *_ = find_modes(solution.rate)
-    pace = np.abs(modes @ solution.in_tau1.rates)
-    reach = (
-        2
-        / (np.pi * np.maximum(pace, np.finfo(float).tiny) * solution.mean_rate)
-        * solution.sensitivity.along_flow
-    )
-    reach = np.minimum(reach, _FARTHEST)
+    rates = solution.in_tau1.rates
+    pace = np.abs(modes @ rates)
+    still = pace <= _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(rates))
+    turns = modes[still] @ solution.in_tau1.start
+    standing = float(np.sum(2 * coefficients[still] * np.cos(2 * np.pi * turns)))
+    modes, coefficients, pace = modes[~still], coefficients[~still], pace[~still]
+    reach = 2 / (np.pi * pace * solution.mean_rate) * solution.sensitivity.along_flow
     effects = np.abs(coefficients) * reach
     order = np.argsort(-effects)
     left_out = np.cumsum(effects[order][::-1])[::-1]
@@ -229,9 +229,8 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     )
     values = coefficients[selected] / solution.tau1_unit
     places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
-    return modes[selected], [
-        round(float(value), place) for value, place in zip(values, places, strict=True)
-    ]
+    rounded = [round(float(value), place) for value, place in zip(values, places, strict=True)]
+    return modes[selected], rounded, standing
 
 
 def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, Any]:
