@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -60,10 +61,14 @@ def assert_same_output(shown: str, printed: str) -> None:
             assert new == pytest.approx(old, rel=1e-5)
 
 
+#: A block of Python or of curl, and the output that is shown below it.
+SHOWN = r"^```(python|sh)\n(.*?)^```(?:\n\n```(?:text|json)\n(.*?)^```)?"
+
+
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "```python" in (ROOT / page).read_text()]
 )
-def test_the_python_of_the_pages_runs_and_prints_what_they_show(
+def test_the_code_of_the_pages_runs_and_prints_what_they_show(
     page: str,
     server: Server,
     tmp_path: Path,
@@ -75,13 +80,47 @@ def test_the_python_of_the_pages_runs_and_prints_what_they_show(
     text = (ROOT / page).read_text()
     require_bundle("".join(blocks(text, "python")))
     scope: dict[str, Any] = {"__name__": "__main__"}
-    for source, shown in re.findall(
-        r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?", text, re.MULTILINE | re.DOTALL
-    ):
-        exec(source.replace("http://127.0.0.1:8000", server.url), scope)
-        printed = capsys.readouterr().out
+    for language, source, shown in re.findall(SHOWN, text, re.MULTILINE | re.DOTALL):
+        source = source.replace("http://127.0.0.1:8000", server.url)
+        if language == "python":
+            exec(source, scope)
+            printed = capsys.readouterr().out
+        elif shown:
+            printed = output_of(["bash", "-c", source])
         if shown:
             assert_same_output(shown, printed)
+
+
+def output_of(command: list[str]) -> str:
+    """Return what a command prints; it has to succeed."""
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
+
+
+#: Language → the interpreter, its arguments, and what loads the packages that the page names.
+LANGUAGES = {
+    "js": (["node", "--input-type=module", "-e"], "0"),
+    "r": (["Rscript", "-e"], "library(httr2); library(jsonlite)"),
+    "julia": (["julia", "-e"], "using HTTP, JSON"),
+}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_clients_in_other_languages_print_what_the_page_shows(
+    language: str, server: Server
+) -> None:
+    command, packages = LANGUAGES[language]
+    if shutil.which(command[0]) is None:
+        pytest.skip(f"needs {command[0]} in PATH")
+    if subprocess.run([*command, packages], capture_output=True, timeout=PATIENCE).returncode:
+        pytest.skip(f"needs the packages of {language} that the page names")
+    page = (ROOT / "docs" / "how-to" / "clients.md").read_text()
+    ((source, shown),) = re.findall(
+        rf"^```{language}\n(.*?)^```\n\n```text\n(.*?)^```", page, re.MULTILINE | re.DOTALL
+    )
+    source = source.replace("http://127.0.0.1:8000", server.url)
+    assert_same_output(shown, output_of([*command, source]))
 
 
 COMMANDS = [
