@@ -47,7 +47,7 @@ int main(int argc, char **argv) {
       FOR(j, M + O) {
         double p = 0, w = j < M ? 0 : 2 * PI * turn, c = j < M ? F[j] : oF[j - M];
         FOR(s, g) { double o = j < M ? m[j * g + s] : om[(j - M) * g + s] / 2; p += PI * o * f[s], w += 2 * PI * o * z0[s]; }
-        time += 2 * c / p * cos(w + p * x) * sin(p * x); slope += 2 * c * cos(w + 2 * p * x);
+        time += 2 * c * cos(w + p * x) * (p * x == 0 ? x : sin(p * x) / p); slope += 2 * c * cos(w + 2 * p * x);
       } step = (time - t[i]) / slope; }
     FOR(s, g) z[s] = z0[s] + f[s] * x;
     FOR(j, K / (2 * g)) th[j] = theta(g, T, c + 2 * g * j, z);

@@ -26,7 +26,7 @@ end
 function time(d, tau)
     pace, turn = π .* (d.modes * d.f), 2π .* (d.modes * d.z0 .+ d.turns)
     h = pace .* tau
-    d.mean * tau + sum(2 .* d.F ./ pace .* cos.(turn .+ h) .* sin.(h)), d.mean + sum(2 .* d.F .* cos.(turn .+ 2 .* h))
+    d.mean * tau + sum(2 .* d.F .* cos.(turn .+ h) .* tau .* sinc.(h ./ π)), d.mean + sum(2 .* d.F .* cos.(turn .+ 2 .* h))
 end
 function frame(d, t)
     tau = t / d.mean

@@ -37,7 +37,7 @@ function frame(document, terms, t) { // rows of [e_1 … e_n]
     let time = mean * tau, slope = mean;
     pace.forEach((p, j) => {
       const h = p * tau;
-      time += ((2 * F[j]) / p) * cos(turn[j] + h) * sin(h);
+      time += 2 * F[j] * cos(turn[j] + h) * (h === 0 ? tau : sin(h) / p);
       slope += 2 * F[j] * cos(turn[j] + 2 * h);
     });
     step = (time - t) / slope;

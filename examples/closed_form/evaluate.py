@@ -47,7 +47,7 @@ def frame(document, t):
     tau = t / mean
     for _ in range(100):  # Newton's method for t(tau) = t
         h = pace * tau
-        time = mean * tau + np.sum(2 * F / pace * np.cos(turn + h) * np.sin(h))
+        time = mean * tau + np.sum(2 * F * np.cos(turn + h) * tau * np.sinc(h / np.pi))
         step = (time - t) / (mean + np.sum(2 * F * np.cos(turn + 2 * h)))
         tau -= step
         if abs(step) < 1e-15 * max(1, abs(tau)):

@@ -150,7 +150,63 @@ def test_the_explicit_formulas_have_half_integer_modes_with_an_area_constant() -
         values = dict(zip(names, z, strict=True))
         v = [float(formulas[f"q_{i}"].subs(values)) for i in (1, 2, 3)]
         attitude = np.array(solution.document["area"]["attitude"])
-        assert (solution.at([time]).frame[0] @ attitude.T)[:, 0] == pytest.approx(v, abs=1e-12)
+        directions = np.array(solution.document["directions"])
+        principal = directions.T @ solution.at([time]).frame[0] @ attitude.T
+        assert principal[:, 0] == pytest.approx(v, abs=1e-12)
+
+
+#: The rotation number is 3/2 to the last digit, and 3:4 for the ball.
+RESONANT = vs.Veselova(
+    ["3", "2", "1"],
+    ["0.2904864139762759", "0.8674450580193938", "0.4039266203321272"],
+    ["1.0045500492021733", "-0.15371043620197616", "-0.39233062448995715"],
+    normalize=True,
+)
+DRIFTING = vs.RubberBall(
+    ["0.8", "1.2", "2.1"],
+    "0.3",
+    "0.5",
+    ["0.3635365676813111", "0.8642994867575062", "0.3476025908263671"],
+    ["0.5539945786260123", "-0.500559004251878", "0.6652298024858441"],
+    strict=False,
+    normalize=True,
+)
+
+
+@pytest.mark.parametrize(("problem", "digits"), [(RESONANT, 15), (RESONANT, 30), (DRIFTING, 15)])
+def test_documents_of_resonant_motions_are_the_motion(problem: Any, digits: int) -> None:
+    times = [0.0, 1.0, 20.0, -1e3, 1e4]
+    found, wanted = vs.closed_form(problem, digits=digits).at(times), vs.solve(problem, times)
+    difference = np.max(np.abs(found.frame.astype(float) - wanted.frame), axis=(1, 2))
+    assert (difference <= np.asarray(found.error, dtype=float) + wanted.error).all()
+    if problem is DRIFTING:
+        off = np.max(np.abs(found.position - wanted.position), axis=1)
+        assert (off <= found.error + wanted.error).all()
+
+
+def standing(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document whose first two modes stand still, and whose others are fewer."""
+    one, two = [1.5, 1.0]
+    modes = [[2, -3], [-4, 6], [1, 1]]
+    return document | {
+        "frequencies": [one, two],
+        "modes": modes,
+        "coefficients": [0.02, 0.01, 0.03],
+        "mean_rate": 0.7,
+    }
+
+
+def test_a_mode_that_stands_still_moves_time_in_proportion() -> None:
+    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
+    beside = document | {"frequencies": [1.5, 1.0 + 1e-13]}
+    times = np.array([0.5, 3.0, 40.0])
+    here = vs.ClosedForm.from_json(json.dumps(document)).at(times)
+    near = vs.ClosedForm.from_json(json.dumps(beside)).at(times)
+    assert np.max(np.abs(here.frame - near.frame)) < 2e-9
+    sympy = pytest.importorskip("sympy")
+    time = vs.ClosedForm.from_json(json.dumps(document)).to_sympy()["time"]
+    shown = [float(time.subs({sympy.Symbol("tau_1", real=True): x})) for x in here.tau1]
+    assert shown == pytest.approx(times.tolist(), abs=1e-12)
 
 
 def test_latex_has_every_entry_of_the_frame() -> None:
@@ -161,27 +217,42 @@ def test_latex_has_every_entry_of_the_frame() -> None:
     assert text.count("{") == text.count("}")
 
 
-@pytest.mark.parametrize("name", ["body3", "body4", "chaplygin"])
-@pytest.mark.parametrize("language", ["python", "node", "cc"])
-def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path: Path) -> None:
-    files = [str(EXAMPLES / f"{name}.json"), str(EXAMPLES / f"{name}.values.json")]
+def deviation(language: str, files: list[Path], folder: Path) -> float:
+    """Return the largest deviation that the evaluator of a language prints; skips without it."""
     command = {
         "python": [sys.executable, str(EXAMPLES / "evaluate.py")],
         "node": ["node", str(EXAMPLES / "evaluate.mjs")],
+        "cc": [str(folder / "evaluate")],
     }
     if language != "python" and shutil.which(language) is None:
         pytest.skip(f"{language} is not installed")
     if language == "cc":
-        program = tmp_path / "evaluate"
-        subprocess.run(
-            ["cc", "-O2", "-o", str(program), str(EXAMPLES / "evaluate.c"), "-lm"], check=True
-        )
-        command["cc"] = [str(program)]
+        source = str(EXAMPLES / "evaluate.c")
+        subprocess.run(["cc", "-O2", "-o", *command["cc"], source, "-lm"], check=True)
     answer = subprocess.run(
-        [*command[language], *files], capture_output=True, text=True, check=True
+        [*command[language], *map(str, files)], capture_output=True, text=True, check=True
     ).stdout
     assert answer.startswith("largest deviation ")
-    assert float(answer.split()[-1]) < 5e-12
+    return float(answer.split()[-1])
+
+
+@pytest.mark.parametrize("name", ["body3", "body4", "chaplygin"])
+@pytest.mark.parametrize("language", ["python", "node", "cc"])
+def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path: Path) -> None:
+    files = [EXAMPLES / f"{name}.json", EXAMPLES / f"{name}.values.json"]
+    assert deviation(language, files, tmp_path) < 5e-12
+
+
+@pytest.mark.parametrize("language", ["python", "node", "cc"])
+def test_evaluators_know_modes_that_stand_still(language: str, tmp_path: Path) -> None:
+    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
+    times = [0.5, 3.0, 40.0]
+    frames = vs.ClosedForm.from_json(json.dumps(document)).at(times).frame
+    values = {"times": times, "frame": frames.tolist()}
+    paths = [tmp_path / "document.json", tmp_path / "values.json"]
+    for path, content in zip(paths, (document, values), strict=True):
+        path.write_text(json.dumps(content))
+    assert deviation(language, paths, tmp_path) < 1e-12
 
 
 def test_the_evaluators_are_short() -> None:

@@ -42,9 +42,6 @@ __all__ = ["closed_form"]
 
 Array = NDArray[np.float64]
 
-#: Derived: Σ|m_k f_k| in roundings below which m·f counts as zero.
-_STANDING = 4.0
-
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
 
@@ -59,6 +56,12 @@ _CYCLES = 100.0
 #: Calibrated: by how much the document's own arithmetic may be off more than the engine's: products
 #: of times and rates are rounded once more.
 _OWN_ROUNDING = 2.0
+
+#: Derived: part of Σ|m_k f_k| below which m·f has lost digits that the error has to tell of.
+_SLOW = 1e-3
+
+#: Budget: cycles of the fastest phase up to which the error of a document in doubles holds.
+_FAR_CYCLES = 1e7
 
 
 def closed_form(
@@ -111,6 +114,10 @@ def closed_form(
     elif isinstance(given, RubberBall):
         parts |= {"path": _path(solution, given, accuracy)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
+    if digits == FEWEST_DIGITS:
+        growth = _growth_of_slow_modes(solution, parts)
+        parts["error"]["per_unit_time"] += growth
+        parts["error"]["per_cycle"] += growth / solution.fastest
     return ClosedForm({**head, **parts, "problem": given.as_dict()})
 
 
@@ -149,32 +156,16 @@ def _attitude(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _without_standing_modes(frequencies: Array) -> Array:
-    """Return the frequencies, one of them moved by a rounding where a low combination of them is
-    exactly zero: evaluators divide by it.
-    """
-    g = len(frequencies)
-    if g > 3:
-        return frequencies
-    orders = np.stack(np.meshgrid(*[np.arange(-40, 41)] * g, indexing="ij"), axis=-1)
-    orders = orders.reshape(-1, g)
-    orders = orders[orders.any(axis=1)]
-    moved = frequencies.copy()
-    while not (orders @ moved).all():
-        moved[0] = np.nextafter(moved[0], np.inf)
-    return moved
-
-
 def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
     unit = solution.tau1_unit
     time = solution.problem.time
-    modes, coefficients, standing = _modes(solution, accuracy)
+    modes, coefficients = _modes(solution, accuracy)
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
         "phases": solution.in_tau1.start.tolist(),
-        "frequencies": _without_standing_modes(solution.in_tau1.rates / unit).tolist(),
-        "mean_rate": (solution.mean_rate + standing) / unit,
+        "frequencies": (solution.in_tau1.rates / unit).tolist(),
+        "mean_rate": solution.mean_rate / unit,
         "modes": modes.tolist(),
         "coefficients": coefficients,
         "rate": {
@@ -190,10 +181,9 @@ def _units(time: str) -> dict[str, str]:
     return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
-def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float], float]:
-    """Return the modes m (M, g) that the accuracy asks for, largest first, F_m per unit of the
-    problem's τ₁, and what modes that stand still to rounding add to F_0: at a resonance dt/dτ₁ has
-    another mean on the orbit than on the torus.
+def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
+    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
+    problem's τ₁.
 
     A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow
     times that. The smallest are left out as long as their sum is below the accuracy. Coefficients
@@ -201,15 +191,12 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
-        return np.empty((0, g), dtype=np.int64), [], 0.0
+        return np.empty((0, g), dtype=np.int64), []
     solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
     modes, coefficients, *_ = find_modes(solution.rate)
     rates = solution.in_tau1.rates
-    pace = np.abs(modes @ rates)
-    still = pace <= _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(rates))
-    turns = modes[still] @ solution.in_tau1.start
-    standing = float(np.sum(2 * coefficients[still] * np.cos(2 * np.pi * turns)))
-    modes, coefficients, pace = modes[~still], coefficients[~still], pace[~still]
+    # at a resonance m·f is zero to rounding
+    pace = np.maximum(np.abs(modes @ rates), np.finfo(float).eps * (np.abs(modes) @ np.abs(rates)))
     reach = 2 / (np.pi * pace * solution.mean_rate) * solution.sensitivity.along_flow
     effects = np.abs(coefficients) * reach
     order = np.argsort(-effects)
@@ -230,7 +217,7 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     values = coefficients[selected] / solution.tau1_unit
     places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
     rounded = [round(float(value), place) for value, place in zip(values, places, strict=True)]
-    return modes[selected], rounded, standing
+    return modes[selected], rounded
 
 
 def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, Any]:
@@ -290,6 +277,38 @@ def _error(solution: Solution, accuracy: float) -> dict[str, float]:
         "per_unit_time": growth / far,
         "per_cycle": growth / _CYCLES,
     }
+
+
+def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
+    """Return by how much the error grows in a unit of time because frequencies are doubles: m·f of
+    a mode that nearly stands, as at a resonance, is off by roundings of each f.
+
+    Over a time τ₁ a mode 2c cos is then off by 2c τ₁ min(τ₁, 1/(πm·f)) of them. The bound is linear
+    up to _FAR_CYCLES.
+    """
+    f = np.array(parts["frequencies"])
+    mean = float(parts["mean_rate"])
+    body = float(solution.sensitivity.along_flow) / solution.tau1_unit
+    longest = _FAR_CYCLES / float(np.max(np.abs(f)))
+
+    def growth(modes: Any, coefficients: list[float]) -> float:
+        orders = np.array(modes, dtype=float).reshape(-1, len(f))
+        sizes = np.abs(orders) @ np.abs(f)
+        pace = np.abs(orders @ f)
+        slow = pace < _SLOW * sizes
+        reaches = np.pi / (np.pi * pace[slow] + 1 / longest)
+        off = 2 * np.finfo(float).eps * sizes[slow] * reaches
+        return float(2 * np.abs(np.array(coefficients)[slow]) @ off) / mean
+
+    size = 1.0
+    of_time = growth(parts["modes"], parts["coefficients"])
+    if "area" in parts:
+        of_time += growth(parts["area"]["odd"]["modes"], parts["area"]["odd"]["coefficients"])
+    found = body * of_time / mean
+    if "path" in parts:
+        size = float(parts["path"]["radius"])
+        found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
+    return max(1.0, size) * found
 
 
 def _error_of_decimals(solution: Solution, accuracy: float, digits: int) -> dict[str, float]:

@@ -31,6 +31,10 @@ _SPARE = 30
 #: Newton's steps from a root in double precision: each doubles its digits.
 _MOST_STEPS = 12
 
+#: A mode is slow where |m·f| is below so much of Σ|m_k f_k|: others lose at most six of the digits
+#: to spare in differences of sines.
+_SLOW = 1e-6
+
 
 class DecimalEvaluator:
     """Evaluates one document with ``digits`` digits after the point.
@@ -122,15 +126,17 @@ class DecimalEvaluator:
             uniform = t / mean
             z = np.array([x % 2 for x in fields["phases"] + uniform * f], dtype=object)
         delta = ctx.mpf(0)
-        if len(self._modes[1]):
+        if len(self._modes[1]) or self._slow_modes:
             near = float(time)
             rest = np.array([float(time - Fraction(near))])
             tau1 = neumann_time(self._document, self._arrays, np.array([near]), rest)
-            delta = self._root(z, ctx.mpf(float(tau1[2][0])))
+            delta = self._root(z, uniform, ctx.mpf(float(tau1[2][0])))
         return uniform + delta, z + delta * f
 
-    def _root(self, z: Objects, delta: Any) -> Any:
-        """Return δ with F_0 δ + Σ F_m/(π m·f) [sin 2πm·(z + δf) − sin 2πm·z⁰] = 0."""
+    def _root(self, z: Objects, uniform: Any, delta: Any) -> Any:
+        """Return δ with F_0 δ + Σ F_m/(π m·f) [sin 2πm·(z + δf) − sin 2πm·z⁰] = 0, and
+        ``uniform`` + δ = τ₁.
+        """
         ctx = self._context
         mean = self._fields["mean_rate"][()]
         doubled, coefficients, _ = self._modes
@@ -140,29 +146,65 @@ class DecimalEvaluator:
         smallest = ctx.mpf(10) ** (5 - ctx.dps)
         for _ in range(_MOST_STEPS):
             cosines, sines = self._sinusoids(z + delta * f)
-            step = (mean * delta + amplitudes @ sines - begin) / (mean + 2 * coefficients @ cosines)
+            slow, slope = self._slow_part(uniform + delta)
+            value = mean * delta + amplitudes @ sines - begin + slow
+            step = value / (mean + 2 * coefficients @ cosines + slope)
             delta = delta - step
             if abs(step) <= smallest * max(1, abs(delta)):
                 return delta
         raise InternalContradiction("Newton's method for the time map does not converge")
 
+    def _slow_part(self, tau1: Any) -> tuple[Any, Any]:
+        """Return what slow modes add to the time and to its slope, each as a product: a difference
+        of sines over a small m·f would lose digits.
+        """
+        ctx = self._context
+        time = slope = ctx.mpf(0)
+        for pace, coefficient, angle in self._slow_modes:
+            h = ctx.pi * pace * tau1
+            time += 2 * coefficient * ctx.cos(angle + h) * tau1 * ctx.sinc(h)
+            slope += 2 * coefficient * ctx.cos(angle + 2 * h)
+        return time, slope
+
+    @cached_property
+    def _slow_modes(self) -> list[tuple[Any, Any, Any]]:
+        """Return m·f, F_m and 2π(m·z⁰ + turn) of the modes that nearly stand, as at a resonance."""
+        doubled, coefficients, turns, slow = self._all_modes
+        halves = doubled[slow].astype(object) / self._context.mpf(2)
+        angles = 2 * self._context.pi * (halves @ self._fields["phases"] + turns[slow])
+        return list(
+            zip(halves @ self._fields["frequencies"], coefficients[slow], angles, strict=True)
+        )
+
     @cached_property
     def _modes(self) -> tuple[NDArray[np.int64], Objects, Objects]:
-        """Return the doubled modes M of the time map, their coefficients, and e^{2πi turn}."""
+        """Return M, F_m and e^{2πi turn} of the other modes."""
+        doubled, coefficients, turns, slow = self._all_modes
+        turn = np.frompyfunc(lambda x: self._context.expjpi(2 * x), 1, 1)
+        return doubled[~slow], coefficients[~slow], np.asarray(turn(turns[~slow]), dtype=object)
+
+    @cached_property
+    def _all_modes(self) -> tuple[NDArray[np.int64], Objects, Objects, NDArray[np.bool_]]:
+        """Return the doubled modes M of the time map, their coefficients, their turns, and which of
+        them are slow.
+        """
         genus = int(self._document["genus"])
-        even = np.array(self._document["modes"], dtype=np.int64).reshape(-1, genus)
+        doubled = 2 * np.array(self._document["modes"], dtype=np.int64).reshape(-1, genus)
         coefficients = self._fields["coefficients"]
-        ones = np.full(len(even), self._context.mpc(1), dtype=object)
-        if "area" not in self._document:
-            return 2 * even, coefficients, ones
-        odd = self._document["area"]["odd"]
-        modes = np.array(odd["modes"], dtype=np.int64).reshape(-1, genus)
-        factor = self._context.expjpi(2 * self._context.mpf(odd["turn"]))
-        return (
-            np.concatenate([2 * even, modes]),
-            np.concatenate([coefficients, self._numbers(odd["coefficients"]).reshape(-1)]),
-            np.concatenate([ones, np.full(len(modes), factor, dtype=object)]),
-        )
+        turns = np.full(len(doubled), self._context.mpf(0), dtype=object)
+        if "area" in self._document:
+            odd = self._document["area"]["odd"]
+            halves = np.array(odd["modes"], dtype=np.int64).reshape(-1, genus)
+            doubled = np.concatenate([doubled, halves])
+            coefficients = np.concatenate(
+                [coefficients, self._numbers(odd["coefficients"]).reshape(-1)]
+            )
+            turn = self._context.mpf(odd["turn"])
+            turns = np.concatenate([turns, np.full(len(halves), turn, dtype=object)])
+        f = self._fields["frequencies"]
+        sizes = np.abs(doubled).astype(object) @ np.abs(f)
+        slow = np.asarray(np.abs(doubled.astype(object) @ f) <= _SLOW * sizes, dtype=bool)
+        return doubled, coefficients, turns, slow
 
     def _sinusoids(self, z: Objects) -> tuple[Objects, Objects]:
         """Return cos 2π(M·z/2 + turn) and sin 2π(M·z/2 + turn) of all modes."""

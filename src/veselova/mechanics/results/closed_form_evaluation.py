@@ -25,6 +25,9 @@ _BLOCK = 400_000
 #: Newton's steps of the inverse time map, each kept inside a bracket that it halves where it must.
 _MOST_STEPS = 200
 
+#: Σ|m_k f_k| in roundings below which m·f counts as zero.
+_STANDING = 4.0
+
 
 def evaluate(
     document: Mapping[str, Any],
@@ -90,20 +93,30 @@ def _integral(
     """Return ∫Σ 2c cos 2π(m·z + turn) dτ₁ from zero, m = M/2.
 
     A mode gives c/(π m·f) [sin 2π(m·z + turn) − sin 2π(m·z⁰ + turn)]. It is made as a product, so
-    that nothing cancels where m·f is small.
+    that nothing cancels where m·f is small; where m·f = 0 it is 2cτ₁ cos 2π(m·z⁰ + turn).
     """
     start = arrays["phases"]
     modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
     pace = np.pi * (modes @ arrays["frequencies"])
-    weights = 2 * np.array(series["coefficients"], dtype=np.float64) / pace
+    weights = 2 * np.array(series["coefficients"], dtype=np.float64)
     offset = 2 * np.pi * (modes @ start + float(series["turn"]))
     found = np.empty(len(z))
     for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
-        h = np.pi * ((z[rows] - start) @ modes.T)
-        near = np.abs(tau1[rows, None] * pace) < 1
-        h = np.where(near, tau1[rows, None] * pace, h)
-        found[rows] = (np.cos(offset + h) * np.sin(h)) @ weights
+        h, reach = _reach(np.pi * ((z[rows] - start) @ modes.T), pace, tau1[rows])
+        found[rows] = (np.cos(offset + h) * reach) @ weights
     return found
+
+
+def _reach(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
+    """Return h = πm·f τ₁, which is known modulo π, and sin h/(πm·f); pace: πm·f.
+
+    Less than a radian of a slow mode is the product itself: h has lost its digits.
+    """
+    slow = tau1[:, None] * pace
+    near = np.abs(slow) < 1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(near, tau1[:, None] * np.sinc(slow / np.pi), np.sin(h) / pace)
+    return np.where(near, slow, h), reach
 
 
 def series_of(
@@ -174,28 +187,48 @@ def neumann_time(
 
     With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰
     + (f/F_0)t + fδ. The left side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals
-    where the document has more digits than a double.
+    where the document has more digits than a double. Modes with m·f = 0, as at a resonance, belong
+    to F_0.
     """
     f = arrays["frequencies"]
-    mean = float(document["mean_rate"])
-    advance = _uniform_advance(document, f / mean, times)
-    if remainders is not None:
-        advance += remainders[:, None] * (f / mean)
-    delta = np.zeros(len(times))
     series = arrays["modes"], arrays["coefficients"], np.zeros(len(arrays["modes"]))
     if "area" in document:
         series = _with_odd_part(document["area"]["odd"], *series)
+    series, standing = _moving_modes(arrays, series)
+    mean = float(document["mean_rate"]) + standing
+    advance = _uniform_advance(document, standing, f / mean, times)
+    if remainders is not None:
+        advance += remainders[:, None] * (f / mean)
+    delta = np.zeros(len(times))
     if count := len(series[0]):
         for rows in _rows(len(times), _BLOCK // count):
-            delta[rows] = _solve_delta(arrays, series, mean, advance[rows])
-    return times / mean + delta, np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0), delta
+            delta[rows] = _solve_delta(arrays, series, mean, times[rows] / mean, advance[rows])
+    tau1 = times / mean + delta
+    z = np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0)
+    return tau1, z, delta - times * (standing / mean / float(document["mean_rate"]))
 
 
-def _uniform_advance(document: Mapping[str, Any], rates: Array, times: Array) -> Array:
-    """Return (f/F_0)t modulo 2, (N, g)."""
+def _moving_modes(
+    arrays: Mapping[str, Array], series: tuple[Array, Array, Array]
+) -> tuple[tuple[Array, Array, Array], float]:
+    """Return the modes, coefficients and turns that move, and what the others add to F_0."""
+    modes, coefficients, turns = series
+    f = arrays["frequencies"]
+    still = np.abs(modes @ f) <= _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(f))
+    angles = 2 * np.pi * (modes[still] @ arrays["phases"] + turns[still])
+    return (
+        (modes[~still], coefficients[~still], turns[~still]),
+        float(np.cos(angles) @ (2 * coefficients[still])),
+    )
+
+
+def _uniform_advance(
+    document: Mapping[str, Any], standing: float, rates: Array, times: Array
+) -> Array:
+    """Return (f/F_0)t modulo 2, (N, g); standing modes are part of F_0."""
     if int(document["digits"]) <= 15:
         return np.asarray(np.fmod(times[:, None] * rates, 2.0))
-    mean = Fraction(document["mean_rate"])
+    mean = Fraction(document["mean_rate"]) + Fraction(standing)
     exact = [Fraction(rate) / mean for rate in document["frequencies"]]
     return np.array(
         [[float(rate * Fraction(time) % 2) for rate in exact] for time in times.tolist()]
@@ -216,33 +249,35 @@ def _with_odd_part(
 
 
 def _solve_delta(
-    arrays: Mapping[str, Array], series: tuple[Array, Array, Array], mean: float, advance: Array
+    arrays: Mapping[str, Array],
+    series: tuple[Array, Array, Array],
+    mean: float,
+    uniform: Array,
+    advance: Array,
 ) -> Array:
-    """Return δ for each row of the uniform advance, by Newton's method inside a bracket; series:
-    modes, coefficients and turns.
+    """Return δ for each row of t/F_0 and of the uniform advance, by Newton's method inside a
+    bracket; series: modes, coefficients and turns.
     """
     f = arrays["frequencies"]
     modes, coefficients, turns = series
     pace = np.pi * (modes @ f)
     offset = 2 * np.pi * (np.mod(modes @ arrays["phases"], 1.0) + turns)
-    uniform = np.pi * (advance @ modes.T)
+    half_turns = np.pi * (advance @ modes.T)
 
     def excess(delta: Array) -> tuple[Array, Array]:
-        # sin 2πm·z − sin 2πm·z⁰ = 2 cos(2πm·z⁰ + h) sin h, h = πm·(z−z⁰): nothing cancels where the
-        # advance is small.
-        h = uniform + delta[:, None] * pace
-        cosine = np.cos(offset + h)
-        sine = np.sin(h)
-        value = mean * delta + (cosine * sine) @ (2 * coefficients / pace)
+        tau1 = uniform + delta
+        h, reach = _reach(half_turns + delta[:, None] * pace, pace, tau1)
+        value = mean * delta + (np.cos(offset + h) * reach) @ (2 * coefficients)
         slope = mean + np.cos(offset + 2 * h) @ (2 * coefficients)
         return value, slope
 
     low = np.full(len(advance), -2 * float(np.sum(np.abs(coefficients / pace))) / mean)
     high = -low
     delta = np.zeros(len(advance))
-    smallest = (
-        4 * np.finfo(float).eps * max(float(high.max(initial=0.0)), 1.0 / float(np.max(np.abs(f))))
-    )
+    # to the rounding of the modes: slow ones move no further than the time
+    reaches = 1 / (np.abs(pace) + 1 / (1 + np.abs(uniform[:, None])))
+    noise = float(np.max(reaches @ np.abs(2 * coefficients), initial=0.0)) / mean
+    smallest = 4 * np.finfo(float).eps * max(noise, 1.0 / float(np.max(np.abs(f))))
     for _ in range(_MOST_STEPS):
         value, slope = excess(delta)
         low = np.where(value <= 0, delta, low)

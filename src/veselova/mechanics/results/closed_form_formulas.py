@@ -186,7 +186,10 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
         later, before = (
             2 * sympy.pi * (_dot(mode, phases) / 2 + turn) for phases in (line, starts)
         )
-        time += value / (sympy.pi * pace) * (sympy.sin(later) - sympy.sin(before))
+        if pace == 0:  # a resonance
+            time += 2 * value * tau * sympy.cos(before)
+        else:
+            time += value / (sympy.pi * pace) * (sympy.sin(later) - sympy.sin(before))
     found["time"] = time
     return found
 
