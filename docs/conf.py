@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "src"))
+sys.path[:0] = [str(ROOT / "src"), str(ROOT / "docs" / "_extensions")]
 # One thread, as everywhere in the checks: a gallery example is small.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -44,6 +44,9 @@ exclude_patterns = [
     "docs/gallery/images",
 ]
 extensions = [
+    "guide_links",
+    "guide_pictures",
+    "guide_tables",
     "matplotlib.sphinxext.plot_directive",
     "myst_parser",
     "sphinx.ext.autodoc",
@@ -68,7 +71,7 @@ katex_js_path = str(ROOT / "explorer" / "node_modules" / "katex" / "dist" / "kat
 katex_css_path = "katex/katex.min.css"
 # Node starts slowly on a busy machine.
 katex.STARTUP_TIMEOUT = katex.RENDER_TIMEOUT = 60.0
-nodejs_binary = os.environ.get("VESELOVA_NODE", "node")
+nodejs_binary = os.environ.get("KATEX_NODE", "node")
 
 sphinx_gallery_conf = {
     "examples_dirs": "examples/gallery",
@@ -90,6 +93,8 @@ plot_html_show_source_link = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"veselova {veselova.__version__}"
+templates_path = ["_templates"]
+html_sidebars = {"**": ["guide-contents"]}
 html_static_path = ["_static", "../build/guide/static"]
 html_favicon = "_static/icon.svg"
 html_context = {"default_mode": "auto"}
@@ -99,6 +104,8 @@ html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
     "navbar_align": "left",
+    # The groups are in the sidebar of every page.
+    "navbar_center": [],
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
@@ -134,11 +141,17 @@ def _adapt_docstring(
     app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]
 ) -> None:
     """Turn what docstrings have of plain text into reStructuredText: tables of two columns become
-    lists, and bars around absolute values are escaped.
+    lists, indented formulas stay as they are, and bars around absolute values are escaped.
     """
     adapted: list[str] = []
-    in_table = False
+    in_table = in_formula = False
     for line in lines:
+        if line.startswith("    ") and not in_table and (in_formula or not "".join(adapted[-1:])):
+            adapted += [] if in_formula else ["::", ""]
+            in_formula = True
+            adapted.append(line)
+            continue
+        in_formula = in_formula and not line
         row = _ROW.fullmatch(line)
         if row:
             adapted += [] if in_table or not adapted or not adapted[-1] else [""]

@@ -91,7 +91,7 @@ def run_sphinx(builder: str, node: str) -> Path:
     command = [sys.executable, "-m", "sphinx", "--builder", builder, "--fail-on-warning"]
     command += ["--keep-going", "--quiet", "--conf-dir", "docs"]
     command += ["--doctree-dir", str(WORK / "doctrees"), ".", str(output)]
-    environment = {**os.environ, "VESELOVA_NODE": node, "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "KATEX_NODE": node, "OPENBLAS_NUM_THREADS": "1"}
     if answer := subprocess.run(command, cwd=ROOT, env=environment).returncode:
         sys.exit(answer)
     return output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import shutil
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+import orjson
 import pytest
 from fastapi import FastAPI
 from guide_site import ROOT, build_or_skip
@@ -19,7 +21,10 @@ from starlette.testclient import TestClient
 import veselova
 from conftest import Server, running_server
 from veselova import curves, theta
+from veselova.service.api.problem_details import REFUSALS
+from veselova.service.api.settings import Settings
 from veselova.service.http import guide
+from veselova.service.http.json_schemas import schema_document, schema_names
 
 CHROMIUM = shutil.which("chromium")
 
@@ -90,6 +95,79 @@ def test_every_public_name_has_its_entry(site: Path) -> None:
     names += [f"veselova.theta.{name}" for name in theta.__all__]
     names += [f"veselova.curves.{name}" for name in curves.__all__]
     assert not {name for name in names if name not in anchors}
+
+
+def test_functions_that_the_paper_page_names_are_links(site: Path) -> None:
+    page = (site / "docs" / "paper.html").read_text()
+    rows = [re.findall(r"<td.*?</td>", row, re.S) for row in re.findall(r"<tr.*?</tr>", page, re.S)]
+    functions = [cells[2] for cells in rows if len(cells) == 4]
+    assert len(functions) > 100
+    for cell in functions:
+        unlinked = re.sub(r"<a .*?</a>", "", cell, flags=re.S)
+        names = re.findall(r'<span class="pre">(.*?)</span>', unlinked)
+        # Names of integrals and formulations are none of functions.
+        assert not [name for name in names if "." in name], cell
+
+
+def test_tables_of_the_reference_come_from_the_program(site: Path) -> None:
+    reference = site / "docs" / "reference"
+    settings = (reference / "settings.html").read_text()
+    assert {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} <= _words(settings)
+    errors = (reference / "errors.html").read_text()
+    assert {*REFUSALS, "invalid-input", "method-not-allowed"} <= _words(errors)
+    commands = _words((site / "docs" / "command-line.html").read_text())
+    assert {"--require-keys", "--expires", "--animate"} <= commands
+    listed = (reference / "schemas.html").read_text()
+    for name in schema_names():
+        assert f"_static/schemas/{name}.json" in listed
+        text = (site / "_static" / "schemas" / f"{name}.json").read_text()
+        assert json.loads(text) == json.loads(orjson.dumps(schema_document(name)))
+
+
+def _words(page: str) -> set[str]:
+    return set(re.findall(r'<span class="pre">([^<]*?),?</span>', page))
+
+
+def test_every_page_shows_the_groups_of_the_guide(site: Path) -> None:
+    for path in site.rglob("*.html"):
+        text = path.read_text()
+        if "bd-docs-nav" not in text:
+            assert "http-equiv" in text, path  # the page that leads on to the first one
+            continue
+        contents = text[text.index("bd-docs-nav") :].partition("</nav>")[0]
+        shown = re.findall(r'<li class="toctree-l1[^"]*"><a [^>]*>(.*?)</a>', contents)
+        assert shown == ["Tutorials", "How-to", "Explanation", "Reference", "Gallery"], path
+
+
+LESSONS = [
+    path.stem
+    for path in sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+    if "savefig(" in path.read_text()
+]
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_lessons_show_the_pictures_that_their_code_draws(name: str, site: Path) -> None:
+    source = (ROOT / "docs" / "tutorials" / f"{name}.md").read_text()
+    page = (site / "docs" / "tutorials" / f"{name}.html").read_text()
+    for picture in re.findall(r'savefig\("(.*?)"\)', source):
+        assert picture in page
+        assert (site / "_images" / picture).stat().st_size > 5000
+
+
+def test_outcomes_of_the_program_have_their_row() -> None:
+    text = (ROOT / "docs" / "reference" / "errors.md").read_text()
+    section = text[text.index("## Outcomes") : text.index("## Over HTTP")]
+    rows = set(re.findall(r"^\| `([a-z-]+)` \|", section, re.MULTILINE))
+    sources = [path.read_text() for path in (ROOT / "src").rglob("*.py")]
+    raised: set[str] = set()
+    for node in (node for text in sources for node in ast.walk(ast.parse(text))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Unsolved"):
+            first = ast.walk(node.args[0]) if node.args else ()
+            raised |= {str(part.value) for part in first if isinstance(part, ast.Constant)}
+    assert raised <= rows
+    strings = set(re.findall(r'"([a-z]+(?:-[a-z]+)+|separatrix|collision)"', "".join(sources)))
+    assert rows <= strings
 
 
 def test_every_page_stands_in_the_contents(site: Path) -> None:

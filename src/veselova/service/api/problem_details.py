@@ -26,13 +26,22 @@ if TYPE_CHECKING:
     from starlette.exceptions import HTTPException
     from starlette.responses import Response
 
-__all__ = ["MEDIA_TYPE", "TABLE", "Refused", "problem_code", "problem_document", "problem_response"]
+__all__ = [
+    "FRAMEWORK",
+    "MEDIA_TYPE",
+    "REFUSALS",
+    "TABLE",
+    "Refused",
+    "problem_code",
+    "problem_document",
+    "problem_response",
+]
 
 MEDIA_TYPE = "application/problem+json"
 
 #: Status codes of HTTPException that the framework itself raises, with the code and title of their
 #: documents.
-_FRAMEWORK = {
+FRAMEWORK = {
     404: ("not-found", "No such resource"),
     405: ("method-not-allowed", "Method not allowed"),
 }
@@ -50,7 +59,7 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
 }
 
 #: What the service itself refuses: code → (status, title).
-_REFUSALS = {
+REFUSALS = {
     "malformed-http": (400, "The request is not HTTP/1.1"),
     "malformed-json": (400, "The body is not JSON"),
     "no-such-job": (404, "No such job"),
@@ -112,10 +121,10 @@ def problem_document(error: Exception) -> dict[str, Any]:
     message.
     """
     if isinstance(error, Refused):
-        status, title = _REFUSALS[error.code]
+        status, title = REFUSALS[error.code]
         return _document(status, error.code, title, error.detail)
     if _is_of_framework(error):
-        code, title = _FRAMEWORK.get(error.status_code, ("http-error", "The request was refused"))
+        code, title = FRAMEWORK.get(error.status_code, ("http-error", "The request was refused"))
         return _document(error.status_code, code, title, str(error.detail))
     status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
     detail = str(error) if code != "internal-error" else "An unexpected error; it has been logged."
