@@ -11,10 +11,12 @@ coordinate axis or at a turning point), ``near-degenerate`` (a gap or cut nearly
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -372,6 +374,75 @@ BODIES: tuple[BodyCase, ...] = (
         for off in ("1e-3", "1e-9", "1e-25", "1e-40")
     ),
     BodyCase("at-rest", _GENERIC, _GAMMA, [0, 0, 0], _tags("at-rest")),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class BallCaseN:
+    """A row of the balls in ℝⁿ, n ≥ 4, whose J has the numbers A, and ma² is ``share`` of its least
+    entry.
+    """
+
+    name: str
+    A: Sequence[Any]
+    gamma: Sequence[Any]
+    gamma_dot: Sequence[Any]
+    tags: frozenset[str] = _tags("generic")
+    span: float = 20.0
+    share: Any = "3/5"
+
+    def problem(self, system: str, **changes: Any) -> Any:
+        """Return the problem of a system, normalised."""
+        A = [Fraction(x) for x in self.A]
+        least = min(x * y / math.prod(A) for x, y in combinations(A, 2))
+        q, v = ([Fraction(x) for x in vector] for vector in (self.gamma, self.gamma_dot))
+        data = {
+            "inertia": {"special": self.A},
+            "mass": least * Fraction(self.share) / Fraction("0.64"),
+            "radius": "0.8",
+            "gamma": self.gamma,
+            "Omega": [a * d - b * c for (a, c), (b, d) in combinations(zip(q, v, strict=True), 2)],
+            "position": ["1/2", -2, *[1] * (len(A) - 3)],
+            "normalize": True,
+        }
+        kind = RubberBall if system == "rubber-ball" else ChaplyginBall
+        return kind(**{**data, **changes})
+
+    def times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return times up to the end of the span."""
+        return self.span * np.array([0, 0.01, 0.1, 0.3, 1])
+
+
+_Q4 = [0.5, 0.1, 0.5, 0.7]
+_V4 = [1.1, -0.7, 0.3, -0.9]
+
+BALLS_IN_MORE_DIMENSIONS: tuple[BallCaseN, ...] = (
+    BallCaseN("generic-4", ["1.6", "1.2", "0.9", "0.5"], _Q4, _V4),
+    BallCaseN("generic-5", [1.6, 1.3, 1.1, 0.8, 0.5], [*_Q4, 0.3], [*_V4, 0.6]),
+    BallCaseN("heavy", ["1.6", "1.2", "0.9", "0.5"], _Q4, _V4, share="999/1000"),
+    BallCaseN("light", ["1.6", "1.2", "0.9", "0.5"], _Q4, _V4, share="1/1000"),
+    BallCaseN("units", [1.6e9, 1.2e9, 9e8, 5e8], _Q4, [x * 1e5 for x in _V4], span=2e-4),
+    BallCaseN("two-equal", [1.6, 1.2, 1.2, 0.5], _Q4, _V4, _tags("closed-cut")),
+    BallCaseN("two-pairs", [1.6, 1.6, 0.5, 0.5], _Q4, _V4, _tags("closed-cut")),
+    BallCaseN("three-equal", [1.2, 1.2, 1.2, 0.5], _Q4, _V4, _tags("closed-cut")),
+    BallCaseN("isotropic", [1, 1, 1, 1], _Q4, _V4, _tags("closed-cut")),
+    BallCaseN(
+        "frozen", [1.6, 1.2, 0.9, 0.5], [0.5, 0, 0.5, 0.7], [1, 0, 0.3, -1], _tags("closed-cut")
+    ),
+    BallCaseN(
+        "twice-frozen", [1.6, 1.2, 0.9, 0.5], [0.6, 0, 0.8, 0], [4, 0, -3, 0], _tags("closed-cut")
+    ),
+    BallCaseN("nearly-equal", [1.6, "1.2000000001", "1.2", 0.5], _Q4, _V4, _tags("generic")),
+    # an umbilic in the plane of three axes
+    BallCaseN(
+        "separatrix",
+        ["1", "1/10", "1/20", "1/26"],
+        ["3/5", 0, 0, "4/5"],
+        ["4/5", 1, 0, "-3/5"],
+        _tags("separatrix"),
+        span=6,
+    ),
+    BallCaseN("at-rest", [1.6, 1.2, 0.9, 0.5], _Q4, [0, 0, 0, 0], _tags("at-rest")),
 )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-__all__ = ["RolledBall", "roll", "roll_in_80_bits"]
+__all__ = ["RolledBall", "roll", "roll_in_80_bits", "roll_in_n_dimensions"]
 
 #: The vertical.
 _UP = np.array([1.0, 0.0, 0.0])
@@ -67,6 +68,74 @@ def roll(ball: Any, times: Sequence[float], twists: bool = False) -> RolledBall:
     frames = np.swapaxes(found[:, :9].reshape(-1, 3, 3), 1, 2)
     Omega = np.einsum("nij,nj->ni", frames, found[:, 9:12])
     return RolledBall(frames, Omega, found[:, 15:17], found[:, 13:15], force[:, 1:])
+
+
+def roll_in_n_dimensions(ball: Any, times: Sequence[float]) -> RolledBall:
+    """Return the motion of a ball in ℝⁿ, Omega as the coefficients on E_i∧E_j: Newton and Euler
+    with the force −f at the contact point and, where it may not twist, torques e_i∧e_j.
+
+    Iω̇ = [Iω,ω] + a Σ f_k e_k∧q + Σ μ_ij e_i∧e_j, mv̇ = −f, v_k = a(e_k, ωq).
+    """
+    n, twists = ball.n, ball.twists
+    pairs = list(combinations(range(n), 2))
+    moments = np.array([float(x) for x in ball.ball.moments])
+    m, a = float(ball.ball.mass), float(ball.ball.radius)
+    size = len(pairs)
+
+    def skew(x: Any) -> Any:
+        W = np.zeros((n, n))
+        for value, (i, j) in zip(x, pairs, strict=True):
+            W[i, j], W[j, i] = value, -value
+        return W
+
+    def wedge(x: Any, y: Any) -> Any:
+        return np.array([x[i] * y[j] - x[j] * y[i] for i, j in pairs])
+
+    def accelerations(omega: Any, E: Any) -> Any:
+        rows = [a * wedge(E[:, k], E[:, 0]) for k in range(1, n)]
+        if not twists:
+            rows += [wedge(E[:, i], E[:, j]) for i, j in combinations(range(1, n), 2)]
+        G = np.array(rows)
+        moved = np.zeros((len(rows), n - 1))
+        moved[: n - 1] = -np.eye(n - 1)
+        # unknowns: ω̇, v̇ and the multipliers
+        M = np.block(
+            [
+                [np.diag(moments), np.zeros((size, n - 1)), -G.T],
+                [np.zeros((n - 1, size)), m * np.eye(n - 1), -moved.T],
+                [G, moved, np.zeros((len(rows), len(rows)))],
+            ]
+        )
+        momentum, turning = skew(moments * omega), skew(omega)
+        free = momentum @ turning - turning @ momentum
+        b = np.zeros(len(M))
+        b[:size] = [free[i, j] for i, j in pairs]
+        return np.linalg.solve(M, b)
+
+    def field(_: float, y: Any) -> Any:
+        omega, E = y[:size], y[size + n - 1 : size + n - 1 + n * n].reshape(n, n)
+        found = accelerations(omega, E)
+        velocity = y[size : size + n - 1]
+        return np.concatenate([found[: size + n - 1], (-skew(omega) @ E).ravel(), velocity])
+
+    E, omega = ball.frame, ball.Omega
+    velocity = [a * E[:, k] @ skew(omega) @ E[:, 0] for k in range(1, n)]
+    contact = [float(x) for x in ball.ball.contact]
+    start = np.concatenate([omega, velocity, E.ravel(), contact])
+    found = solve_ivp(
+        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
+    ).y.T
+    frames = found[:, size + n - 1 : size + n - 1 + n * n].reshape(-1, n, n)
+    force = m * np.array(
+        [accelerations(y[:size], frame)[size : size + n - 1] for y, frame in zip(found, frames)]
+    )
+    return RolledBall(
+        frames,
+        found[:, :size],
+        found[:, size + n - 1 + n * n :],
+        found[:, size : size + n - 1],
+        force,
+    )
 
 
 def roll_in_80_bits(ball: Any, times: Sequence[float], twists: bool = False) -> tuple[Any, Any]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
     from veselova.mechanics.results.torus import Torus
     from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+    from veselova.mechanics.systems.rolling_ball_n import RollingBallN
     from veselova.mechanics.systems.rubber_ball import RubberBall
     from veselova.mechanics.systems.veselova import Veselova
 
@@ -307,7 +308,7 @@ def closed_form(
         return closed_form_of(problem, accuracy, digits)
 
 
-def drift(problem: RubberBall | ChaplyginBall) -> Drift:
+def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
     from veselova.analytic.motion.mean_drift import drift as drift_of
 

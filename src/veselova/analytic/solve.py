@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
+from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
 from veselova.analytic.motion.rank_one_so3 import motion_of_body
@@ -30,6 +31,7 @@ from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -53,7 +55,7 @@ _SERIES = ("tau1", "q_dot", "frame", "spheroconic")
 
 
 def solve(
-    problem: TorusProblem | AreaBody | SeparableVeselova,
+    problem: TorusProblem | AreaBody | RollingBallN | SeparableVeselova,
     times: Any,
     *,
     method: str | None = None,
@@ -88,6 +90,8 @@ def solve(
     ):
         if value is not None and value not in names:
             raise unknown_name((field,), value, names)
+    if isinstance(problem, RollingBallN):
+        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified, solution)
     if isinstance(problem, ChaplyginBall) or (
         isinstance(problem, VeselovaSO3) and problem.has_area_constant
     ):
@@ -122,6 +126,26 @@ def solve(
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
     return MotionInBalls(problem, digits, certified, method)(grid)
+
+
+def _motion_of_ball_n(
+    problem: RollingBallN,
+    grid: TimeGrid,
+    method: str | None,
+    time_map: str | None,
+    digits: int,
+    certified: bool,
+    solution: Solution | None,
+) -> Trajectory:
+    """Return the motion of a ball in ℝⁿ."""
+    if beyond_double(digits, certified):
+        further = "" if problem.twists else ": the attitude alone has more, system veselova"
+        raise _needs_doubles(digits, f"the contact point{further}")
+    if not problem.moves:
+        provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
+        return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
+    on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+    return motion_of_ball_n(problem, on_torus.evaluate(grid))
 
 
 def _require_options(

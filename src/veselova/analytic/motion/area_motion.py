@@ -13,6 +13,7 @@ from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
@@ -58,11 +59,12 @@ def motion_with_area(problem: AreaBody, point: Trajectory) -> Trajectory:
     )
 
 
-def roll(ball: RollingBall, torus: TorusProblem, displacement: Array) -> Array:
-    """Return x(t) − x(0) along e_2 and e_3, (N, 2), from the series of the problem on the torus."""
+def roll(ball: RollingBall | RollingBallN, torus: TorusProblem, displacement: Array) -> Array:
+    """Return x(t) − x(0) along e_2 … e_n, (N, n−1), from the series of the problem on the torus."""
     radius = float(ball.ball.radius)
     if not isinstance(torus, AreaVeselova):
         return -radius * displacement
+    assert isinstance(ball, RollingBall)
     return np.asarray(radius * displacement @ plane_of_path(ball, torus))
 
 

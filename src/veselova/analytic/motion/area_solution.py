@@ -16,31 +16,27 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity_sampling import sample_phases
+from veselova.analytic.motion.directed_solution import CommutingSolution, DirectedSolution
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.cross_component import CrossComponent
 from veselova.analytic.time_map.fourier_modes import TorusSeries
-from veselova.analytic.time_map.guard_digits import extended_precision_flows
-from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.torus_series import find_series
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["AreaSolution", "solution_of"]
 
 Array = NDArray[np.float64]
 
-#: Calibrated: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, are those of
-#: extended precision.
-_CANCELLED = 8.0
-
 #: Calibrated: by how much more than at the sampled phases dt/dτ₁ may vary.
 _BETWEEN = 2.0
 
 
-class AreaSolution(Solution):
+class AreaSolution(DirectedSolution):
     """The solution of an ``AreaVeselova`` problem: f = a⁻¹(−μ2, ς) for the forms dλ/2w, λdλ/2w,
     dt/dτ₁ = dt'/dτ₁ (1 − tilt (u,A'v)/(v,A'v)).
     """
@@ -73,8 +69,8 @@ class AreaSolution(Solution):
         distance = abs(Fraction(spectrum.constants[1]) - middle)
         return distance < problem.told_apart * (highest - lowest)
 
-    @cached_property
-    def _direction(self) -> list[Fraction]:
+    @property
+    def direction(self) -> list[Fraction]:
         """Return du/dτ₁ for the nodal differentials, exact but for the branch points.
 
         Where one direction is frozen λ_2 stays at its I, and du = ς + μ2 I for what is left.
@@ -83,36 +79,8 @@ class AreaSolution(Solution):
         mu2 = problem.mu2 / self.moving.unit
         if self.curve.genus == 1:
             return [problem.sign + mu2 * self.moving.unit / self.moving.frozen[0]]
-        points = self.spectrum.branch_points
-        with self.spectrum.working():
-            node = Fraction((points[2][0] + points[3][0]) / 2)
+        (node,) = self._nodes
         return [-mu2, problem.sign + node * mu2]
-
-    @cached_property
-    def _flows(self) -> tuple[LinearFlow, LinearFlow]:
-        direction = to_float(self._direction)
-        inverse = self.periods.inverse_cycles
-        f = inverse @ direction
-        if np.any(np.abs(inverse) @ np.abs(direction) > _CANCELLED * np.abs(f)):
-            return self.precise_flows[:2]
-        return LinearFlow.of(self._origin, f), LinearFlow.of(self._origin, f / self.rate.mean)
-
-    @cached_property
-    def in_tau1(self) -> LinearFlow:
-        """Return z(τ₁) = z⁰ + fτ₁."""
-        return self._flows[0]
-
-    @cached_property
-    def in_time(self) -> LinearFlow:
-        """Return the uniform part z⁰ + Ωt, Ω = f/F_0."""
-        return self._flows[1]
-
-    @cached_property
-    def precise_flows(self) -> tuple[LinearFlow, LinearFlow, float]:
-        """Return both flows and F_0 with guard digits."""
-        return extended_precision_flows(
-            self.spectrum, self._origin, self.problem.time, self._direction
-        )
 
     @cached_property
     def side(self) -> float:
@@ -204,4 +172,6 @@ def solution_of(problem: TorusProblem, distance: Fraction | None = None) -> Solu
     """Return the solution of a problem on a torus; ``distance`` as ``Solution`` takes it."""
     if isinstance(problem, AreaVeselova):
         return AreaSolution(problem, distance)
+    if isinstance(problem, CommutingVeselova):
+        return CommutingSolution(problem, distance)
     return Solution(problem, distance)

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.motion.area_solution import AreaSolution, solution_of
+from veselova.analytic.motion.ball_n_motion import ball_fields
 from veselova.analytic.motion.closed_form_area import area_fields, error_of_body
 from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
+from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
@@ -32,6 +34,7 @@ from veselova.mechanics.results.closed_form import (
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
@@ -75,7 +78,7 @@ def closed_form(
     """
     digits = whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_CLOSED_FORM_DIGITS)
     accuracy = require_accuracy(accuracy, digits)
-    if digits > FEWEST_DIGITS and isinstance(given, RollingBall):
+    if digits > FEWEST_DIGITS and isinstance(given, (RollingBall, RollingBallN)):
         required = f"{FEWEST_DIGITS} (the path of the contact point is in double precision)"
         raise InvalidInput(("digits",), required, str(digits))
     problem = on_torus(given)
@@ -111,8 +114,10 @@ def closed_form(
         parts |= area_fields(solution, given, accuracy)
         parts["error"] = error_of_body(parts["error"], given)
         parts["axes"] = None if given.axes is None else given.axes.tolist()
-    elif isinstance(given, RubberBall):
+    elif isinstance(given, (RubberBall, RollingBallN)):
         parts |= {"path": _path(solution, given, accuracy)}
+        if isinstance(given, RollingBallN):
+            parts |= {"ball": ball_fields(given)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
     if digits == FEWEST_DIGITS:
         growth = _growth_of_slow_modes(solution, parts)
@@ -220,12 +225,13 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     return modes[selected], rounded
 
 
-def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, Any]:
+def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) -> dict[str, Any]:
     """Return the contact point: the speed along the momentum, and the modes across it that the
     accuracy asks for, largest first.
     """
     assert isinstance(solution.problem, RollingVeselova)
     transverse = []
+    unit = AlongMomentum(solution).side / solution.tau1_unit
     for k in range(1, solution.curve.genus):
         component = NormalComponent.of(solution.frame, solution.inversion, k)
         series = find_series(component)
@@ -237,7 +243,7 @@ def _path(solution: Solution, ball: RubberBall, accuracy: float) -> dict[str, An
         transverse.append(
             {
                 "modes": series.orders[selected].tolist(),
-                "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),
+                "coefficients": (series.coefficients[selected] * unit).tolist(),
                 "turn": component.turn,
             }
         )

@@ -17,6 +17,7 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.systems.area_veselova import RollingAreaVeselova
+from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
 __all__ = ["Displacement", "WithAreaConstant", "displacement_of"]
@@ -123,7 +124,13 @@ class AlongMomentum(Displacement):
 
     def _combine(self, along: Array, integrals: Array) -> Array:
         """Return ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk, y_γ growing with the speed."""
-        return np.concatenate([integrals, along[:, None]], axis=1) @ self.solution.rotation
+        across = self.side * integrals
+        return np.concatenate([across, along[:, None]], axis=1) @ self.solution.rotation
+
+    @property
+    def side(self) -> float:
+        """Return −1 for Chaplygin's ball in ℝⁿ: across the momentum it moves by −q̇."""
+        return -1.0 if isinstance(self.solution.problem, CommutingVeselova) else 1.0
 
     def error(self, displacement: Array, errors: Array) -> Array:
         """Return √g of the largest error, and the rounding of the products with ℜ and the speed."""

@@ -14,6 +14,7 @@ from veselova.analytic.time_map.fourier_modes import Integers, TorusSeries
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
 
 __all__ = ["drift"]
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 _ROUNDINGS = 32.0
 
 
-def drift(ball: RubberBall | ChaplyginBall) -> Drift:
+def drift(ball: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point.
 
     The uniform part is a·2h/|p| along the momentum, or aμ1k_h along n with an area constant. The
@@ -32,7 +33,7 @@ def drift(ball: RubberBall | ChaplyginBall) -> Drift:
     separatrix.
     """
     if not ball.moves:
-        return Drift(np.zeros(2))
+        return Drift(np.zeros_like(ball.start["position"][0]))
     solution = solution_of(ball.on_torus())
     if solution.separatrices:
         raise Unsolved("no-closed-form", "on a separatrix motions have no mean over all times")

@@ -23,7 +23,7 @@ from veselova.mechanics.core.exact_input import (
     to_float,
 )
 
-__all__ = ["Ball"]
+__all__ = ["Ball", "BallData"]
 
 Array = NDArray[np.float64]
 
@@ -36,18 +36,51 @@ _MODERATE = Fraction(10**60)
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A ball, and where it touches the plane at t = 0, exactly as given.
+class BallData:
+    """What balls in any dimension have: mass, radius, and the contact point at t = 0, exactly.
 
-    - inertia: principal moments (3,) about the centre, or the symmetric matrix, (3, 3)
     - mass, radius: positive
-    - contact: (2,) the contact point in the plane, along e_2 and e_3
+    - contact: (n−1,) along e_2 … e_n
     """
 
-    inertia: tuple[Any, ...]
     mass: Fraction
     radius: Fraction
     contact: tuple[Fraction, ...]
+
+    @classmethod
+    def read(cls, mass: Any, radius: Any, position: Any, count: int) -> BallData:
+        """Return the data that are given, the contact point with so many entries. Raises
+        InvalidInput, with all faults.
+        """
+        faults = Faults()
+        exact_mass = faults.attempt(_positive, mass, "mass")
+        exact_radius = faults.attempt(_positive, radius, "radius")
+        contact = faults.attempt(exact_vector, position, ("position",), count)
+        faults.require_none()
+        assert exact_mass is not None
+        assert exact_radius is not None
+        assert contact is not None
+        return BallData(exact_mass, exact_radius, contact)
+
+    @property
+    def added(self) -> Fraction:
+        """Return ma², the moment of the mass at the centre about the contact point."""
+        return self.mass * self.radius**2
+
+    @property
+    def size(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return max(1.0, float(self.radius))
+
+
+@dataclass(frozen=True)
+class Ball(BallData):
+    """A ball, and where it touches the plane at t = 0, exactly as given.
+
+    - inertia: principal moments (3,) about the centre, or the symmetric matrix, (3, 3)
+    """
+
+    inertia: tuple[Any, ...]
 
     @classmethod
     def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: Any) -> Ball:
@@ -58,15 +91,11 @@ class Ball:
         faults = Faults()
         faults.attempt(require_truth_value, strict, "strict")
         tensor = faults.attempt(_inertia, inertia, strict is not False)
-        exact_mass = faults.attempt(_positive, mass, "mass")
-        exact_radius = faults.attempt(_positive, radius, "radius")
-        contact = faults.attempt(exact_vector, position, ("position",), 2)
+        data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
         assert tensor is not None
-        assert exact_mass is not None
-        assert exact_radius is not None
-        assert contact is not None
-        ball = cls(tensor, exact_mass, exact_radius, contact)
+        assert data is not None
+        ball = cls(data.mass, data.radius, data.contact, tensor)
         ball._require_moderate()
         return ball
 
@@ -77,11 +106,6 @@ class Ball:
             required = f"ma² between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e} of the "
             given = f"ma² = {_decimal(self.added)} and {float(largest):.3g}"
             raise InvalidInput(("mass",), required + "largest entry of inertia", given)
-
-    @property
-    def added(self) -> Fraction:
-        """Return ma², the moment of the mass at the centre about the contact point."""
-        return self.mass * self.radius**2
 
     @cached_property
     def effective(self) -> tuple[Any, ...]:
@@ -98,11 +122,6 @@ class Ball:
         """Return the inertia about the centre, (3, 3)."""
         values = to_float(self.inertia)
         return np.diag(values) if values.ndim == 1 else np.array(values)
-
-    @property
-    def size(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return max(1.0, float(self.radius))
 
     def velocity(self, Omega: Array, frame: Array) -> Array:
         """Return the velocity of the contact point and of the centre, a(Ω×γ, e_k), (..., 2)."""

@@ -33,6 +33,7 @@ __all__ = [
     "read_only",
     "require_each",
     "require_truth_value",
+    "square_root",
     "to_float",
     "whole_number",
 ]
@@ -259,6 +260,12 @@ def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]
     """
     common = math.lcm(*(x.denominator for x in vector))
     return [x.numerator * (common // x.denominator) for x in vector], common
+
+
+def square_root(square: Fraction) -> float:
+    """Return the square root of a positive rational, whose float may be out of range."""
+    shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
+    return float(np.ldexp(np.sqrt(float(square / Fraction(4) ** shift)), shift))
 
 
 def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:

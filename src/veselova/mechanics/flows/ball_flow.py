@@ -23,19 +23,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RollingFlow(Flow):
-    """A flow of the attitude, and the contact point by ẋ_k = −a(e_k, γ̇).
+    """A flow of the attitude, and the contact point by ẋ_k = −a(e_k, q̇), q = e_1.
 
-    - attitude: a flow whose state is three numbers and the frame, row-major, (12,)
+    - attitude: a flow whose state ends with the frame E, row-major, or with g = Eᵀ
     - radius: a
-    - contact: (2,) the contact point at the start
+    - contact: (n−1,) the contact point at the start
+    - transposed: whether it ends with g
 
-    A state is that of the attitude and (x−x(0))/a, of length 14.
+    A state is that of the attitude and (x−x(0))/a.
     """
 
     attitude: Any
     radius: float
     contact: Array
     size: float
+    transposed: bool = False
 
     @property
     def time_unit(self) -> float:  # type: ignore[override]
@@ -45,7 +47,7 @@ class RollingFlow(Flow):
     @cached_property
     def initial(self) -> Array:  # type: ignore[override]
         """Return the start as a state."""
-        return np.concatenate([self.attitude.initial, np.zeros(2)])
+        return np.concatenate([self.attitude.initial, np.zeros(self.contact.size)])
 
     @property
     def parameters(self) -> Array:  # type: ignore[override]
@@ -55,19 +57,29 @@ class RollingFlow(Flow):
     @property
     def structure(self) -> Hashable | None:
         """Return what determines the field besides its parameters."""
-        return type(self), self.attitude.structure
+        inner = self.attitude.structure
+        return None if inner is None else (type(self), self.transposed, inner)
+
+    @cached_property
+    def _length(self) -> int:
+        return int(self.attitude.initial.size)
+
+    def _frame(self, state: Any) -> Any:
+        """Return E of a state of the attitude, or of its derivative."""
+        n = self.contact.size + 1
+        matrix = state[self._length - n * n :].reshape(n, n)
+        return matrix.T if self.transposed else matrix
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return the derivatives of the attitude and of the contact point."""
-        rate = self.attitude.field(state[:12], parameters, ops)
-        horizontal = state[3:12].reshape(3, 3)[:, 1:]
-        gamma_dot = rate[3:12].reshape(3, 3)[:, 0]
-        return np.concatenate([rate, -ops.dot(horizontal.T, gamma_dot)])
+        rate = self.attitude.field(state[: self._length], parameters, ops)
+        horizontal = self._frame(state[: self._length])[:, 1:]
+        return np.concatenate([rate, -ops.dot(horizontal.T, self._frame(rate)[:, 0])])
 
     def project(self, state: Array) -> Array:
-        """Return states (..., 14) with the attitude back on its manifold."""
-        attitude = self.attitude.project(state[..., :12])
-        return np.concatenate([attitude, state[..., 12:]], axis=-1)
+        """Return states with the attitude back on its manifold."""
+        attitude = self.attitude.project(state[..., : self._length])
+        return np.concatenate([attitude, state[..., self._length :]], axis=-1)
 
     def neighbour(self, distance: float) -> RollingFlow:
         """Return the flow of a start whose attitude is moved by about ``distance``."""
@@ -75,8 +87,8 @@ class RollingFlow(Flow):
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return the series of the attitude, and position."""
-        series: dict[str, Array] = self.attitude.unpack(states[:, :12])
-        return {**series, "position": self.contact + self.radius * states[:, 12:]}
+        series: dict[str, Array] = self.attitude.unpack(states[:, : self._length])
+        return {**series, "position": self.contact + self.radius * states[:, self._length :]}
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,19 @@ from veselova.mechanics.flows.collision import SingularFlow
 from veselova.mechanics.groups.distribution import Distribution, combine
 from veselova.mechanics.potentials.on_group import GroupPotential
 
-__all__ = ["LRFlow", "MomentumFlow", "MultiplierFlow", "jacobi_integral", "multipliers_of"]
+__all__ = [
+    "LARGEST_SYMBOLIC",
+    "LRFlow",
+    "MomentumFlow",
+    "MultiplierFlow",
+    "jacobi_integral",
+    "multipliers_of",
+]
 
 Array = NDArray[np.float64]
 
 #: dim G up to which a field is written in symbols (SO(12)): the expressions grow like its square.
-_LARGEST_SYMBOLIC = 66
+LARGEST_SYMBOLIC = 66
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ class LRFlow(SingularFlow):
     @property
     def structure(self) -> Hashable | None:
         """Return what the compiled field depends on besides its parameters."""
-        if self.distribution.group.dimension > _LARGEST_SYMBOLIC:
+        if self.distribution.group.dimension > LARGEST_SYMBOLIC:
             return None
         powers = self.potential.powers if self.potential else None
         return type(self), self.distribution.key, powers, self.parameters.size

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import Faults
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import exact_vector, over_common_denominator, to_float
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "inverse_length",
     "over_largest",
     "point_on_sphere",
+    "read_direction",
     "unit",
 ]
 
@@ -90,6 +91,21 @@ def over_largest(vector: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
     """Return the vector over its largest entry, so that its floats have squares."""
     largest = max(abs(x) for x in vector)
     return tuple(x / largest for x in vector)
+
+
+def read_direction(
+    given: Any, n: int, normalize: bool, name: str = "gamma"
+) -> tuple[tuple[Fraction, ...], Array]:
+    """Return γ as given, exactly, and the unit vector; ``name`` is that of the argument."""
+    exact = exact_vector(given, (name,), n)
+    if not any(exact):
+        raise InvalidInput((name,), "a vector of unit length", "the zero vector")
+    vector = to_float(over_largest(exact) if normalize else exact)
+    length = float(np.linalg.norm(vector / np.max(np.abs(vector))) * np.max(np.abs(vector)))
+    if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
+        required = "a vector of unit length to 1e-9 (or normalize=True)"
+        raise InvalidInput((name,), required, f"length {length!r}")
+    return exact, unit(vector)
 
 
 def point_on_sphere(

@@ -134,6 +134,8 @@ def series_of(
     if document["problem"]["system"] == "ellipsoid-geodesic":
         X = A * q / root(np.sum(A * q * q, axis=1))[:, None]
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
+    if "ball" in document:
+        return {"gamma": q, "Omega": _turning_of_ball(document["ball"], frame), "frame": frame}
     if axes is not None:
         matrix = np.array(axes, dtype=np.float64)
         frame = matrix @ frame
@@ -165,6 +167,24 @@ def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Any) -> dict[str,
     share = share / np.sum((gamma @ form) * gamma, axis=1)
     Omega = free + share[:, None] * (gamma @ inverse)
     return {"gamma": gamma, "Omega": Omega, "frame": frame}
+
+
+def _turning_of_ball(ball: Mapping[str, Any], frame: Any) -> Any:
+    """Return the coefficients of ω on E_i∧E_j, i < j, of a ball in ℝⁿ, (N, n(n−1)/2).
+
+    ω = q∧ξ, or (xq∧xξ)/D − q∧ξ for a ball that twists freely, ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq), p
+    fixed in space.
+    """
+    x = np.asarray(ball["roots"], dtype=frame.dtype)
+    q = frame[:, :, 0]
+    free = frame @ np.asarray(ball["momentum"], dtype=frame.dtype) / x
+    xi = free - np.sum(free * q, axis=1)[:, None] * q
+    xi = xi / np.sum(q * x * q, axis=1)[:, None]
+    rows, columns = np.triu_indices(len(x), 1)
+    turning = q[:, rows] * xi[:, columns] - q[:, columns] * xi[:, rows]
+    if ball["added"] is None:
+        return turning
+    return (x[rows] * x[columns] / float(ball["added"]) - 1) * turning
 
 
 def _cross(a: Any, b: Any) -> Any:

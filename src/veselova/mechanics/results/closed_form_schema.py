@@ -10,6 +10,12 @@ from typing import Any
 import numpy as np
 
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.results.closed_form_parts import (
+    require_area,
+    require_ball,
+    require_numbers,
+    require_path,
+)
 
 __all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "require_document"]
 
@@ -154,6 +160,19 @@ _FURTHER: dict[str, tuple[dict[str, Any], str]] = {
         "2 … g the doubled modes M and coefficients of (q', n_k) = Σ 2c cos 2π(M·z/2 + turn); with "
         "an area constant also the directions of these parts, and the factor of the odd time",
     ),
+    "ball": (
+        {
+            "type": "object",
+            "required": ["roots", "momentum", "added"],
+            "properties": {
+                "roots": _VECTOR,
+                "momentum": _VECTOR,
+                "added": {"anyOf": [_NUMBER, {"type": "null"}]},
+            },
+        },
+        "of a ball in ℝⁿ, n ≥ 4: x with J_ij = x_ix_j, the momentum p in space, and ma² where it "
+        "twists freely; its ω is q∧ξ, or (xq∧xξ)/ma² − q∧ξ, ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq)",
+    ),
     "area": (
         {
             "type": "object",
@@ -238,14 +257,16 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         "modes": (count, g),
     }
     for name, shape in shapes.items():
-        _require_numbers((name,), document[name], shape)
-    _require_numbers(("mean_rate",), document["mean_rate"], ())
+        require_numbers((name,), document[name], shape)
+    require_numbers(("mean_rate",), document["mean_rate"], ())
     if document["axes"] is not None:
-        _require_numbers(("axes",), document["axes"], (n, n))
+        require_numbers(("axes",), document["axes"], (n, n))
     if "path" in document:
-        _require_path(document["path"], g, n, "area" in document)
+        require_path(document["path"], g, n, "area" in document)
     if "area" in document:
-        _require_area(document["area"], g, n)
+        require_area(document["area"], g, n)
+    if "ball" in document:
+        require_ball(document["ball"], n)
     least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
     if not least > 0:
         raise InvalidInput(
@@ -266,9 +287,7 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     ):
         for key in keys:
             inner = document[name]
-            _require_numbers(
-                (name, key), inner.get(key) if isinstance(inner, Mapping) else None, ()
-            )
+            require_numbers((name, key), inner.get(key) if isinstance(inner, Mapping) else None, ())
     place = document["rate"]["characteristic"]
     if not isinstance(place, int) or not 0 <= place < functions:
         raise InvalidInput(
@@ -276,52 +295,12 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         )
 
 
-def _require_area(area: Any, g: int, n: int) -> None:
-    """Raise InvalidInput unless the body with an area constant has a series, vectors and
-    matrices.
-    """
-    if not isinstance(area, Mapping):
-        raise InvalidInput(("document", "area"), "an object", show(area))
-    for name in ("attitude", "inverse", "form"):
-        _require_numbers(("area", name), area.get(name), (n, n))
-    _require_numbers(("area", "momentum"), area.get("momentum"), (n,))
-    _require_numbers(("area", "constant"), area.get("constant"), ())
-    _require_series(("area", "odd"), area.get("odd"), g)
-
-
-def _require_path(path: Any, g: int, n: int, has_area: bool) -> None:
-    """Raise InvalidInput unless the path has numbers and g − 1 series."""
-    if not isinstance(path, Mapping) or not isinstance(path.get("transverse"), list):
-        raise InvalidInput(("document", "path"), "an object with a list of series", show(path))
-    for name in ("radius", "speed"):
-        _require_numbers(("path", name), path.get(name), ())
-    _require_numbers(("path", "position"), path.get("position"), (n - 1,))
-    if len(path["transverse"]) != g - 1:
-        required = f"a list of {g - 1} series"
-        raise InvalidInput(("document", "path", "transverse"), required, show(path["transverse"]))
-    for k, series in enumerate(path["transverse"]):
-        _require_series(("path", "transverse", k), series, g)
-    if has_area:
-        _require_numbers(("path", "odd"), path.get("odd"), ())
-        _require_numbers(("path", "plane"), path.get("plane"), (g, n - 1))
-
-
-def _require_series(where: tuple[str | int, ...], series: Any, g: int) -> None:
-    """Raise InvalidInput unless a function of period 2 has modes, coefficients and a turn."""
-    if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
-        raise InvalidInput(("document", *where), "an object with modes", show(series))
-    count = len(series["modes"])
-    _require_numbers((*where, "modes"), series["modes"], (count, g))
-    _require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
-    _require_numbers((*where, "turn"), series.get("turn"), ())
-
-
 def _require_reduction(reduction: Any, g: int) -> None:
     """Raise InvalidInput unless the basis is a matrix of whole numbers of determinant ±1 and the
     waves are some of its rows.
     """
     basis = reduction.get("basis") if isinstance(reduction, Mapping) else None
-    _require_numbers(("reduction", "basis"), basis, (g, g))
+    require_numbers(("reduction", "basis"), basis, (g, g))
     matrix = np.array(basis, dtype=float)
     if np.any(matrix != np.rint(matrix)) or abs(abs(np.linalg.det(matrix)) - 1) > 1e-6:
         raise InvalidInput(
@@ -368,26 +347,4 @@ def _require_pairs(path: tuple[str | int, ...], value: Any, length: int, functio
             raise InvalidInput(
                 ("document", *path, i), f"a pair [index below {functions}, constant]", show(pair)
             )
-        _require_numbers((*path, i, 1), pair[1], ())
-
-
-def _require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, ...]) -> None:
-    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or
-    strings of them.
-    """
-    if shape:
-        if not isinstance(value, list) or len(value) != shape[0]:
-            raise InvalidInput(("document", *path), f"a list of length {shape[0]}", show(value))
-        for i, item in enumerate(value):
-            _require_numbers((*path, i), item, shape[1:])
-        return
-    try:
-        number = (
-            float(value)
-            if isinstance(value, (int, float, str)) and not isinstance(value, bool)
-            else float("nan")
-        )
-    except (ValueError, OverflowError):
-        number = float("nan")
-    if not abs(number) < float("inf"):
-        raise InvalidInput(("document", *path), "a finite number, or a string of one", show(value))
+        require_numbers((*path, i, 1), pair[1], ())

@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The mean velocity of a contact point over all times, along e_2 and e_3.
+    """The mean velocity of a contact point over all times, along e_2 … e_n.
 
-    - velocity: (2,)
+    - velocity: (n−1,)
     - resonance: the whole numbers M with Σ_s M_s f_s = 0 by which the ball also drifts across
       the direction of its generic motions; None where there are none
     """
@@ -31,5 +31,5 @@ class Drift:
 
     @property
     def direction(self) -> Array:
-        """Return the unit vector along the velocity, (2,); zero for a ball at rest."""
-        return self.velocity / self.speed if self.speed else np.zeros(2)
+        """Return the unit vector along the velocity, (n−1,); zero for a ball at rest."""
+        return self.velocity / self.speed if self.speed else np.zeros_like(self.velocity)

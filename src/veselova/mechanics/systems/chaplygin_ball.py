@@ -20,7 +20,9 @@ from veselova.mechanics.systems.area_veselova import (
     AreaVeselova,
     RollingAreaVeselova,
 )
+from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["ChaplyginBall"]
@@ -41,7 +43,8 @@ class ChaplyginBall(RollingBall):
     Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with 15 digits.
     Formulations: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
     point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises
-    InvalidInput, which names the field.
+    InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
+    ``ChaplyginBallN``.
     """
 
     system: ClassVar[str] = "chaplygin-ball"
@@ -49,6 +52,7 @@ class ChaplyginBall(RollingBall):
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+    in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True
     #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
     has_area_constant: ClassVar[bool] = True

@@ -33,7 +33,7 @@ from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, over_largest, unit
+from veselova.mechanics.geometry.sphere import exact_cross, read_direction
 from veselova.mechanics.potentials.polynomial import Potential, without_companion
 
 __all__ = ["RigidBody", "exact_inverse", "read_fields"]
@@ -238,7 +238,7 @@ def read_fields(
     faults = Faults()
     faults.attempt(require_truth_value, normalize, "normalize")
     body = faults.attempt(_inertia, inertia)
-    point = faults.attempt(_direction, gamma, bool(normalize))
+    point = faults.attempt(read_direction, gamma, 3, bool(normalize))
     exact_Omega = faults.attempt(exact_vector, Omega, ("Omega",), 3)
     exact_frame = None
     if frame is not None and point is not None:
@@ -284,20 +284,6 @@ def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fract
     cofactors = [exact_cross(tensor[i - 2], tensor[i - 1]) for i in range(3)]
     determinant = sum((x * y for x, y in zip(tensor[0], cofactors[0], strict=True)), Fraction())
     return tuple(tuple(x / determinant for x in row) for row in cofactors)
-
-
-def _direction(given: Any, normalize: bool) -> tuple[tuple[Fraction, ...], Array]:
-    """Return γ as given, exactly, and the unit vector."""
-    exact = exact_vector(given, ("gamma",), 3)
-    if not any(exact):
-        raise InvalidInput(("gamma",), "a vector of unit length", "the zero vector")
-    gamma = to_float(over_largest(exact) if normalize else exact)
-    length = float(np.linalg.norm(gamma / np.max(np.abs(gamma))) * np.max(np.abs(gamma)))
-    if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
-        raise InvalidInput(
-            ("gamma",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
-        )
-    return exact, unit(gamma)
 
 
 def _require_finite_squares(velocity: Array, tensor: Array) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,11 +15,12 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import given_arguments
+from veselova.mechanics.core.exact_input import entry_count, given_arguments
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
@@ -26,6 +28,12 @@ if TYPE_CHECKING:
 __all__ = ["RollingBall"]
 
 Array = NDArray[np.float64]
+
+
+def _without_self(method: Any) -> inspect.Signature:
+    """Return the signature of a bound method."""
+    signature = inspect.signature(method)
+    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -40,6 +48,8 @@ class RollingBall(RigidBody):
     ball: Ball
 
     bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    #: What the same ball is in ℝⁿ, n ≥ 4.
+    in_many_dimensions: ClassVar[type[RollingBallN] | None] = None
     #: Whether the ball may turn freely about the vertical.
     twists: ClassVar[bool]
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -52,6 +62,13 @@ class RollingBall(RigidBody):
         "momentum": ("axis",),
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
+
+    def __new__(cls, *arguments: Any, **fields: Any) -> Any:
+        """Return the ball; with n ≥ 4 entries of γ that of ``in_many_dimensions``."""
+        gamma = arguments[3] if len(arguments) > 3 else fields.get("gamma")
+        if cls.in_many_dimensions is not None and entry_count(gamma) > 3:
+            return cls.in_many_dimensions(*arguments, **fields)
+        return super().__new__(cls)
 
     def __init__(
         self,
@@ -154,3 +171,7 @@ class RollingBall(RigidBody):
             frame = series["frame"]
             return self.ball.force(self.angular_acceleration(series["Omega"], frame[..., 0]), frame)
         return super().derive(name, series)
+
+
+# ``__new__`` looks at γ alone, and would hide what ``__init__`` takes.
+RollingBall.__signature__ = _without_self(RollingBall.__init__)  # type: ignore[attr-defined]

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
@@ -52,15 +53,9 @@ class RollingVeselova(Veselova):
     @cached_property
     def speed(self) -> float:
         """Return 2h/|p|, with which the displacement along γ of the natural frame grows."""
-        return _root(self.exact_square_of_speed) if self.moves else 0.0
+        return square_root(self.exact_square_of_speed) if self.moves else 0.0
 
     @property
     def start(self) -> Series:
         """Return the series at t = 0."""
         return {**super().start, "displacement": np.zeros((1, self.n - 1))}
-
-
-def _root(square: Fraction) -> float:
-    """Return the square root of a positive rational, whose float may be out of range."""
-    shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
-    return float(np.ldexp(np.sqrt(float(square / Fraction(4) ** shift)), shift))

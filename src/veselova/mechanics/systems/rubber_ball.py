@@ -13,7 +13,9 @@ from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.flows.ball_flow import RollingFlow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rubber_ball_n import RubberBallN
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3, multiplier
 
@@ -46,7 +48,7 @@ class RubberBall(RollingBall, VeselovaSO3):
 
     Formulations: those of ``VeselovaSO3`` with the quadrature of the contact point, and
     ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises InvalidInput, which
-    names the field.
+    names the field. With n ≥ 4 entries of ``gamma`` the ball is a ``RubberBallN``.
     """
 
     system: ClassVar[str] = "rubber-ball"
@@ -55,6 +57,7 @@ class RubberBall(RollingBall, VeselovaSO3):
         "multiplier": (),
     }
     derived: ClassVar[tuple[str, ...]] = (*RollingBall.derived, "multiplier")
+    in_many_dimensions: ClassVar[type[RollingBallN] | None] = RubberBallN
     twists: ClassVar[bool] = False
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, WithJsonSchema
@@ -12,14 +13,15 @@ from veselova.mechanics.core.problem import Problem
 __all__ = [
     "NUMBER",
     "Attitude",
+    "BallInertia",
     "BodyInertia",
     "Columns",
+    "Direction",
     "Frame",
     "Inertia",
     "InertiaOperator",
     "Matrix",
     "Number",
-    "Pair",
     "Potential",
     "PotentialData",
     "Request",
@@ -28,6 +30,7 @@ __all__ = [
     "Tensor",
     "Times",
     "Triple",
+    "Turning",
     "Vector",
     "Whole",
 ]
@@ -87,7 +90,6 @@ _MONOMIAL = {
 _TIMES = {"anyOf": [{"type": "array", "items": NUMBER, "minItems": 1}, _UNIFORM]}
 
 _TRIPLE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-_PAIR = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
 _SQUARE = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
 _TERM = {
     "type": "object",
@@ -132,11 +134,16 @@ _BODY_INERTIA = {
     ]
 }
 
+_FROM_THREE = {"type": "array", "items": NUMBER, "minItems": 3}
+_BALL_INERTIA = {"anyOf": [_FROM_THREE, _SQUARE, *_INERTIA_OPERATOR["anyOf"]]}
+
 Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
 Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]
 Frame = Annotated[Any, WithJsonSchema({"anyOf": [_MATRIX, {"type": "null"}]})]
+Direction = Annotated[Any, WithJsonSchema(_FROM_THREE)]
+Turning = Annotated[Any, WithJsonSchema({"anyOf": [_FROM_THREE, _MATRIX]})]
+BallInertia = Annotated[Any, WithJsonSchema(_BALL_INERTIA)]
 Number = Annotated[Any, WithJsonSchema(NUMBER)]
-Pair = Annotated[Any, WithJsonSchema(_PAIR)]
 Triple = Annotated[Any, WithJsonSchema(_TRIPLE)]
 Tensor = Annotated[Any, WithJsonSchema({"anyOf": [_TRIPLE, _SQUARE]})]
 Attitude = Annotated[Any, WithJsonSchema({"anyOf": [_SQUARE, {"type": "null"}]})]
@@ -171,6 +178,11 @@ class SystemModel(Request):
     measured: ClassVar[str]
 
     system: str
+
+    @property
+    def outputs(self) -> Mapping[str, tuple[str, ...]]:
+        """Return the names of the axes of each output, as they are in this problem's dimension."""
+        return self.problem_class.outputs
 
     @property
     def dimension(self) -> int:

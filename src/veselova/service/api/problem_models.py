@@ -18,6 +18,7 @@ from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson
 from veselova.mechanics.systems.lr_system import LRSystem
 from veselova.mechanics.systems.neumann import NeumannSystem
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.stiefel import StiefelFlow
@@ -26,14 +27,15 @@ from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 from veselova.service.api.problem_fields import (
     NUMBER,
     Attitude,
+    BallInertia,
     BodyInertia,
     Columns,
+    Direction,
     Frame,
     Inertia,
     InertiaOperator,
     Matrix,
     Number,
-    Pair,
     Potential,
     PotentialData,
     Request,
@@ -42,6 +44,7 @@ from veselova.service.api.problem_fields import (
     Tensor,
     Times,
     Triple,
+    Turning,
     Vector,
     Whole,
 )
@@ -156,40 +159,58 @@ class EulerPoissonModel(RigidBodyModel):
 
 
 class BallModel(SystemModel):
-    """A ball on a horizontal plane and its state at t = 0."""
+    """A ball on a horizontal plane, or on a hyperplane of ℝⁿ, n ≥ 4, and its state at t = 0."""
 
-    measured: ClassVar[str] = "inertia"
+    problem_class: ClassVar[type[RollingBall]]
+    measured: ClassVar[str] = "gamma"
 
     inertia: Annotated[
-        Tensor,
+        BallInertia,
         Field(
             description="inertia about the centre: 3 positive principal moments, or a symmetric "
-            "positive definite 3 × 3 matrix"
+            "positive definite 3 × 3 matrix. n ≥ 4: the special one, or n(n−1)/2 moments that are "
+            "so"
         ),
     ]
     mass: Annotated[Number, Field(description="mass, greater than 0")]
     radius: Annotated[Number, Field(description="radius, greater than 0")]
     gamma: Annotated[
-        Triple, Field(description="unit normal e_1 = γ of the plane, upwards, seen from the body")
+        Direction,
+        Field(description="unit normal e_1 = γ of the plane, upwards, seen from the body"),
     ]
-    Omega: Annotated[Triple, Field(description="angular velocity in the body")]
+    Omega: Annotated[
+        Turning,
+        Field(
+            description="angular velocity in the body; n ≥ 4: coefficients on E_i∧E_j, i < j, or "
+            "the skew matrix"
+        ),
+    ]
     frame: Annotated[
-        Attitude,
-        Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out"),
+        Frame,
+        Field(description="orthogonal n × n, columns e_i, e_1 = γ; the natural one when left out"),
     ] = None
     position: Annotated[
-        Pair, Field(description="contact point at t = 0, along e_2 and e_3; zero when left out")
+        Vector, Field(description="contact point at t = 0, along e_2 … e_n; zero when left out")
     ] = (0, 0)
     strict: Annotated[
         bool, Field(description="refuse moments that violate the triangle inequalities")
     ] = True
-    normalize: Annotated[bool, Field(description="scale gamma to unit length first")] = False
+    normalize: Annotated[
+        bool,
+        Field(description="scale gamma to unit length first; n ≥ 4: and project Omega"),
+    ] = False
+
+    @property
+    def outputs(self) -> Mapping[str, tuple[str, ...]]:
+        """Return those of the ball in ℝⁿ where n ≥ 4."""
+        many = self.problem_class.in_many_dimensions
+        return self.problem_class.outputs if many is None or self.dimension < 4 else many.outputs
 
 
 class RubberBallModel(BallModel):
     """A ball that rolls on a plane without slipping, (Ω,γ) = const, zero for no twist."""
 
-    problem_class: ClassVar[type[Problem]] = RubberBall
+    problem_class: ClassVar[type[RollingBall]] = RubberBall
 
     system: Literal["rubber-ball"]
 
@@ -197,7 +218,7 @@ class RubberBallModel(BallModel):
 class ChaplyginBallModel(BallModel):
     """A ball that rolls on a plane without slipping and is free to twist: Chaplygin's."""
 
-    problem_class: ClassVar[type[Problem]] = ChaplyginBall
+    problem_class: ClassVar[type[RollingBall]] = ChaplyginBall
 
     system: Literal["chaplygin-ball"]
 

@@ -160,7 +160,7 @@ class ComparisonRequest(TorusRequest):
         """Return what is wrong with the options for the system that they are asked of."""
         faults = Faults()
         self._try_options(faults)
-        names = SYSTEMS[self.problem.system].problem_class.output_names()
+        names = [*self.problem.outputs, CONDITIONING]
         faults.found += [
             unknown_name(("outputs", i), name, names)
             for i, name in enumerate(self.outputs or ())

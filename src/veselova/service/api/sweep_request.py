@@ -321,11 +321,7 @@ class SweepRequest(TorusRequest):
         of the kept trajectories.
         """
         n = self.problem.dimension
-        outputs = (
-            len(self.outputs)
-            if self.outputs
-            else len(SYSTEMS[self.problem.system].problem_class.outputs)
-        )
+        outputs = len(self.outputs) if self.outputs else len(self.problem.outputs)
         summary = 16 + 8 * n + (2 * outputs * n * n if self.times is not None else 0)
         return summary + (outputs * n * n * self.time_count() if self.trajectories else 0)
 

@@ -1,0 +1,156 @@
+"""Chaplygin's ball in ℝⁿ, n ≥ 4, without momentum in so(n−1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from operator import mul
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.flows.ball_flow import RollingFlow
+from veselova.mechanics.flows.ball_flow_n import ChaplyginFlowN
+from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_ball_n import ExactVector, RollingBallN
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+
+__all__ = ["ChaplyginBallN"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class ChaplyginBallN(RollingBallN):
+    """What ``ChaplyginBall`` is in ℝⁿ, n ≥ 4, without momentum in so(n−1): it rolls without
+    slipping and is free to twist, and k = Iω + D(γγᵀω + ωγγᵀ) = γ∧p, D = ma².
+
+    - inertia: {"special": [A_1, …, A_n]} with J_ij = A_iA_j/det A above ma², for the moments I_ij =
+      D²/(J_ij − D) about the centre; or the n(n−1)/2 moments I_ij, i < j, in lexicographic order, a
+      list or the diagonal of {"matrix": …}, for which D + D²/I_ij = c A_iA_j/det A to 1e-9
+    - mass, radius, gamma, frame, position, strict: as of ``RubberBallN``
+    - Omega: ω at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the skew matrix (n, n);
+      the momentum k that it makes has to be γ∧p to 1e-9
+
+    With ``normalize=True`` γ is scaled, and ω becomes the one with this γ̇ = −ωγ and momentum γ∧p.
+    The motion commutes with that of ``RubberBallN`` of the same A: ω = J(γ∧ξ)/D − γ∧ξ, where ξ is
+    the velocity of that one with the same p. Outputs, error, engines: as of ``RubberBallN``.
+
+    Formulations: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
+    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Against the ball
+    itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names the field.
+    """
+
+    system: ClassVar[str] = "chaplygin-ball"
+    twists: ClassVar[bool] = True
+    formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+
+    def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
+        gamma = self._exact_gamma
+        if normalize:
+            momentum = self._momentum_of(tuple(-(omega @ np.array(gamma, dtype=object))))
+            return self._velocity_of(momentum)
+        J = [moment + self.ball.added for moment in self.ball.moments]
+        for value, i, j in zip(J, *np.triu_indices(self.n, 1), strict=True):
+            omega[i, j], omega[j, i] = value * omega[i, j], value * omega[j, i]
+        momentum = tuple(-(omega @ np.array(gamma, dtype=object)))
+        velocity = self._velocity_of(momentum)
+        self._require_no_momentum(np.array(omega, dtype=np.float64))
+        return velocity
+
+    def _require_no_momentum(self, momentum: Array) -> None:
+        """Raise InvalidInput unless Iω, of (I+D)ω, is along γ alone."""
+        rows, columns = np.triu_indices(self.n, 1)
+        share = self.ball.operator / (self.ball.operator + float(self.ball.added))
+        M = np.zeros_like(momentum)
+        M[rows, columns] = momentum[rows, columns] * share
+        M = M - M.T
+        along = np.outer(self.gamma, self.gamma @ M)
+        off = float(np.max(np.abs(M - along + along.T)))
+        if off > INPUT_TOLERANCE * float(np.max(np.abs(momentum))):
+            required = (
+                "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ, to 1e-9 "
+                "(or normalize=True)"
+            )
+            raise InvalidInput(("Omega",), required, f"a momentum there of {off:.3g}")
+
+    def _velocity_of(self, momentum: ExactVector) -> ExactVector:
+        """Return ξ = Δ/(q,Aq) [A⁻¹p − (p,A⁻¹q)q] over p's unit, from p."""
+        A, gamma = self.ball.A, self._exact_gamma
+        square = sum(map(mul, gamma, gamma))
+        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        free = [p / a for p, a in zip(momentum, A, strict=True)]
+        share = Fraction(sum(map(mul, free, gamma)), square)
+        return tuple(factor * (y - share * x) for y, x in zip(free, gamma, strict=True))
+
+    def _momentum_of(self, q_dot: ExactVector) -> ExactVector:
+        """Return p with p/D − ξ(p) = q̇ and (p,γ) = 0: a linear system, symmetric and positive
+        definite across γ.
+        """
+        A, gamma, n = self.ball.A, self._exact_gamma, self.n
+        square = sum(map(mul, gamma, gamma))
+        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        rows = [[Fraction(0)] * (n + 2) for _ in range(n + 1)]
+        for i in range(n):
+            rows[i][i] = 1 / self.ball.added - factor / A[i]
+            rows[i][n] = rows[n][i] = gamma[i]
+            rows[i][-1] = q_dot[i]
+        return _solve_exactly(rows)[:n]
+
+    @property
+    def _unit(self) -> Fraction:
+        """Return det A over the scale of J."""
+        return math.prod(self.ball.A) / self.ball.scale
+
+    def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
+        return CommutingVeselova(
+            self.ball.A,
+            self._exact_gamma,
+            velocity,
+            self._exact_frame,
+            added=self.ball.added / self.ball.scale,
+            scale=self.ball.scale,
+        )
+
+    def _omega_of(self, q: Array, xi: Array) -> Array:
+        x = self.ball.roots
+        momentum = (x * q)[..., :, None] * (x * xi)[..., None, :] / float(self.ball.added)
+        product = momentum - q[..., :, None] * xi[..., None, :]
+        return np.asarray(product - np.swapaxes(product, -1, -2))
+
+    def flow(self, formulation: str = "momentum") -> Flow:
+        """Return the field in units of this problem."""
+        if formulation == "contact-forces":
+            return self.contact_force_flow()
+        _, power = unit_scale(self.ball.operator)
+        power -= power % 2
+        attitude = ChaplyginFlowN(
+            roots=np.ldexp(self.ball.roots, -power // 2),
+            added=float(np.ldexp(float(self.ball.added), -power)),
+            momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
+            frame=self.frame,
+            time_unit=1 / self.turning,
+        )
+        contact = self.start["position"][0]
+        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
+
+
+def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:
+    """Return the solution of a regular linear system of rationals, its right-hand side the last
+    column.
+    """
+    size = len(rows)
+    for k in range(size):
+        pivot = max(range(k, size), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(size):
+            if i != k and rows[i][k]:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return tuple(row[-1] for row in rows)

@@ -1,0 +1,336 @@
+"""Balls that roll on a hyperplane of ℝⁿ, n ≥ 4: their data, their start, and their series."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.mechanics.bodies.ball_n import BallN
+from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.exact_input import (
+    exact_matrix,
+    exact_vector,
+    given_arguments,
+    is_matrix,
+    require_truth_value,
+    to_float,
+    whole_number,
+)
+from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
+from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
+from veselova.mechanics.groups.matrix_group import LARGEST
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+if TYPE_CHECKING:
+    from veselova.mechanics.results.drift import Drift
+
+__all__ = ["ExactVector", "RollingBallN"]
+
+Array = NDArray[np.float64]
+ExactVector = tuple[Fraction, ...]
+
+#: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles.
+_BITS = 320
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class RollingBallN(Problem):
+    """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping.
+
+    - ball: what was given of the ball
+    - gamma: (n,) the unit normal e_1
+    - Omega: (n(n−1)/2,) the coefficients of ω on E_i∧E_j, i < j
+    - frame: (n, n) at t = 0
+    """
+
+    ball: BallN
+    gamma: Array
+    Omega: Array
+    frame: Array
+    given: Mapping[str, Any]
+    _exact_gamma: ExactVector
+    _exact_rate: ExactVector
+    _exact_frame: ExactFrame | None
+
+    engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
+    has_tori: ClassVar[bool] = True
+    has_documents: ClassVar[bool] = True
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    portrait: ClassVar[str] = "gamma"
+    #: Whether the ball may turn freely about the normal.
+    twists: ClassVar[bool]
+    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "Omega": ("plane",),
+        "gamma": ("axis",),
+        "frame": ("axis", "vector"),
+        "position": ("horizontal",),
+        "velocity": ("horizontal",),
+        "force": ("horizontal",),
+        "momentum": ("plane",),
+    }
+    derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
+
+    def __init__(
+        self,
+        inertia: Any,
+        mass: Any,
+        radius: Any,
+        gamma: Any,
+        Omega: Any,
+        frame: Any = None,
+        position: Any = (0, 0),
+        *,
+        strict: bool = True,
+        normalize: bool = False,
+    ) -> None:
+        faults = Faults()
+        n = faults.attempt(whole_number, len(gamma), ("gamma",), 4, LARGEST)
+        if n is None:
+            faults.require_none()
+            raise AssertionError
+        faults.attempt(require_truth_value, normalize, "normalize")
+        data = (inertia, mass, radius, position, strict)
+        ball = faults.attempt(BallN.of, n, self.twists, *data)
+        point = faults.attempt(read_direction, gamma, n, bool(normalize))
+        turning = faults.attempt(_turning, Omega, n)
+        exact_frame = None
+        if frame is not None and point is not None:
+            exact_frame = faults.attempt(given_frame, frame, point[0], bool(normalize), "gamma")
+        elif frame is not None:
+            faults.attempt(exact_matrix, frame, ("frame",), n)
+        faults.require_none()
+        assert ball is not None
+        assert point is not None
+        assert turning is not None
+        exact_gamma, direction = point
+        self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
+        self._set(_exact_rate=self._velocity_of_point(turning, bool(normalize)))
+        torus = self.on_torus() if any(self._exact_rate) else None
+        if exact_frame is not None:
+            start = admissible_frame(to_float(exact_frame), direction)
+        elif torus is None:
+            start = np.linalg.qr(np.column_stack([direction, np.eye(n)]))[0]
+            start = start * np.sign(start[:, 0] @ direction)
+        else:
+            start = torus.frame
+        self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
+        if torus is not None:
+            self._set(Omega=self.angular_velocity(start[None])[0])
+        given = given_arguments(
+            inertia=inertia,
+            mass=mass,
+            radius=radius,
+            gamma=gamma,
+            Omega=Omega,
+            frame=frame,
+            position=position,
+            strict=strict,
+            normalize=normalize,
+        )
+        self._set(given=given)
+
+    @abstractmethod
+    def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
+        """Return the rational vector that, over |γ|, is the velocity of q on the torus, from ω as
+        an (n, n) array of rationals. Raises InvalidInput for an ω that the system forbids.
+        """
+
+    @abstractmethod
+    def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
+        """Return the problem on whose torus the motion runs, from the velocity of q there."""
+
+    @abstractmethod
+    def _omega_of(self, q: Array, xi: Array) -> Array:
+        """Return ω (..., n, n) from q and the velocity ξ of the rank-one problem with p."""
+
+    def __repr__(self) -> str:
+        shown = ((name, getattr(self, name)) for name in ("gamma", "Omega"))
+        parts = (f"{name}={np.array2string(x, precision=6, threshold=8)}" for name, x in shown)
+        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+
+    @property
+    def n(self) -> int:
+        """Return the dimension."""
+        return self.ball.n
+
+    @property
+    def title(self) -> str:
+        """Return the system, its dimension and its energy."""
+        energy = float(self.integrals(self.start)["energy"][0])
+        return f"{self.system}, n = {self.n}, energy {energy:.12g}"
+
+    @property
+    def moves(self) -> bool:
+        """Return whether the ball moves."""
+        return bool(np.any(self.Omega))
+
+    @property
+    def turning(self) -> float:
+        """Return |ω|."""
+        return float(np.linalg.norm(self.Omega))
+
+    @property
+    def extent(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return self.ball.size
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        contact = np.array([[float(x) for x in self.ball.contact]])
+        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
+
+    def on_torus(self) -> RollingVeselova:
+        """Return the problem on whose torus the motion runs, the same object every time."""
+        return self._torus
+
+    @cached_property
+    def _torus(self) -> RollingVeselova:
+        length = inverse_length(self._exact_gamma, _BITS)
+        return self._torus_of(tuple(length * x for x in self._exact_rate))
+
+    @cached_property
+    def drift(self) -> Drift:
+        """Return the mean velocity of the contact point, its direction, and the resonance if there
+        is one. Raises Unsolved on a separatrix.
+        """
+        # By name, as engines are: what solves stands above systems.
+        found: Drift = import_module("veselova.engines").drift(self)
+        return found
+
+    @cached_property
+    def momentum_in_space(self) -> Array:
+        """Return Eᵀp, (n,), with exact zero along e_1."""
+        torus = self.on_torus()
+        x = self.ball.roots
+        q, xi = torus.q, torus.q_dot
+        p = (q @ (x * q)) * (x * xi) - (xi @ (x * q)) * (x * q)
+        found = self.frame.T @ p
+        found[0] = 0.0
+        return found
+
+    def _xi(self, q: Array, p: Array) -> Array:
+        """Return ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq), J_ij = x_ix_j, for q and p (..., n)."""
+        x = self.ball.roots
+        free = p / x
+        free = free - np.sum(free * q, axis=-1)[..., None] * q
+        return np.asarray(free / np.sum(q * x * q, axis=-1)[..., None])
+
+    def angular_velocity(self, frame: Array) -> Array:
+        """Return Ω at attitudes (N, n, n) of this motion, (N, n(n−1)/2)."""
+        q = frame[..., 0]
+        return coefficients(self._omega_of(q, self._xi(q, frame @ self.momentum_in_space)))
+
+    def _parts(self, series: Series) -> tuple[Array, Array, Array]:
+        """Return ω, q and p = −((I+D)ω)q along series."""
+        J = self.ball.operator + float(self.ball.added)
+        q = series["frame"][..., 0]
+        p = -np.einsum("...ij,...j->...i", skew(series["Omega"] * J, self.n), q)
+        return skew(series["Omega"], self.n), q, p
+
+    def derive(self, name: str, series: Series) -> Array:
+        """Return gamma, velocity, force, or the momentum q∧p about the contact point, (N,
+        n(n−1)/2).
+        """
+        frame = series["frame"]
+        if name == "gamma":
+            return np.array(frame[..., 0])
+        omega, q, p = self._parts(series)
+        if name == "momentum":
+            return coefficients(
+                q[..., :, None] * p[..., None, :] - p[..., :, None] * q[..., None, :]
+            )
+        radius = float(self.ball.radius)
+        q_dot = -np.einsum("...ij,...j->...i", omega, q)
+        if name == "velocity":
+            return np.asarray(-radius * np.einsum("...ik,...i->...k", frame[..., 1:], q_dot))
+        x = self.ball.roots
+        p_dot = -np.einsum("...ij,...j->...i", omega, p)
+        xi = self._xi(q, p)
+        size = np.sum(q * x * q, axis=-1)[..., None]
+        # of the derivative of ξ, what is across q
+        xi_dot = (p_dot / x - np.sum(p * q / x, axis=-1)[..., None] * q_dot) / size
+        xi_dot = xi_dot - 2 * np.sum(q_dot * x * q, axis=-1)[..., None] / size * xi
+        moved = np.einsum("...ij,...j->...i", omega, xi) + xi_dot
+        side = 1.0 if self.twists else -1.0
+        force = side * float(self.ball.mass) * radius
+        return np.asarray(force * np.einsum("...ik,...i->...k", frame[..., 1:], moved))
+
+    def complete(self, series: Series) -> Series:
+        """Return the series of a flow, ω as its coefficients; where the flow leaves it out, from
+        the momentum.
+        """
+        rest = {name: values for name, values in series.items() if name != "omega"}
+        Omega = coefficients(series["omega"]) if "omega" in series else None
+        return {"Omega": self.angular_velocity(rest["frame"]) if Omega is None else Omega, **rest}
+
+    def integrals(self, series: Series) -> dict[str, Array]:
+        """Return the integrals of motion along the series, by name: ``energy`` ½⟨k,ω⟩,
+        ``gamma_norm`` (γ,γ), ``space_momentum`` Eᵀp, ``twist``: the largest of ⟨ω, e_i∧e_j⟩, i, j ≥
+        2, or, where the ball twists freely, of the momentum's, over that of all.
+        """
+        frame = series["frame"]
+        omega, q, p = self._parts(series)
+        q_dot = -np.einsum("...ij,...j->...i", omega, q)
+        k = skew(series["Omega"] * self.ball.operator, self.n) if self.twists else omega
+        along = np.swapaxes(frame, -1, -2) @ k @ frame
+        size = np.max(np.abs(along), axis=(-1, -2))
+        across = np.max(np.abs(along[..., 1:, 1:]), axis=(-1, -2))
+        return {
+            "energy": np.asarray(np.sum(p * q_dot, axis=-1) / 2),
+            "gamma_norm": np.asarray(np.sum(q * q, axis=-1)),
+            "space_momentum": np.einsum("...ji,...j->...i", frame, p),
+            "twist": np.divide(across, size, out=np.zeros_like(size), where=size > 0),
+        }
+
+    @property
+    def vanishing(self) -> frozenset[str]:
+        """Return the twist."""
+        return frozenset({"twist"})
+
+    def contact_force_flow(self) -> ContactForceFlowN:
+        """Return the field of the ball with its contact forces, in units of this problem."""
+        _, power = unit_scale(self.ball.operator)
+        return ContactForceFlowN(
+            inertia=np.ldexp(self.ball.operator, -power),
+            added=float(np.ldexp(float(self.ball.added), -power)),
+            omega=self.Omega / self.turning,
+            g=np.ascontiguousarray(self.frame.T),
+            radius=float(self.ball.radius),
+            contact=self.start["position"][0],
+            time_unit=1 / self.turning,
+            twists=self.twists,
+            size=self.ball.size,
+        )
+
+
+def _turning(given: Any, n: int) -> Any:
+    """Return ω as an (n, n) array of rationals, from its coefficients or as a skew matrix."""
+    if is_matrix(given):
+        rows = np.array(exact_matrix(given, ("Omega",), n), dtype=object)
+        off = np.array(rows + rows.T, dtype=np.float64)
+        if np.max(np.abs(off)) > INPUT_TOLERANCE * float(np.max(np.abs(rows))):
+            row, column = divmod(int(np.argmax(np.abs(off))), n)
+            given_pair = (
+                f"{float(rows[row, column])} against {float(rows[column, row])} across the diagonal"
+            )
+            raise InvalidInput(("Omega", row, column), "a skew matrix", given_pair)
+        return (rows - rows.T) / Fraction(2)
+    numbers = exact_vector(given, ("Omega",), n * (n - 1) // 2)
+    omega = np.full((n, n), Fraction(0), dtype=object)
+    for value, i, j in zip(numbers, *np.triu_indices(n, 1), strict=True):
+        omega[i, j], omega[j, i] = value, -value
+    return omega

@@ -1,0 +1,369 @@
+"""Balls in ℝⁿ, n ≥ 4: every engine, route, formulation and door through their table, against the
+ball with its contact forces.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import veselova as vs
+from conftest import PATIENCE, Server, slow
+from problems import BALLS_IN_MORE_DIMENSIONS, BallCaseN
+from rolling_truth import roll_in_n_dimensions
+from veselova import InvalidInput, Unsolved
+from veselova.analytic.motion.area_solution import solution_of
+from veselova.analytic.solve import METHODS, solve
+from veselova.mechanics.systems.catalogue import read_problem
+
+SYSTEMS = ("rubber-ball", "chaplygin-ball")
+CASES = {case.name: case for case in BALLS_IN_MORE_DIMENSIONS}
+
+#: What the integration of the ball itself is off by, over lengths and radians of order 20.
+TRUTH = 1e-11
+
+
+@cache
+def problem_of(name: str, system: str) -> Any:
+    return CASES[name].problem(system)
+
+
+@cache
+def truth(name: str, system: str) -> Any:
+    """Return the motion of the ball itself."""
+    return roll_in_n_dimensions(problem_of(name, system), CASES[name].times())
+
+
+def largest(values: Any) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def off(problem: Any, one: Any, other: Any) -> Any:
+    """Return the largest difference of the bounded series at each time."""
+    rows = [np.abs(getattr(one, x) - getattr(other, x)) for x in problem.bounded]
+    return np.max([np.max(x.reshape(len(x), -1), axis=1) for x in rows], axis=0)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", CASES)
+def test_true_errors_never_exceed_reported_ones(name: str, system: str) -> None:
+    problem, true = problem_of(name, system), truth(name, system)
+    found = vs.solve(problem, CASES[name].times())
+    assert found.provenance.engine == "analytic"
+    assert np.all(off(problem, found, true) <= found.error + TRUTH)
+    assert np.max(found.error) < 1e-10
+    size = 1 + problem.turning
+    assert largest(found.Omega - true.Omega) < 1e-10 * size
+    assert largest(found.velocity - true.velocity) < 1e-10 * size
+    forces = float(problem.ball.mass) * size**2
+    assert largest(found.force - true.force) < 1e-10 * forces
+    assert max(found.drift.values()) < 1e-11
+
+
+@pytest.mark.parametrize("name", ["generic-4", "two-equal"])
+def test_to_twenty_attitude_and_path_are_those_of_the_ball_to_1e_10(name: str) -> None:
+    for system in SYSTEMS:
+        found = vs.solve(problem_of(name, system), CASES[name].times())
+        assert np.max(off(found.problem, found, truth(name, system))) < 1e-11
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", ["generic-4", "generic-5", "frozen", "heavy"])
+def test_every_formulation_integrates_the_same_motion(name: str, system: str) -> None:
+    problem, true = problem_of(name, system), truth(name, system)
+    for formulation in problem.formulations:
+        found = vs.solve(problem, CASES[name].times(), "numeric", formulation=formulation)
+        assert np.all(off(problem, found, true) <= found.error + TRUTH), formulation
+        assert largest(found.Omega - true.Omega) < 1e-9
+        assert max(found.drift.values()) < 1e-11
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_taylor_integrates_every_formulation(system: str) -> None:
+    pytest.importorskip("heyoka")
+    problem = problem_of("generic-4", system)
+    expected = vs.solve(problem, [3.0])
+    for formulation in problem.formulations:
+        found = vs.solve(problem, [3.0], "numeric", "taylor", formulation=formulation)
+        assert largest(found.position - expected.position) < 1e-12
+
+
+@pytest.mark.parametrize("time_map", ["fourier", "panels"])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_every_route_agrees(system: str, method: str, time_map: str) -> None:
+    for name in ("generic-4", "two-equal", "frozen"):
+        problem = problem_of(name, system)
+        times = np.concatenate([[-7.0, 0.0], np.linspace(1, 40, 300)])
+        some, other = (
+            solve(problem, times, time_map=time_map, method=method),
+            vs.solve(problem, times),
+        )
+        assert np.all(off(problem, some, other) <= some.error + other.error)
+
+
+def drawn(seed: int, system: str) -> Any:
+    """Return a random ball in four to six dimensions, every fourth with equal A's."""
+    rng = np.random.default_rng([35, seed])
+    n = int(rng.choice([4, 4, 4, 5, 5, 6]))
+    A = rng.uniform(0.5, 1.5, n)
+    if seed % 4 == 1:
+        A[1] = A[0]
+    gamma, velocity = rng.normal(size=(2, n))
+    if seed % 8 == 5:
+        gamma[-1] = velocity[-1] = 0
+    frame = np.linalg.qr(np.column_stack([gamma, rng.normal(size=(n, n - 1))]))[0]
+    case = BallCaseN("random", A.tolist(), gamma, velocity, share=rng.uniform(0.05, 0.95))
+    changes = {} if seed % 3 else {"frame": frame * np.sign(frame[:, 0] @ gamma)}
+    return case.problem(system, **changes)
+
+
+@pytest.mark.parametrize("seed", [*range(4), *map(slow, range(4, 200))])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_random_balls_are_served_honestly(seed: int, system: str) -> None:
+    problem = drawn(seed, system)
+    times = np.sort(np.random.default_rng(seed).uniform(-30, 30, 6)) / problem.turning
+    formulation = problem.formulations[seed % 2]
+    comparison = vs.compare(problem, times, formulation=formulation)
+    assert comparison.agrees
+    assert np.max(comparison.analytic.error) < 1e-10
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_along_the_momentum_it_moves_uniformly_and_across_it_hardly(system: str) -> None:
+    problem = problem_of("generic-4", system)
+    times = np.linspace(0, 3000, 400)
+    found = vs.solve(problem, times)
+    P = found.integrals["space_momentum"][0]
+    energy = found.integrals["energy"][0]
+    along = -P[1:] / np.linalg.norm(P)
+    speed = 0.8 * 2 * energy / np.linalg.norm(P)  # (p,q̇) = 2·energy for both balls
+    moved = found.position - found.position[0]
+    assert largest(moved @ along - speed * times) < 1e-12 * 3000 * speed
+    assert largest(moved - np.outer(moved @ along, along)) < 3
+    assert np.allclose(problem.drift.velocity, speed * along, rtol=0, atol=1e-13)
+    assert problem.drift.resonance is None
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_in_a_resonance_it_drifts_across_as_predicted(system: str) -> None:
+    """n = 4 with a frozen direction has two phases; their ratio is made p/q."""
+    case = CASES["frozen"]
+
+    def made(angle: float) -> Any:
+        gamma = np.array(case.gamma)
+        velocity = np.array([math.cos(angle), 0, math.sin(angle), 0])
+        velocity -= (velocity @ gamma) / (gamma @ gamma) * gamma
+        return BallCaseN("resonant", case.A, gamma, velocity).problem(system)
+
+    def ratio(angle: float) -> float:
+        f = vs.torus(made(angle)).frequencies_t
+        return float(f[0] / f[1])
+
+    angles = np.linspace(0.1, 3.0, 40)
+    ratios = np.array([ratio(angle) for angle in angles])
+    found = []
+    for p, q in ((3, 4), (4, 5), (5, 6), (5, 7), (3, 2), (4, 3), (5, 3), (7, 4), (2, 1)):
+        for k in np.flatnonzero((ratios[:-1] - p / q) * (ratios[1:] - p / q) < 0)[:2]:
+            ends = angles[k], angles[k + 1]
+            problem = made(brentq(lambda x, aim=p / q: ratio(x) - aim, *ends, xtol=1e-15))
+            solution = solution_of(problem.on_torus())
+            turns = abs(2 * q / solution.in_tau1.rates[1])
+            period = float(solution.fourier_time_map(False).time(np.array([turns]))[0])
+            measured = np.diff(vs.solve(problem, [0.0, period]).position, axis=0)[0] / period
+            assert largest(measured - problem.drift.velocity) < 1e-12
+            found.append(problem.drift.resonance is not None)
+    assert set(found) == {False, True}
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_far_times_cost_no_more_digits_than_the_time_itself(system: str) -> None:
+    problem = problem_of("generic-4", system)
+    found = vs.solve(problem, [1e9])
+    assert found.error[0] < 100 * np.finfo(float).eps * 1e9 * problem.drift.speed
+    before = vs.solve(problem, [1e9 - 10, 1e9])
+    again = CASES["generic-4"].problem(
+        system,
+        gamma=before.gamma[0],
+        Omega=before.Omega[0],
+        frame=before.frame[0],
+        position=(0, 0),
+    )
+    step = vs.solve(again, [10.0])
+    assert largest(step.frame - before.frame[1]) <= 3 * before.error[0]
+    assert largest(step.position[0] - np.diff(before.position, axis=0)) <= 3 * before.error[0]
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("name", ["generic-4", "two-equal", "frozen"])
+def test_the_document_holds_attitude_velocity_and_path(name: str, system: str) -> None:
+    problem = problem_of(name, system)
+    times = np.array([-3.0, 0.0, 1.0, 20.0, 400.0])
+    found = vs.solve(problem, times)
+    document = vs.closed_form(problem)
+    written = vs.ClosedForm.from_json(document.to_json()).at(times)
+    assert np.all(off(problem, found, written) <= found.error + written.error)
+    assert largest(written.Omega - found.Omega) < 1e-10
+    broken = json.loads(document.to_json())
+    broken["ball"].pop("roots")
+    with pytest.raises(InvalidInput, match="roots"):
+        vs.ClosedForm.from_json(json.dumps(broken))
+
+
+def test_both_balls_of_the_same_numbers_share_a_torus() -> None:
+    rubber, free = (problem_of("generic-4", system) for system in SYSTEMS)
+    added = rubber.ball.added
+    products = [x * y for x, y in zip(rubber.ball.moments, free.ball.moments, strict=True)]
+    assert products == [added**2] * 6
+    # the free ball with the momentum of the other one
+    x, q = rubber.ball.roots, rubber.gamma
+    p = rubber.frame @ rubber.momentum_in_space
+    xi = p / x - (p @ (q / x)) * q
+    xi /= q @ (x * q)
+    turning = np.outer(x * q, x * xi) / float(added) - np.outer(q, xi)
+    other = CASES["generic-4"].problem(
+        "chaplygin-ball", Omega=(turning - turning.T).tolist(), normalize=False
+    )
+    one, two = vs.torus(rubber), vs.torus(other)
+    assert np.allclose(one.riemann_matrix, two.riemann_matrix, rtol=1e-13, atol=1e-13)
+    assert np.allclose(one.constants, two.constants, rtol=1e-12)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_moments_text_and_matrix_state_the_same_ball(system: str) -> None:
+    problem = problem_of("generic-4", system)
+    moments = [str(x) for x in problem.ball.moments]
+    times = [0.5, 7.0]
+    expected = vs.solve(problem, times)
+    rounded = [float(x) for x in problem.ball.moments]
+    for inertia in (moments, rounded, {"matrix": np.diag(rounded).tolist()}):
+        other = CASES["generic-4"].problem(system, inertia=inertia)
+        found = vs.solve(other, times)
+        assert largest(found.position - expected.position) < 2e-13
+    omega = np.zeros((4, 4))
+    omega[np.triu_indices(4, 1)] = problem.Omega
+    same = CASES["generic-4"].problem(system, Omega=omega - omega.T, normalize=True)
+    assert np.allclose(same.Omega, problem.Omega, rtol=1e-14, atol=1e-15)
+
+
+GENERIC: dict[str, Any] = {
+    "inertia": {"special": [1.6, 1.2, 0.9, 0.5]},
+    "mass": 0.3,
+    "radius": 0.8,
+    "gamma": [1, 0, 0, 0],
+    "Omega": [0.1, 0.2, 0.3, 0, 0, 0],
+}
+
+FAULTS = [
+    ("rubber-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "off by"),
+    ("chaplygin-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "off by"),
+    ("rubber-ball", {"mass": 10}, "inertia", "above ma²"),
+    ("chaplygin-ball", {"mass": 10}, "inertia", "above ma²"),
+    ("rubber-ball", {"mass": 0}, "mass", "greater than 0"),
+    ("rubber-ball", {"radius": -1}, "radius", "greater than 0"),
+    ("rubber-ball", {"Omega": [0.1, 0.2, 0.3, 0.4, 0, 0]}, "Omega", "no twist"),
+    ("chaplygin-ball", {"Omega": [0.1, 0.2, 0.3, 0.4, 0, 0]}, "Omega", "without momentum"),
+    ("rubber-ball", {"Omega": [0.1, 0.2, 0.3]}, "Omega", "6 numbers"),
+    ("rubber-ball", {"Omega": np.ones((4, 4)).tolist()}, "Omega", "skew"),
+    ("rubber-ball", {"inertia": [1, 1, 1]}, "inertia", "3 numbers"),
+    ("rubber-ball", {"inertia": {"special": [1, 1, 1]}}, "inertia", "4 numbers"),
+    ("rubber-ball", {"inertia": {"other": [1, 1, 1, 1]}}, "inertia", "other"),
+    ("rubber-ball", {"inertia": {"matrix": np.ones((6, 6)).tolist()}}, "inertia", "diagonal"),
+    ("rubber-ball", {"position": [1, 2]}, "position", "3 numbers"),
+    ("rubber-ball", {"gamma": [1, 1, 0, 0]}, "gamma", "unit length"),
+    ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "64"),
+    ("rubber-ball", {"frame": np.eye(3).tolist()}, "frame", "4 rows"),
+    ("rubber-ball", {"strict": 1}, "strict", "true or false"),
+]
+
+
+@pytest.mark.parametrize(("system", "changes", "field", "part"), FAULTS)
+def test_bad_input_is_refused_by_name(
+    system: str, changes: dict[str, Any], field: str, part: str
+) -> None:
+    kind = vs.RubberBall if system == "rubber-ball" else vs.ChaplyginBall
+    with pytest.raises(InvalidInput) as refusal:
+        kind(**{**GENERIC, **changes})
+    assert field in str(refusal.value)
+    assert part in str(refusal.value)
+
+
+def test_all_faults_come_together() -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        vs.RubberBall(**{**GENERIC, "mass": -1, "Omega": [1], "position": [1, "x", 2]})
+    for field in ("mass", "Omega", "position"):
+        assert field in str(refusal.value)
+
+
+def test_more_digits_are_refused_by_name() -> None:
+    for system in SYSTEMS:
+        for options in ({"digits": 30}, {"certified": True}):
+            with pytest.raises(InvalidInput, match="contact point"):
+                vs.solve(problem_of("generic-4", system), [1.0], **options)
+        with pytest.raises(InvalidInput, match="digits"):
+            vs.closed_form(problem_of("generic-4", system), digits=30)
+        with pytest.raises(Unsolved, match="separatrix"):
+            _ = problem_of("separatrix", system).drift
+    assert np.array_equal(problem_of("at-rest", "rubber-ball").drift.velocity, np.zeros(3))
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_it_passes_every_door(system: str, server: Server, tmp_path: Path) -> None:
+    problem = problem_of("generic-4", system)
+    document = problem.as_request()
+    assert type(read_problem(document)) is type(pickle.loads(pickle.dumps(problem)))
+    times = [0.0, 1.0, 5.0]
+    expected = vs.solve(problem, times)
+    ask = {"problem": document, "times": times}
+    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
+    for name in problem.outputs:
+        assert np.allclose(answer["series"][name], expected.series(name), rtol=0, atol=1e-11)
+    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
+    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
+    assert torus["frequencies_t"] == vs.torus(problem).frequencies_t.tolist()
+    closed = server.ask("POST", "/v1/closed-forms", json={"problem": document}).json()
+    assert closed["ball"]["roots"] == problem.ball.roots.tolist()
+    bad = {**ask, "problem": {**document, "inertia": [1, 1, 1, 1, 1, 2], "Omega": "x"}}
+    refused = server.ask("POST", "/v1/trajectories", json=bad)
+    assert refused.status_code == 422
+    assert {fault["pointer"] for fault in refused.json()["errors"]} == {
+        "/problem/inertia",
+        "/problem/Omega",
+    }
+    unknown = server.ask("POST", "/v1/trajectories", json={**ask, "outputs": ["multiplier"]})
+    assert unknown.status_code == 422
+    with vs.Client(server.url) as client:
+        found = client.trajectory(problem, times)
+        assert np.array_equal(found.position, expected.position)
+    file = tmp_path / "ball.json"
+    file.write_text(json.dumps(ask))
+    command = [sys.executable, "-m", "veselova", "solve", str(file), "--json"]
+    printed = subprocess.run(command, capture_output=True, check=True, timeout=PATIENCE)
+    assert json.loads(printed.stdout)["series"]["force"][2] == expected.force[2].tolist()
+    stored = tmp_path / "ball.npz"
+    expected.to_npz(stored)
+    assert np.array_equal(vs.Trajectory.from_npz(stored).position, expected.position)
+    assert expected.to_xarray()["Omega"].shape == (3, 6)
+
+
+def test_sweeps_run_over_balls_in_more_dimensions(tmp_path: Path) -> None:
+    problem = problem_of("generic-4", "chaplygin-ball").as_request()
+    added = {"/position": [[0, 0, 0], [1, 2, 3]]}
+    table = vs.sweep(
+        problem, added, times=[0.0, 2.0], trajectories=True, workers=1, folder=tmp_path
+    )
+    assert set(table["outcome"].values.tolist()) == {"solved"}
+    assert table["trajectory.Omega"].shape == (2, 2, 6)
+    assert table["trajectory.gamma"].shape == (2, 2, 4)
+    moved = table["trajectory.position"].values[1] - table["trajectory.position"].values[0]
+    assert np.allclose(moved, [1, 2, 3], rtol=0, atol=1e-14)
