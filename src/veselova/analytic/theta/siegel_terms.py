@@ -211,8 +211,8 @@ def _products_of_powers(rows: Array, v: Complex) -> Complex:
     for k, own in zip(rows.T.astype(np.int64), v.T, strict=True):
         most = int(np.max(np.abs(k), initial=0))
         powers = np.ones((2 * most + 1, len(v)), dtype=complex)
-        for sign in (1, -1):
-            one = np.exp(2j * np.pi * sign * own)
+        up = np.exp(2j * np.pi * own)
+        for sign, one in ((1, up), (-1, 1 / up)):
             for j in range(1, most + 1):
                 np.multiply(powers[most + sign * (j - 1)], one, out=powers[most + sign * j])
         result *= powers[most + k]

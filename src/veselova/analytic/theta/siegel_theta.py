@@ -107,15 +107,16 @@ def _phases(
     logarithm of the size, which all have.
     """
     first = members[0]
-    turns = found.turns + points.outer + first.turns + points.n @ first.given_epsilon
-    turns -= np.sum(points.m * (points.rest + first.given_delta), axis=1)
-    own = turns.real + first.logarithm.imag / (2 * _PI)
+    moved = _dot(points.m, points.rest + first.given_delta)
+    own = found.turns.real + points.outer.real - moved.real + points.n @ first.given_epsilon
+    own += first.turns.real + first.logarithm.imag / (2 * _PI)
+    height = found.turns.imag + points.outer.imag - moved.imag + first.turns.imag
     phases = [own]
     for member in members[1:]:
-        phase = own + found.own @ (member.delta - first.delta) + (member.turns - first.turns)
+        phase = own + found.own @ (member.delta - first.delta) + (member.turns - first.turns).real
         phase += points.n @ (member.given_epsilon - first.given_epsilon)
         phases.append(phase - points.m @ (member.given_delta - first.given_delta))
-    return phases, first.logarithm.real - 2 * _PI * turns.imag
+    return phases, first.logarithm.real - 2 * _PI * height
 
 
 def _transform(sums: list[Complex], slope: Complex, L: Complex, Q: Complex) -> Complex:
@@ -147,9 +148,24 @@ def _growth(found: _Sums, slope: Complex, L: Complex, Q: Complex) -> list[Array]
     return [fixed**2 + 2 * np.pi * float(np.max(np.abs(Q))), 2 * rate * fixed, rate**2 * one]
 
 
+def _times(rows: NDArray[Any], matrix: Wide) -> Wide:
+    """Return real rows times a complex matrix: each part is a product of real numbers."""
+    found = np.empty((len(rows), matrix.shape[1]), dtype=np.clongdouble)
+    found.real, found.imag = rows @ matrix.real, rows @ matrix.imag
+    return found
+
+
 def _forms(rows: NDArray[Any], matrix: Wide) -> Wide:
     """Return xᵀ matrix x for each row x."""
-    return np.asarray(np.sum((rows @ matrix) * rows, axis=1))
+    return np.asarray(_dot(rows @ matrix, rows))
+
+
+def _dot(left: NDArray[Any], right: NDArray[Any]) -> Any:
+    """Return the products of rows with rows, (N,), each summed in order."""
+    found = left[:, 0] * right[:, 0]
+    for k in range(1, left.shape[1]):
+        found += left[:, k] * right[:, k]
+    return found
 
 
 @dataclass(frozen=True)
@@ -215,9 +231,10 @@ class SiegelTheta:
             phases, exponent = _phases(points, found, members)
             rounded = exponent.astype(float)
             growth = _growth(found, points.slope, L, Q) if with_errors else []
+            size = np.exp((exponent - rounded).astype(float))
             for place, member in enumerate(members):
                 angle = 2 * np.pi * (phases[place] - np.rint(phases[place])).astype(float)
-                factor = np.exp((exponent - rounded).astype(float) + 1j * angle)
+                factor = size * np.exp(1j * angle)
                 derivative = _transform(
                     [part[place] for part in found.derivatives], points.slope, L, Q
                 )
@@ -236,11 +253,13 @@ class SiegelTheta:
         L = self.reduction.linear
         Q = self.reduction.quadratic
         m = np.rint(np.linalg.solve(self.tau.imag, z.imag.T).T)
-        rest = z.astype(np.clongdouble) - m @ tau
+        moved = _times(m, tau)
+        rest = z.astype(np.clongdouble) - moved
         n = np.rint(rest.real)
-        rest = rest - n
-        slope = (2j * np.pi * (rest @ Q - m)).astype(complex)
-        outer = (_forms(rest, Q) - _forms(m, tau)) / 2
+        rest.real -= n
+        pulled = rest @ Q
+        slope = 2j * np.pi * (pulled.astype(complex) - m)
+        outer = _dot(rest, pulled) / 2 - _dot(m, moved) / 2
         return _Points(rest, n, m, rest @ L.T, outer, slope)
 
     def _alike(self, characteristics: Array) -> list[list[_Member]]:
@@ -285,9 +304,11 @@ class SiegelTheta:
         half_turns = np.array([np.rint(2 * (c.delta - first)) for c in members], dtype=np.int64)
         height = np.linalg.solve(tau.imag.astype(float), z.imag.astype(float).T).T
         m = np.rint(-(epsilon.astype(float) + height)) + epsilon
-        v = z + first + m @ tau
-        turns = _forms(m, tau) / 2 + np.sum(m * (z + first), axis=1)
-        v = v - np.rint(v.real)  # k is an integer
+        moved = _times(m, tau)
+        v = z + first
+        turns = _dot(m, v + moved / 2)
+        v += moved
+        v.real -= np.rint(v.real)  # k is an integer
         own = m.astype(float)
         shape = (len(members), count)
         sums = [np.empty((*shape, *(genus,) * k), dtype=complex) for k in range(order + 1)]
