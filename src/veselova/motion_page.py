@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from veselova.engines import closed_form, solve, torus
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, VeselovaError
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.table import Target, open_target
 from veselova.mechanics.results.trajectory import Trajectory
 
@@ -150,12 +149,10 @@ def _documents(problem: Problem, far: bool) -> dict[str, Any]:
         if found.regime == "separatrix" or found.n > _LARGEST_GENUS + 1:
             return nothing
         document = closed_form(problem).document
-        if document["format"] != ClosedForm.format:  # an area constant, which the page has not
-            return nothing
     except (InvalidInput, Unsolved):
         return nothing
     precise = None
-    if far and not document["axes"] and "path" not in document:
+    if far and not document["axes"] and not {"path", "area"} & document.keys():
         try:
             precise = closed_form(problem, digits=_MORE_DIGITS).document
         except VeselovaError:

@@ -71,12 +71,38 @@ def test_the_three_engines_agree_in_the_plot(visit: Visit) -> None:
     assert closed < 1e-11
 
 
+@pytest.mark.parametrize("preset", ["chaplygin", "spin"])
+def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) -> None:
+    visit.open(f"#preset={preset}&play=0")
+    assert visit.text("#status").startswith("Closed form")
+    for view in ("ball", "body", "sphere", "torus", "ellipsoid"):
+        visit.wait_for_ink(view, colours=100, part=0.1)
+    visit.wait_for_ink("curve", colours=20, part=0.01)
+    assert "Constants: With an area constant" in visit.text("#absent")
+    visit.wait_for("document.getElementById('twin-engines').textContent.includes('integration')")
+    for part in visit.text("#twin-engines").split("differ by at most ")[1:]:
+        assert float(part.split(" ")[0].rstrip(".").replace("−", "-")) < 1e-10
+    before = visit.text("#facts td")
+    visit.page.fill("#time", "1e6")
+    visit.page.keyboard.press("Enter")
+    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+    problem = next(one for one in PRESET_LIST if one["name"] == preset)["problem"]
+    request = {"problem": problem, "times": [10**6], "outputs": ["gamma", "position"]}
+    series = httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]
+    shown = [float(entry) for entry in visit.text("#facts td").replace("−", "-").split(", ")]
+    assert shown == pytest.approx(series["gamma"][0], abs=2e-4)
+    visit.wait_for("document.getElementById('twin-ball').textContent.includes('e+6')")
+    twin = visit.text("#twin-ball").replace("−", "-").split("(")[1].split(")")[0]
+    point = [float(entry) for entry in twin.split(", ")]
+    assert point == pytest.approx(series["position"][0], rel=2e-4)
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_moves(visit: Visit, preset: str) -> None:
     visit.open(f"#preset={preset}&play=0")
     assert visit.text("#message") == ""
     assert visit.page.input_value("#preset") == preset
-    ball = preset in ("ball", "drift", "chaplygin")
+    ball = preset in ("ball", "drift", "chaplygin", "spin")
     visit.wait_for_ink("ball" if ball else "body", colours=100, part=0.03)
     first = visit.text("#facts td")
     visit.page.fill("#time", "7/10")

@@ -19,7 +19,12 @@ from veselova import motion_page
 
 Q = {"q": ["0.5", "0.5", "0.7"], "q_dot": ["0.4", "0.3", "-0.1"], "normalize": True}
 BODY = vs.Veselova(["3", "2", "1"], **Q)
-BALL = vs.ChaplyginBall([0.4, 0.6, 0.9], 0.2, 1, [0.6, 0, 0.8], [0.8, 1, -0.3])
+#: A ball on a separatrix, which has no document, and one with an area constant, which has one.
+BALL = vs.RubberBall([1, 2, 5], 1, 1, [0, 1, 0], [-3, 0, 1], strict=False)
+TWISTING = vs.ChaplyginBall([0.4, 0.6, 0.9], 0.2, 1, [0.6, 0, 0.8], [0.8, 1, -0.3])
+
+#: A system without documents.
+FREE = vs.EulerPoisson([1, 2, 2.5], [0.6, 0, 0.8], [0.1, 1.5, 0.1])
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -62,6 +67,14 @@ def test_far_times_carry_more_digits() -> None:
     assert float(found["t"]) == 1e8
 
 
+def test_a_page_carries_the_document_of_an_area_constant() -> None:
+    found = carried(motion_page.page(vs.solve(TWISTING, [0, 1e7])))
+    assert found["document"]["format"] == "veselova.closed-form/2"
+    assert found["document"] == json.loads(vs.closed_form(TWISTING).to_json())
+    assert found["torus"]["regime"] == "generic"
+    assert found["series"] is found["precise"] is None
+
+
 def test_a_motion_without_a_document_carries_its_series() -> None:
     times = np.linspace(-2, 6, 9)
     trajectory = vs.solve(BALL, times)
@@ -81,7 +94,7 @@ def test_a_motion_without_a_document_carries_its_series() -> None:
 
 def test_series_over_too_long_a_time_are_refused() -> None:
     with pytest.raises(vs.InvalidInput, match=r"times: required times within .* of each other"):
-        motion_page.page(vs.solve(BALL, [0, 5000]))
+        motion_page.page(vs.solve(FREE, [0, 5000]))
 
 
 def test_nothing_in_a_problem_ends_the_script(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,6 +131,19 @@ def test_a_file_plays_without_a_server(browser: Any, tmp_path: Path) -> None:
         assert visit.page.input_value("#text-A-1") == "2"
         assert visit.page.get_attribute("#text-A-1", "readonly") is not None
         assert visit.download("#csv", tmp_path).read_text().startswith("t,q.1")
+
+
+@needs_chromium
+def test_an_area_constant_plays_at_any_time(browser: Any, tmp_path: Path) -> None:
+    vs.solve(TWISTING, np.linspace(0, 30, 61)).to_html(tmp_path / "twisting.html")
+    with visiting(browser, FILE, offline=True) as visit:
+        visit.open(f"{tmp_path}/twisting.html#play=0".lstrip("/"))
+        for view in ("ball", "body", "sphere", "torus", "ellipsoid"):
+            visit.wait_for_ink(view, colours=100, part=0.1)
+        visit.wait_for("document.getElementById('twin-engines').textContent.includes('differ by')")
+        words = visit.text("#twin-engines").split("differ by at most ")[1].split(" ")
+        assert float(words[0].rstrip(".").replace("−", "-")) < 1e-11
+        shown(visit, "12345.6", vs.solve(TWISTING, ["12345.6"]).frame[0, :, 0])
 
 
 @needs_chromium

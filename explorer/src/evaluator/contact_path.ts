@@ -2,11 +2,14 @@
  * The contact point of a rolling ball: x(t) = x(0) − a ℜᵀ (y_2, …, y_g, speed·t) with
  * y_k = Σ 2c/(π M·f) [sin 2π(M·z/2 + turn) − sin 2π(M·z⁰/2 + turn)]  (docs/balls.md).
  *
+ * With an area constant `plane` stands in the place of ℜ, and to y_γ = speed·t comes `odd` times the
+ * integral of the odd part of dt/dτ₁, which is a series like the others.
+ *
  * Where M·f is next to nothing the ball drifts across its strip; that mode is written as
  * 2c cos(2π(M·z⁰/2 + turn) + h) sin(h)·2/(π M·f), h = π M·f τ₁/2.
  */
 import { matrix, number, vector } from "./document.ts";
-import type { ClosedFormDocument } from "./document.ts";
+import type { ClosedFormDocument, PathSeries } from "./document.ts";
 import type { DoubleDouble } from "./double_double.ts";
 import { dot } from "./linear_algebra.ts";
 
@@ -24,7 +27,9 @@ export class ContactPath {
   readonly #radius: number;
   readonly #start: number[];
   readonly #speed: number;
-  readonly #rotation: number[][];
+  readonly #plane: number[][];
+  /** The factor of the last series in y_γ; 0 without an area constant. */
+  readonly #odd: number;
   readonly #series: Series[];
   readonly #offsets: number[];
 
@@ -35,10 +40,12 @@ export class ContactPath {
     this.#radius = number(path.radius);
     this.#start = vector(path.position);
     this.#speed = number(path.speed);
-    this.#rotation = matrix(document.rotation);
+    this.#plane = matrix(path.plane ?? document.rotation);
+    this.#odd = number(path.odd ?? 0);
     const z0 = vector(document.phases);
     const least = RESONANCE * Math.max(...f.map(Math.abs));
-    this.#series = path.transverse.map(({ modes, coefficients, turn }) => {
+    const odd = document.area?.odd ?? { modes: [], coefficients: [], turn: 0 };
+    this.#series = [...path.transverse, odd].map(({ modes, coefficients, turn }: PathSeries) => {
       const series: Series = { modes: [], amplitudes: [], turn, resonant: [] };
       modes.forEach((m, k) => {
         const frequency = dot(m, f);
@@ -61,9 +68,10 @@ export class ContactPath {
     const y = this.#integrals(z).map(
       (value, k) => value - this.#offsets[k] + drift(this.#series[k], tau),
     );
-    y.push(this.#speed * time[0]);
+    const odd = y.pop() ?? 0;
+    y.push(this.#odd * odd + this.#speed * time[0]);
     const [first, second] = this.#start.map((entry, j) => {
-      const turned = y.reduce((sum, value, k) => sum + this.#rotation[k][j] * value, 0);
+      const turned = y.reduce((sum, value, k) => sum + this.#plane[k][j] * value, 0);
       return entry - this.#radius * turned;
     });
     return [first, second];

@@ -2,7 +2,7 @@
 
 export const FORMAT = "veselova.closed-form/1";
 
-/** The format of a body with an area constant, which this evaluator does not have. */
+/** The format of a body with an area constant, whose document has the field `area`. */
 export const AREA_FORMAT = "veselova.closed-form/2";
 
 export type Decimal = number | string;
@@ -12,6 +12,26 @@ export interface PathSeries {
   modes: number[][];
   coefficients: Decimal[];
   turn: number;
+}
+
+/** What a body with an area constant has beside the body on whose torus it moves. */
+export interface AreaFields {
+  odd: PathSeries;
+  attitude: Decimal[][];
+  momentum: Decimal[];
+  inverse: Decimal[][];
+  form: Decimal[][];
+  constant: Decimal;
+}
+
+export interface PathFields {
+  radius: Decimal;
+  position: Decimal[];
+  speed: Decimal;
+  transverse: PathSeries[];
+  /** With an area constant only: what stands in the place of ℜ, and the factor of the odd time. */
+  plane?: Decimal[][];
+  odd?: Decimal;
 }
 
 export interface ClosedFormDocument {
@@ -38,7 +58,8 @@ export interface ClosedFormDocument {
   coefficients: Decimal[];
   rate: { characteristic: number; constant: Decimal; power: number };
   error: { at_start: number; per_unit_time: number };
-  path?: { radius: Decimal; position: Decimal[]; speed: Decimal; transverse: PathSeries[] };
+  path?: PathFields;
+  area?: AreaFields;
   problem: { system: string };
 }
 
@@ -46,12 +67,16 @@ export const number = (value: Decimal): number => Number(value);
 export const vector = (values: Decimal[]): number[] => values.map(Number);
 export const matrix = (rows: Decimal[][]): number[][] => rows.map(vector);
 
-/** Throw an error in one sentence unless this is a document of the version that is read here. */
+/** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {
-  const format = (value as { format?: unknown } | null)?.format;
-  if (format !== FORMAT) {
+  const { format, area } = (value ?? {}) as { format?: unknown; area?: unknown };
+  if (format !== FORMAT && format !== AREA_FORMAT) {
     throw new Error(
-      `The document must have the format ${FORMAT}; this server gave ${String(format)}.`,
+      `The document must have the format ${FORMAT} or ${AREA_FORMAT}; given ${String(format)}.`,
     );
+  }
+  if ((area !== undefined) !== (format === AREA_FORMAT)) {
+    const given = area === undefined ? "none" : "one";
+    throw new Error(`A document has the field area with ${AREA_FORMAT} alone; ${format} has ${given}.`);
   }
 }

@@ -38,3 +38,12 @@ export function inverse(A: Matrix): Matrix {
 
 export const block = (A: Matrix, rows: number[], columns: number[]): Matrix =>
   rows.map((i) => columns.map((j) => A[i][j]));
+
+/** Return a×b. */
+export function cross(a: ArrayLike<number>, b: ArrayLike<number>): Float64Array {
+  return Float64Array.of(
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0],
+  );
+}

@@ -3,25 +3,30 @@ import type { DoubleDouble } from "./double_double.ts";
 import { parse } from "./double_double.ts";
 import { matrix, number, vector } from "./document.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
-import { dot, product } from "./linear_algebra.ts";
+import { cross, dot, product } from "./linear_algebra.ts";
+import { AreaBody } from "./area_body.ts";
 import { ContactPath } from "./contact_path.ts";
 import { directions, spheroconic } from "./spheroconic.ts";
 import { thetaFunctions } from "./theta.ts";
 import type { ThetaFunctions } from "./theta.ts";
 import { TimeMap } from "./time_map.ts";
 
-/** What the views show at one time. */
-export interface Sample {
-  t: number;
+/** The state of the body. */
+export interface BodyState {
   /** The frame [e_1 … e_n], row by row; e_1 = q. */
   frame: Float64Array;
   q: Float64Array;
   /** dq/dt. */
   velocity: Float64Array;
-  /** q' = dq/dτ₁; empty where τ₁ is not known. */
+  /** q' = dq/dτ₁; empty where τ₁ is not known, and with an area constant. */
   prime: Float64Array;
-  /** Ω in the body where n = 3, q̇×q on the constraint; empty elsewhere. */
+  /** Ω in the body where n = 3, q̇×q where it is horizontal; empty elsewhere. */
   Omega: Float64Array;
+}
+
+/** What the views show at one time. */
+export interface Sample extends BodyState {
+  t: number;
   /** Phases in cycles modulo 2; empty where the motion has no torus. */
   z: Float64Array;
   lambda: Float64Array;
@@ -36,6 +41,8 @@ export interface Motion {
   readonly genus: number;
   /** I_i = 1/A_i of the directions that move, increasing. */
   readonly moments: number[];
+  /** The body with an area constant that moves on this torus; null where q itself does. */
+  readonly body: AreaBody | null;
   at(t: DoubleDouble | number): Sample;
 }
 
@@ -43,6 +50,7 @@ export class ClosedFormMotion implements Motion {
   readonly n: number;
   readonly genus: number;
   readonly moments: number[];
+  readonly body: AreaBody | null;
   readonly document: ClosedFormDocument;
   readonly #thetas: ThetaFunctions;
   readonly #values: Float64Array;
@@ -74,6 +82,7 @@ export class ClosedFormMotion implements Motion {
     this.#order = moments.map((_, i) => i).sort((i, j) => moments[i] - moments[j]);
     this.moments = this.#order.map((i) => moments[i]);
     this.#path = document.path ? new ContactPath(document) : null;
+    this.body = document.area ? new AreaBody(document.area) : null;
   }
 
   at(t: DoubleDouble | number): Sample {
@@ -95,15 +104,13 @@ export class ClosedFormMotion implements Motion {
     const sorted = this.#order.map((i) => x[i]);
     const lambda = spheroconic(sorted, this.moments, new Float64Array(this.genus));
     const sortedDot = this.#order.map((i) => xDot[i]);
-    const q = Float64Array.from(this.#directions, (row) => dot(row, x));
-    const velocity = Float64Array.from(this.#directions, (row) => dot(row, xDot));
+    const own = this.#frame(x, normals);
+    const along = (values: number[]) => Float64Array.from(this.#directions, (row) => dot(row, values));
+    const state =
+      this.body?.stateOf(own) ?? ownState(own, along(x), along(xDot), along(xPrime));
     return {
       t: time[0] + time[1],
-      frame: this.#frame(x, normals),
-      q,
-      velocity,
-      prime: Float64Array.from(this.#directions, (row) => dot(row, xPrime)),
-      Omega: this.n === 3 ? cross(velocity, q) : new Float64Array(0),
+      ...state,
       z,
       lambda,
       directions: directions(sorted, sortedDot, this.moments, lambda),
@@ -140,13 +147,15 @@ export class ClosedFormMotion implements Motion {
   }
 }
 
-/** Return a×b. */
-export function cross(a: ArrayLike<number>, b: ArrayLike<number>): Float64Array {
-  return Float64Array.of(
-    a[1] * b[2] - a[2] * b[1],
-    a[2] * b[0] - a[0] * b[2],
-    a[0] * b[1] - a[1] * b[0],
-  );
+/** Return the state of a body without an area constant, whose Ω is q̇×q. */
+function ownState(
+  frame: Float64Array,
+  q: Float64Array,
+  velocity: Float64Array,
+  prime: Float64Array,
+): BodyState {
+  const Omega = q.length === 3 ? cross(velocity, q) : new Float64Array(0);
+  return { frame, q, velocity, prime, Omega };
 }
 
 /** Return I_j = 1/(D_j, A D_j) of the directions that move. */

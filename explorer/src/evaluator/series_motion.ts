@@ -5,7 +5,7 @@
  * nearest known time is shown until it comes.
  */
 import type { DoubleDouble } from "./double_double.ts";
-import { cross } from "./motion.ts";
+import { cross } from "./linear_algebra.ts";
 import type { Motion, Sample } from "./motion.ts";
 import { directions, spheroconic } from "./spheroconic.ts";
 
@@ -24,6 +24,7 @@ const MOST_STRETCHES = 24;
 export class SeriesMotion implements Motion {
   readonly n: number;
   readonly genus = 0;
+  readonly body = null;
   readonly moments: number[];
   readonly #order: number[];
   readonly #stretches = new Map<number, Stretch>();

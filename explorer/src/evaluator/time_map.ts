@@ -3,7 +3,8 @@
  *
  * t(τ₁) = F₀τ₁ + P(z⁰ + fτ₁) − P(z⁰) with P(z) = Σ F_m/(π m·f) sin 2πm·z. With τ₁ = t/F₀ + δ the
  * mean phases z⁰ + f t/F₀ are reduced in two doubles, and δ, which is bounded, solves
- * F₀δ + P(z̄ + fδ) = P(z⁰) by Newton's method in doubles.
+ * F₀δ + P(z̄ + fδ) = P(z⁰) by Newton's method in doubles. With an area constant the rate has an odd
+ * part too, whose modes are M/2 with a constant turn: all modes are doubled here, M = 2m.
  */
 import * as dd from "./double_double.ts";
 import type { DoubleDouble } from "./double_double.ts";
@@ -18,10 +19,9 @@ const SMALLEST_COEFFICIENT = 1e-17;
 const LARGEST_AMPLITUDE = 3;
 
 interface ResonantMode {
-  order: number[];
   coefficient: number;
-  frequency: DoubleDouble; // m·f
-  turn: number; // 2πm·z⁰
+  frequency: DoubleDouble; // M·f/2
+  turn: number; // its angle at z⁰
 }
 
 export interface Phases {
@@ -39,6 +39,8 @@ export class TimeMap {
   readonly #orders: Int32Array;
   readonly #coefficients: Float64Array;
   readonly #amplitudes: Float64Array;
+  /** cos and sin of the constant turn of each mode. */
+  readonly #turns: [Float64Array, Float64Array];
   readonly #resonant: ResonantMode[] = [];
   readonly #most: number;
   readonly #real: Float64Array[];
@@ -54,23 +56,30 @@ export class TimeMap {
     const orders: number[] = [];
     const coefficients: number[] = [];
     const amplitudes: number[] = [];
-    document.modes.forEach((order, k) => {
-      const coefficient = number(document.coefficients[k]);
+    const turns: number[] = [];
+    const add = (order: number[], coefficient: number, turn: number) => {
       if (Math.abs(coefficient) < SMALLEST_COEFFICIENT * this.#mean[0]) return;
       const frequency = order.reduce(
-        (sum, entry, s) => dd.add(sum, dd.multiply(this.#f[s], [entry, 0])),
+        (sum, entry, s) => dd.add(sum, dd.multiply(this.#f[s], [entry / 2, 0])),
         [0, 0] as DoubleDouble,
       );
       const amplitude = coefficient / (Math.PI * frequency[0]);
       if (!(Math.abs(amplitude) < LARGEST_AMPLITUDE * this.#mean[0])) {
-        const turn = order.reduce((sum, entry, s) => sum + entry * this.#start[s], 0);
-        this.#resonant.push({ order, coefficient, frequency, turn: 2 * Math.PI * turn });
+        const cycles = order.reduce((sum, entry, s) => sum + (entry / 2) * this.#start[s], turn);
+        this.#resonant.push({ coefficient, frequency, turn: 2 * Math.PI * cycles });
         return;
       }
       orders.push(...order);
       coefficients.push(coefficient);
       amplitudes.push(amplitude);
+      turns.push(2 * Math.PI * turn);
+    };
+    document.modes.forEach((order, k) => {
+      add(order.map((entry) => 2 * entry), number(document.coefficients[k]), 0);
     });
+    const odd = document.area?.odd;
+    odd?.modes.forEach((order, k) => add(order, number(odd.coefficients[k]), odd.turn));
+    this.#turns = [Float64Array.from(turns, Math.cos), Float64Array.from(turns, Math.sin)];
     this.#orders = Int32Array.from(orders);
     this.#coefficients = Float64Array.from(coefficients);
     this.#amplitudes = Float64Array.from(amplitudes);
@@ -113,16 +122,17 @@ export class TimeMap {
     return delta;
   }
 
-  /** Return P(z) and Σ 2F_m cos 2πm·z. */
+  /** Return P(z) and its slope Σ 2F cos 2π(M·z/2 + turn). */
   #periodicPart(z: ArrayLike<number>): [number, number] {
     const g = this.#speed.length;
     const most = this.#most;
-    powersOfWaves(z, most, 2 * Math.PI, this.#real, this.#imaginary);
+    const [cosines, sines] = this.#turns;
+    powersOfWaves(z, most, Math.PI, this.#real, this.#imaginary);
     let value = 0;
     let slope = 0;
     for (let k = 0; k < this.#coefficients.length; k++) {
-      let x = 1;
-      let y = 0;
+      let x = cosines[k];
+      let y = sines[k];
       for (let s = 0; s < g; s++) {
         const c = this.#real[s][most + this.#orders[k * g + s]];
         const i = this.#imaginary[s][most + this.#orders[k * g + s]];

@@ -390,7 +390,11 @@ export class Explorer {
     this.#asksPrecise = true;
     try {
       const precise = await this.#source.loadPrecise(loaded, this.#abort.signal);
-      if (!precise || loaded !== this.#loaded) return;
+      if (loaded !== this.#loaded) return;
+      if (!precise) {
+        elements.status.textContent = "Far time: the table has the error of this document.";
+        return;
+      }
       this.#show(precise);
       this.#asksPrecise = true;
       elements.status.textContent = "Far time: the phases are those of a document of 30 digits.";

@@ -3,11 +3,12 @@ import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { element, list, short } from "../views/view.ts";
 import type { Loaded } from "../views/view.ts";
-import { FORMULAS, typeset } from "./formulas.ts";
+import { AREA_FORMULAS, FORMULAS, typeset } from "./formulas.ts";
 
 export class Facts {
   readonly #table: HTMLElement;
   readonly #live = new Map<string, HTMLElement>();
+  #formulas = FORMULAS;
 
   constructor(table: HTMLElement) {
     this.#table = table;
@@ -17,6 +18,7 @@ export class Facts {
   build({ torus, document, motion }: Loaded): void {
     this.#table.replaceChildren();
     this.#live.clear();
+    this.#formulas = motion.body ? { ...FORMULAS, ...AREA_FORMULAS } : FORMULAS;
     this.#row("q", "q = e₁", "");
     this.#row("omega", "|Ω|", "", motion.n === 3);
     this.#row("lambda", "λ", "", motion.moments.length > 1);
@@ -45,7 +47,7 @@ export class Facts {
     const button = element("button", { class: "fact", type: "button" }, title);
     const note = element("span", { class: "note", role: "tooltip", id: `note-${name}` });
     button.setAttribute("aria-describedby", note.id);
-    const formula = FORMULAS[name];
+    const formula = this.#formulas[name];
     let written = false;
     const write = () => {
       if (written || !formula) return;

@@ -5,6 +5,34 @@ export interface Formula {
   label: string;
 }
 
+/** The formulas that are other ones with an area constant, (Ω,γ) or (K,γ). */
+export const AREA_FORMULAS: Record<string, Formula> = {
+  energy: {
+    tex: "h=\\tfrac12(K,\\Omega)\\ \\text{of a ball that twists, else}\\ \\tfrac12(J\\Omega,\\Omega)-(\\Omega,\\gamma)(J\\Omega,\\gamma)",
+    label: "what stays constant, with J = I + ma²",
+  },
+  lambda: {
+    tex: "\\sum_i\\frac{v_i^2}{\\lambda_s-I_i'}=0",
+    label: "(S_n) for v, which is fixed in space like γ",
+  },
+  constants: {
+    tex: "\\sum_{i<j}\\frac{(v_iv_j'-v_jv_i')^2}{(\\lambda-I_i')(\\lambda-I_j')}+\\sum_i\\frac{v_i^2}{\\lambda-I_i'}=0\\ \\text{at}\\ \\lambda=c_k",
+    label: "(family1) for v, which is fixed in space like γ",
+  },
+  q: {
+    tex: "v_i=\\kappa_i\\,\\frac{\\theta[\\eta(I_i)](z)}{\\theta(z)},\\qquad[\\gamma\\,e_2\\,e_3]=[v\\,e_2'\\,e_3']\\,R",
+    label: "(wurzel) for v; R is a constant rotation",
+  },
+  tau: {
+    tex: "\\frac{dt}{d\\tau_1}=L_{00}\\sqrt{c_2\\lambda_1\\lambda_2}-L_{10}\\,\\rho",
+    label: "time with an area constant: ρ changes sign with z → z + 1",
+  },
+  omega: {
+    tex: "\\Omega=J^{-1}(K+\\sigma\\gamma)",
+    label: "K is fixed in space",
+  },
+};
+
 export const FORMULAS: Record<string, Formula> = {
   regime: {
     tex: "w^2=-\\lambda\\prod_i(\\lambda-I_i)\\prod_{k\\ge2}(\\lambda-c_k)",

@@ -1,5 +1,5 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { AREA_FORMAT, number, requireDocument } from "../evaluator/document.ts";
+import { number, requireDocument } from "../evaluator/document.ts";
 import type { ClosedFormDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
 import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -60,8 +60,6 @@ async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Load
     const torus = await post<Torus>("v1/tori", { problem }, signal);
     if (torus.regime === "separatrix") return null;
     const document = await post<ClosedFormDocument>("v1/closed-forms", { problem }, signal);
-    // a body with an area constant: the page shows its series
-    if (document.format === AREA_FORMAT) return null;
     requireDocument(document);
     return document.genus <= 3 ? ofDocument(problem, document, torus) : null;
   } catch (error) {
@@ -89,13 +87,15 @@ export function ofDocument(
   torus: Torus,
 ): Loaded {
   const motion = new ClosedFormMotion(document);
+  const axes = document.axes ? [] : document.A.map(number);
   const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
   return {
     problem,
     motion,
     document,
     torus,
-    A: document.axes ? [] : document.A.map(number),
+    A: motion.body ? inertiaOf(problem) : axes,
+    torusA: axes,
     time: LETTERS[document.time] ?? "t",
     reach: Number.isFinite(slowest) ? CYCLES / slowest : 60,
     range: null,
@@ -122,7 +122,7 @@ export function ofMotion(problem: Problem, motion: SeriesMotion, reach: number):
   const letter = problem.system === "ellipsoid-geodesic" ? "s" : "t";
   const time = problem.system === "neumann" ? LETTERS.tau1 : letter;
   const A = inertiaOf(problem);
-  return { problem, motion, document: null, torus: null, A, time, reach, range: null };
+  return { problem, motion, document: null, torus: null, A, torusA: A, time, reach, range: null };
 }
 
 function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promise<Stretch> {
@@ -144,7 +144,9 @@ export function inertiaOf(problem: Problem): number[] {
 
 async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
   const { document, problem, torus } = loaded;
-  if (!document || !torus || document.path || document.axes || document.digits > 15) return null;
+  if (!document || !torus || document.digits > 15) return null;
+  // What the service has in 15 digits alone.
+  if (document.path || document.area || document.axes) return null;
   const asked = { problem, digits: MORE_DIGITS };
   const precise = await post<ClosedFormDocument>("v1/closed-forms", asked, signal);
   requireDocument(precise);

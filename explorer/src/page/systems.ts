@@ -38,7 +38,7 @@ const inertia: Field = {
 const Omega: Field = {
   name: "Omega",
   symbol: "Ω",
-  text: "The angular velocity in the body, kept horizontal: (Ω,γ) = 0, (classical)",
+  text: "The angular velocity in the body; where (Ω,γ) = 0, (classical), it stays so",
   low: -2,
   high: 2,
 };
@@ -107,8 +107,14 @@ export const SYSTEMS: Record<string, System> = {
   "chaplygin-ball": {
     title: "Chaplygin's ball",
     className: "ChaplyginBall",
-    closedForm: false,
-    fields: [inertia, mass, radius, gamma, Omega],
+    closedForm: true,
+    fields: [
+      inertia,
+      mass,
+      radius,
+      gamma,
+      { ...Omega, text: "The angular velocity in the body; (Ω,γ) is free" },
+    ],
     example: { system: "chaplygin-ball", ...ball, Omega: ["0.8", "1", "-0.3"] },
   },
   "ellipsoid-geodesic": {

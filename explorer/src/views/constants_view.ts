@@ -40,6 +40,7 @@ export class ConstantsView extends View {
 
   refusal({ torus, motion }: Loaded): string | null {
     if (!torus || !motion.genus) return "The page knows no constants c of this motion.";
+    if (motion.body) return "With an area constant I changes with the start, so there is no map.";
     if (motion.n < 3) return "In two dimensions the energy is the only constant.";
     return motion.n <= 4 && motion.genus === motion.n - 1
       ? null

@@ -3,6 +3,8 @@
  * quadric of μ = 1/c_2 (Chasles).
  */
 import type { Line, Mesh, Object3D } from "three";
+import type { AreaBody } from "../evaluator/area_body.ts";
+import { cross } from "../evaluator/linear_algebra.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { confocalQuadric } from "./conics.ts";
@@ -18,7 +20,12 @@ import type { Loaded } from "./view.ts";
 const CAPTION =
   "The same motion as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
 
+const WITH_AREA =
+  "v, fixed in space like γ, as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
+
 export class EllipsoidView extends View3D {
+  /** With an area constant v is the geodesic, in the place of q. */
+  #body: AreaBody | null = null;
   #A: number[] = [];
   #scale = 1;
   #mu: number | null = null;
@@ -36,22 +43,25 @@ export class EllipsoidView extends View3D {
     );
   }
 
-  refusal({ A, motion, problem }: Loaded): string | null {
-    const geodesic = motion.n > 3 || keepsHorizontal({ motion, problem });
+  refusal({ torusA: A, motion, problem }: Loaded): string | null {
+    const geodesic = motion.n > 3 || motion.body || keepsHorizontal({ motion, problem });
     if (A.length !== motion.n || motion.moments.length === 0 || !geodesic) {
       return "No geodesic on an ellipsoid goes with this system.";
     }
     return motion.n >= 3 ? null : "In two dimensions the ellipsoid is an ellipse.";
   }
 
-  build({ A, torus }: Loaded): void {
+  build({ torusA: A, torus, motion }: Loaded): void {
     this.clear();
+    this.#body = motion.body;
     const colours = theme();
     this.#A = A;
     this.caption.textContent =
       A.length > 3
         ? "The first three components of the geodesic that goes with the motion, and its tangent."
-        : CAPTION;
+        : motion.body
+          ? WITH_AREA
+          : CAPTION;
     this.#scale = Math.sqrt(Math.max(...A));
     const half = A.map((entry) => Math.sqrt(entry) / this.#scale);
     const globe = surface((u, v) => onEllipsoid(u, v, half), colours.dark ? "#243042" : "#dfe6ee", {
@@ -77,8 +87,9 @@ export class EllipsoidView extends View3D {
 
   override extend(samples: Samples, anew: boolean): void {
     const n = this.#A.length;
-    this.#trail?.extend(samples, anew, ({ q }, k) => {
-      const X = this.#position(q.subarray(k * n, k * n + n));
+    this.#trail?.extend(samples, anew, ({ q, frame }, k) => {
+      const own = this.#body?.axisOf(frame, 9 * k) ?? q.subarray(k * n, k * n + n);
+      const X = this.#position(own);
       return [1.004 * X[0], 1.004 * X[1], 1.004 * X[2]];
     });
   }
@@ -89,7 +100,15 @@ export class EllipsoidView extends View3D {
     return this.#A.map((a, i) => (a * q[i]) / (size * this.#scale));
   }
 
-  show({ q, velocity }: Sample): void {
+  /** Return the vector whose image is the geodesic, and its velocity in the body. */
+  #state({ q, velocity, frame, Omega }: Sample): [Float64Array, Float64Array] {
+    if (!this.#body) return [q, velocity];
+    const axis = this.#body.axisOf(frame);
+    return [axis, cross(axis, Omega)];
+  }
+
+  show(sample: Sample): void {
+    const [q, velocity] = this.#state(sample);
     const X = this.#position(q);
     // dX/dt ∝ A q̇ (q,Aq) − A q (q,Aq̇).
     const size = this.#A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0);
@@ -119,8 +138,8 @@ export class EllipsoidView extends View3D {
     return this.#mu === null ? [this.#point] : [this.#point, this.#touch];
   }
 
-  override pen({ q }: Sample): Point {
-    return this.#position(q).map((x) => 1.004 * x) as Point;
+  override pen(sample: Sample): Point {
+    return this.#position(this.#state(sample)[0]).map((x) => 1.004 * x) as Point;
   }
 
   /** Return where along the tangent it touches the quadric. */
@@ -136,8 +155,8 @@ export class EllipsoidView extends View3D {
     return Number.isFinite(b / a) ? -b / a : null;
   }
 
-  describe({ q }: Sample): string {
-    const X = this.#position(q).map((x) => x * this.#scale);
+  describe(sample: Sample): string {
+    const X = this.#position(this.#state(sample)[0]).map((x) => x * this.#scale);
     const quadric =
       this.#mu === null ? "" : ` The tangents touch the quadric of μ = 1/c₂ = ${short(this.#mu)}.`;
     return `X is (${list(X)}).${quadric}`;

@@ -4,7 +4,7 @@
  */
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import type { Motion, Sample } from "../evaluator/motion.ts";
+import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
 import { element, short, View } from "./view.ts";
@@ -84,7 +84,7 @@ export class EnginesView extends View {
       this.#add("λ(t)", loaded.time, lines, false, false);
     }
     if (loaded.document) {
-      const { times, columns, names } = integralErrors(loaded.motion, loaded.document.time === "t", loaded.A);
+      const { times, columns, names } = integralErrors(loaded);
       const colours = [BLUE, GREEN, ORANGE, PINK];
       const lines = names.map((name, k) => ({ name, colour: colours[k] }));
       const plot = this.#add("Change of integrals", loaded.time, lines, true, true);
@@ -260,13 +260,18 @@ function powerOfTen(value: number): string {
 }
 
 /** Return how far integrals at times from 0.1 to 10⁶ are from those at the start. */
-function integralErrors(motion: Motion, physical: boolean, A: number[]) {
+function integralErrors({ motion, document, A }: Loaded) {
   const times = Array.from({ length: 141 }, (_, k) => 10 ** (-1 + k / 20));
-  const start = integrals(motion.at(0), A, motion.n);
-  const names = ["(q,q)", "EᵀE", "Σ cₖ", ...(physical && A.length === motion.n ? ["energy"] : [])];
+  const energy = motion.body || (document?.time === "t" && A.length === motion.n);
+  const names = ["(q,q)", "EᵀE", ...(motion.body ? [] : ["Σ cₖ"]), ...(energy ? ["energy"] : [])];
+  const integrals = (sample: Sample) =>
+    motion.body
+      ? [...ofFrame(sample), motion.body.energyOf(sample)]
+      : [...ofFrame(sample), ...ofRankOne(sample, A)];
+  const start = integrals(motion.at(0));
   const columns: number[][] = names.map(() => []);
   for (const t of times) {
-    const now = integrals(motion.at(t), A, motion.n);
+    const now = integrals(motion.at(t));
     names.forEach((_, k) => {
       const scale = Math.abs(start[k]) || 1;
       columns[k].push(Math.max(FLOOR, Math.abs(now[k] - start[k]) / scale));
@@ -275,9 +280,9 @@ function integralErrors(motion: Motion, physical: boolean, A: number[]) {
   return { times, columns, names };
 }
 
-/** Return (q,q), the largest entry of EᵀE − 1, Σ c_k = tr I − (q,Iq) − (q',q'), and the energy. */
-function integrals({ q, prime, velocity, frame }: Sample, A: number[], n: number): number[] {
-  const sum = (f: (i: number) => number) => A.reduce((total, _, i) => total + f(i), 0);
+/** Return (q,q), and 1 more than the largest entry of EᵀE − 1. */
+function ofFrame({ q, frame }: Sample): number[] {
+  const n = q.length;
   let off = 0;
   for (let a = 0; a < n; a++) {
     for (let b = 0; b <= a; b++) {
@@ -286,12 +291,17 @@ function integrals({ q, prime, velocity, frame }: Sample, A: number[], n: number
       off = Math.max(off, Math.abs(product));
     }
   }
-  const length = Array.from(q).reduce((total, x) => total + x * x, 0);
+  return [q.reduce((total, x) => total + x * x, 0), 1 + off];
+}
+
+/** Return Σ c_k = tr I − (q,Iq) − (q',q'), and the energy. */
+function ofRankOne({ q, prime, velocity }: Sample, A: number[]): number[] {
+  const sum = (f: (i: number) => number) => A.reduce((total, _, i) => total + f(i), 0);
   const c = sum((i) => (1 - q[i] * q[i]) / A[i] - prime[i] * prime[i]);
   const [vv, qq, qv] = [
     sum((i) => A[i] * velocity[i] ** 2),
     sum((i) => A[i] * q[i] ** 2),
     sum((i) => A[i] * q[i] * velocity[i]),
   ];
-  return [length, 1 + off, c, vv * qq - qv * qv];
+  return [c, vv * qq - qv * qv];
 }

@@ -1,5 +1,6 @@
 /** q on the unit sphere: its trail, the net of spheroconic coordinates, the zone of the motion. */
 import type { ArrowHelper, Mesh, Object3D } from "three";
+import type { AreaBody } from "../evaluator/area_body.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { netValues, spheroconicLine } from "./conics.ts";
@@ -7,7 +8,7 @@ import { aim, arrow, ball, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
-import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
+import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
@@ -16,8 +17,14 @@ const CAPTION = "q = e₁ seen from the body, with lines of spheroconic coordina
 
 const ZONE = "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
 
+const WITH_AREA =
+  "γ = e₁ seen from the body (blue), and v (pink), fixed in space too. v keeps to the shaded zone.";
+
 export class SphereView extends View3D {
   #n = 3;
+  /** With an area constant v is in the zone, in the place of q. */
+  #body: AreaBody | null = null;
+  #axis: { trail: TrailLine; point: Mesh } | null = null;
   #trail: TrailLine | null = null;
   #point: Mesh | null = null;
   #velocity: ArrowHelper | null = null;
@@ -36,9 +43,10 @@ export class SphereView extends View3D {
     return motion.at(0).q.length ? null : "This system has no vector q.";
   }
 
-  build({ motion, torus, A }: Loaded): void {
+  build({ motion, torus, torusA: A }: Loaded): void {
     this.clear();
     const colours = theme();
+    this.#body = motion.body;
     this.#n = motion.n;
     this.caption.textContent =
       this.#n > 3
@@ -46,7 +54,7 @@ export class SphereView extends View3D {
         : CAPTION;
     const c2 = torus && motion.n === 3 ? torus.constants[0] : null;
     const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
-    if (I && c2 !== null) this.caption.textContent = ZONE;
+    if (I && c2 !== null) this.caption.textContent = motion.body ? WITH_AREA : ZONE;
     const unit = [1, 1, 1];
     const [plain, shaded] = colours.dark ? ["#243042", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
     const inside = I && c2 !== null ? zoneOf(I, c2) : null;
@@ -72,16 +80,30 @@ export class SphereView extends View3D {
     this.#point = ball(VERMILION, 0.035);
     this.#velocity = arrow(GREEN, 0.4);
     this.world.add(this.#trail.object, this.#point, this.#velocity);
+    this.#axis = null;
+    if (!motion.body) return;
+    this.#axis = { trail: new TrailLine(10000, PINK, { opacity: 0.6 }), point: ball(PINK, 0.03) };
+    this.world.add(this.#axis.trail.object, this.#axis.point);
   }
 
   override extend(samples: Samples, anew: boolean): void {
     this.#trail?.extend(samples, anew, ({ q }, k) => place(q, k * this.#n, this.#n));
+    this.#axis?.trail.extend(samples, anew, ({ frame }, k) => this.#placeOfAxis(frame, 9 * k));
   }
 
-  show({ q, velocity }: Sample): void {
+  #placeOfAxis(frame: ArrayLike<number>, from = 0): Point {
+    return place(this.#body!.axisOf(frame, from), 0, 3);
+  }
+
+  show({ q, velocity, frame }: Sample): void {
     const at = place(q, 0, this.#n);
     this.#point?.position.set(...at);
     this.#trail?.lead(at);
+    if (this.#axis) {
+      const axis = this.#placeOfAxis(frame);
+      this.#axis.point.position.set(...axis);
+      this.#axis.trail.lead(axis);
+    }
     if (this.#velocity) {
       this.#velocity.position.set(...at);
       aim(this.#velocity, ...place(velocity, 0, this.#n, 0), 0.42);
@@ -89,21 +111,25 @@ export class SphereView extends View3D {
   }
 
   protected override labels(): Label[] {
-    const at = this.#point?.position.clone().multiplyScalar(1.12).toArray();
-    return at ? [{ text: "q", at }] : [];
+    const beside = (point: Mesh): Point => point.position.clone().multiplyScalar(1.12).toArray();
+    if (!this.#point) return [];
+    const names = [{ text: this.#axis ? "γ" : "q", at: beside(this.#point) }];
+    if (this.#axis) names.push({ text: "v", at: beside(this.#axis.point) });
+    return names;
   }
 
   override actors(): Object3D[] {
-    if (this.#n > 3 || !this.#point || !this.#velocity) return [];
-    return [this.#point, this.#velocity];
+    if (!this.#point || !this.#velocity) return [];
+    return [this.#point, this.#velocity, ...(this.#axis ? [this.#axis.point] : [])];
   }
 
   override pen({ q }: Sample): Point {
     return place(q, 0, this.#n);
   }
 
-  describe({ q, lambda }: Sample): string {
-    const coordinates = lambda.length ? `Its coordinates λ are ${list(lambda, 5)}. ` : "";
+  describe({ q, lambda, frame }: Sample): string {
+    const axis = this.#body ? `v is (${list(this.#body.axisOf(frame))}). ` : "";
+    const coordinates = lambda.length ? `${axis}Its coordinates λ are ${list(lambda, 5)}. ` : "";
     const shadow = this.#n > 3 ? "The picture shows its first three components. " : "";
     return `q is (${list(q)}). ${coordinates}${this.#zone}${shadow}`;
   }

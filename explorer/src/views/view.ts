@@ -27,6 +27,8 @@ export interface Loaded {
   torus: Torus | null;
   /** A of the directions along the axes; empty where the system has none. */
   A: number[];
+  /** A of the problem on the torus, which is another with an area constant; empty as before. */
+  torusA: number[];
   /** The letter of the independent variable. */
   time: string;
   /** The time that trails and plots reach back. */
