@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import os
+import runpy
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from types import ModuleType
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -52,21 +51,12 @@ def is_built() -> bool:
     return stamp.is_file() and stamp.read_text(encoding="utf-8") == fingerprint()
 
 
-def _explorer_build() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("explorer_build", ROOT / "explorer" / "build.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def prepare_katex() -> str:
     """Copy the style and the fonts of KaTeX, and return the Node that runs it."""
-    build = _explorer_build()
-    npm = build.find_node()
+    build = runpy.run_path(str(ROOT / "explorer" / "build.py"))
+    npm = build["find_node"]()
     if npm is None:
-        sys.exit(f"The formulas need Node {build.OLDEST_NODE} or newer in PATH.")
+        sys.exit(f"The formulas need Node {build['OLDEST_NODE']} or newer in PATH.")
     source = ROOT / "explorer" / "node_modules" / "katex" / "dist"
     if not source.is_dir():
         subprocess.run(

@@ -157,3 +157,20 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One server for all tests that do not harm it."""
     with running_server(tmp_path_factory.mktemp("server")) as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def bundle() -> Path:
+    """Return the folder of the explorer's bundle; skips the test where it cannot be built."""
+    from explorer_bundle import build_or_skip
+
+    return build_or_skip()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Return chromium, without a window; skips the test where playwright is missing."""
+    from explorer_browser import running_browser
+
+    with running_browser() as running:
+        yield running

@@ -5,7 +5,6 @@ core by itself.
 from __future__ import annotations
 
 import ast
-import importlib.util
 import json
 import os
 import re
@@ -19,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from loading import load_file
 
 ROOT = Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "veselova"
@@ -138,11 +139,7 @@ def test_the_readme_of_a_package_has_no_relative_link(wheel: Path) -> None:
 
 
 def test_links_of_the_readme_lead_to_the_tag_where_the_repository_is_known() -> None:
-    spec = importlib.util.spec_from_file_location("readme", ROOT / ".ci" / "readme.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load_file(ROOT / ".ci" / "readme.py")
     text = (ROOT / "README.md").read_text()
     found = module.standalone(text, "https://example.org/us/veselova/", "1.2")
     assert not _RELATIVE.search(found)
@@ -430,17 +427,21 @@ def _locked(name: str) -> set[str]:
 
 def test_licences_of_all_locked_packages_are_listed() -> None:
     table = (ROOT / "docs" / "licences.md").read_text()
-    rows = re.findall(r"^\| ([\w.-]+) \| (.+?) \| (runtime|tests) \| (.*) \|$", table, re.MULTILINE)
-    runtime = _locked("requirements.lock")
-    listed = {package: where == "runtime" for package, _, where, _ in rows}
-    assert listed == {
-        package: package in runtime for package in runtime | _locked("requirements-check.lock")
+    rows = re.findall(
+        r"^\| ([\w.-]+) \| (.+?) \| (runtime|tests|docs) \| (.*) \|$", table, re.MULTILINE
+    )
+    locks = {"docs": "-docs", "tests": "-check", "runtime": ""}
+    wanted = {
+        package: where
+        for where, name in locks.items()
+        for package in _locked(f"requirements{name}.lock")
     }
+    assert {package: where for package, _, where, _ in rows} == wanted
     for package, licence, where, remark in rows:
         assert licence != "not stated", package
         # The container is given away: nothing in it may be under the GPL, which binds what it is
         # combined with.
-        assert where == "tests" or not re.search(r"\bA?GPL", licence + remark), package
+        assert where != "runtime" or not re.search(r"\bA?GPL", licence + remark), package
 
 
 def test_both_stages_of_the_container_take_a_base_by_digest() -> None:

@@ -65,8 +65,10 @@ class Names:
                 for home, public in self.public.items():
                     if full == home or full.startswith(f"{home}."):
                         yield public + full.removeprefix(home)
-        yield f"veselova.{name}"
-        yield name
+        # A single word in small letters may be one of the language, or of a command.
+        if not (name.isalpha() and name.islower()):
+            yield f"veselova.{name}"
+            yield name
         found = self.ends.get(name, set())
         if len(found) == 1:
             yield from found

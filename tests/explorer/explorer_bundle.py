@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+
+from loading import load_file
 
 EXPLORER = Path(__file__).parent.parent.parent / "explorer"
 
 
-def load_build() -> ModuleType:
-    """Return the module ``explorer/build.py``, which is part of no package."""
-    spec = importlib.util.spec_from_file_location("explorer_build", EXPLORER / "build.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-BUILD = load_build()
+BUILD = load_file(EXPLORER / "build.py")
 
 
 def npm_or_skip() -> list[str]:

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 import httpx2
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium, running_browser, visiting
+from explorer_browser import Visit, needs_chromium, visiting
 from explorer_bundle import EXPLORER
 from PIL import Image
 from scipy.spatial.transform import Rotation
@@ -28,13 +28,6 @@ pytestmark = needs_chromium
 
 PRESET_LIST = json.loads((EXPLORER / "src/presets.json").read_text())
 PRESETS = [preset["name"] for preset in PRESET_LIST]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Return chromium, without a window."""
-    with running_browser() as running:
-        yield running
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 
 import pytest
-from explorer_bundle import build_or_skip
 from starlette.testclient import TestClient
 
 from conftest import Server, running_server
@@ -21,12 +20,6 @@ LARGEST_FIRST_LOAD = 350_000
 
 #: Files that come when they are asked for: the API's page, and the export of scenes.
 LATER = ("docs-", "scene_file-")
-
-
-@pytest.fixture(scope="module")
-def bundle() -> Path:
-    """Return the folder of the bundle."""
-    return build_or_skip()
 
 
 @pytest.fixture

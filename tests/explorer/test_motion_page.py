@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from explorer_browser import FILE, Visit, needs_chromium, running_browser, visiting
-from explorer_bundle import build_or_skip
+from explorer_browser import FILE, Visit, needs_chromium, visiting
 
 import veselova as vs
 from veselova import motion_page
@@ -27,17 +25,7 @@ TWISTING = vs.ChaplyginBall([0.4, 0.6, 0.9], 0.2, 1, [0.6, 0, 0.8], [0.8, 1, -0.
 FREE = vs.EulerPoisson([1, 2, 2.5], [0.6, 0, 0.8], [0.1, 1.5, 0.1])
 
 
-@pytest.fixture(scope="module", autouse=True)
-def bundle() -> Path:
-    """Return the folder of the bundle."""
-    return build_or_skip()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Return chromium, without a window."""
-    with running_browser() as running:
-        yield running
+pytestmark = pytest.mark.usefixtures("bundle")
 
 
 def carried(page: str) -> dict[str, Any]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from explorer_browser import FILE, needs_chromium, running_browser, visiting
-from explorer_bundle import build_or_skip
+from explorer_browser import FILE, needs_chromium, visiting
 
 import veselova as vs
 from veselova import notebook
@@ -47,17 +45,7 @@ document.getElementById("status").textContent = "here";
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def bundle() -> Path:
-    """Return the folder of the bundle."""
-    return build_or_skip()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Return chromium, without a window."""
-    with running_browser() as running:
-        yield running
+pytestmark = pytest.mark.usefixtures("bundle")
 
 
 def test_the_widget_holds_the_page_and_its_time() -> None:

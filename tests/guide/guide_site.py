@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import fcntl
-import importlib.util
 import subprocess
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+
+from loading import load_file
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -16,17 +16,7 @@ ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 900.0
 
 
-def load_site() -> ModuleType:
-    """Return the module ``docs/site.py``, which is part of no package."""
-    spec = importlib.util.spec_from_file_location("guide_build", ROOT / "docs" / "site.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SITE = load_site()
+SITE = load_file(ROOT / "docs" / "site.py")
 
 
 def build_or_skip() -> Path:
