@@ -5,13 +5,13 @@ orthonormal, and its momentum in space.
 from __future__ import annotations
 
 import decimal
-from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
 
+from veselova.mechanics.core import decimal_vectors as vectors
+from veselova.mechanics.core.decimal_vectors import Vector
 from veselova.mechanics.systems.rigid_body import RigidBody
 
 __all__ = ["AreaStart", "exact_start"]
@@ -21,8 +21,6 @@ _SPARE = 60
 
 #: A column of the natural frame in double precision this near to one of many digits is that one.
 _NEARLY_NATURAL = 1e-9
-
-Vector = tuple[Decimal, ...]
 
 
 @dataclass(frozen=True)
@@ -48,19 +46,19 @@ def exact_start(body: RigidBody, digits: int) -> AreaStart:
         context.prec = digits + _SPARE
         context.Emin, context.Emax = decimal.MIN_EMIN, decimal.MAX_EMAX
         gamma, Omega, moments = (
-            tuple(_decimal(x) for x in values)
+            tuple(vectors.of_rational(x) for x in values)
             for values in (body.exact_gamma, body.exact_Omega, body.moments)
         )
-        gamma = _unit(gamma)
+        gamma = vectors.unit(gamma)
         columns = None
         if body.exact_frame is None:
             columns = _natural(gamma, Omega, moments, body)
         if columns is None:
             columns = _orthonormal(gamma, body)
-        M = _times(Omega, moments)
-        shift = _dot(Omega, gamma) - _dot(M, gamma)
+        M = vectors.times(Omega, moments)
+        shift = vectors.dot(Omega, gamma) - vectors.dot(M, gamma)
         K = tuple(x + shift * y for x, y in zip(M, gamma, strict=True))
-        momentum = tuple(Fraction(_dot(column, K)) for column in columns)
+        momentum = tuple(Fraction(vectors.dot(column, K)) for column in columns)
         rows = tuple(tuple(map(Fraction, row)) for row in zip(*columns, strict=True))
         return AreaStart(rows, momentum)
 
@@ -71,18 +69,18 @@ def _natural(
     """Return the columns γ, ±p×γ/|p|, ±p/|p| in the order and with the signs of the frame in
     double precision; None where it is another.
     """
-    rate = _cross(gamma, Omega)
+    rate = vectors.cross(gamma, Omega)
     A = tuple(1 / moment for moment in moments)
-    Aq = _times(A, gamma)
-    Av = _times(A, rate)
-    along, across = _dot(gamma, Aq), _dot(rate, Aq)
+    Aq = vectors.times(A, gamma)
+    Av = vectors.times(A, rate)
+    along, across = vectors.dot(gamma, Aq), vectors.dot(rate, Aq)
     p = tuple(along * x - across * y for x, y in zip(Av, Aq, strict=True))
     if not any(p):
         return None
-    p = _unit(p)
+    p = vectors.unit(p)
     found = [gamma]
     for near in body.frame.T[1:]:
-        for vector in (p, _cross(p, gamma)):
+        for vector in (p, vectors.cross(p, gamma)):
             cosine = float(np.dot(near, [float(x) for x in vector]))
             if abs(cosine) > 1 - _NEARLY_NATURAL:
                 found.append(vector if cosine > 0 else tuple(-x for x in vector))
@@ -94,10 +92,10 @@ def _orthonormal(gamma: Vector, body: RigidBody) -> tuple[Vector, ...]:
     vectors, by Newton–Schulz steps X(3 − XᵀX)/2.
     """
     given = body.frame.tolist() if body.exact_frame is None else body.exact_frame
-    second, third = (tuple(_decimal(Fraction(row[k])) for row in given) for k in (1, 2))
+    second, third = (tuple(vectors.of_rational(Fraction(row[k])) for row in given) for k in (1, 2))
     second, third = (_across(vector, gamma) for vector in (second, third))
     for _ in range(decimal.getcontext().prec.bit_length() + 3):
-        a, b, c = _dot(second, second), _dot(second, third), _dot(third, third)
+        a, b, c = vectors.dot(second, second), vectors.dot(second, third), vectors.dot(third, third)
         pairs = list(zip(second, third, strict=True))
         second = tuple(((3 - a) * x - b * y) / 2 for x, y in pairs)
         third = tuple(((3 - c) * y - b * x) / 2 for x, y in pairs)
@@ -105,26 +103,5 @@ def _orthonormal(gamma: Vector, body: RigidBody) -> tuple[Vector, ...]:
 
 
 def _across(vector: Vector, gamma: Vector) -> Vector:
-    share = _dot(vector, gamma)
+    share = vectors.dot(vector, gamma)
     return tuple(x - share * y for x, y in zip(vector, gamma, strict=True))
-
-
-def _decimal(number: Fraction) -> Decimal:
-    return Decimal(number.numerator) / Decimal(number.denominator)
-
-
-def _dot(a: Sequence[Decimal], b: Sequence[Decimal]) -> Decimal:
-    return sum((x * y for x, y in zip(a, b, strict=True)), Decimal(0))
-
-
-def _times(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
-    return tuple(x * y for x, y in zip(a, b, strict=True))
-
-
-def _cross(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
-    return tuple(a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3))
-
-
-def _unit(vector: Sequence[Decimal]) -> Vector:
-    length = _dot(vector, vector).sqrt()
-    return tuple(x / length for x in vector)

@@ -40,6 +40,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core import decimal_vectors as vectors
+from veselova.mechanics.core.decimal_vectors import Vector
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.rigid_body import RigidBody
@@ -48,7 +50,6 @@ from veselova.mechanics.systems.veselova import Veselova
 __all__ = ["AreaData", "AreaVeselova", "RollingAreaVeselova"]
 
 Array = NDArray[np.float64]
-Vector = tuple[Decimal, ...]
 
 #: Digits of the data, and where K is within _NEAR of γ.
 _DIGITS = 110
@@ -146,13 +147,13 @@ class AreaVeselova(Veselova):
             found = _Pencil.of(momentum)
             A = [found.sign * (b - found.mu[1]) for b in found.inverse]
             unit = min(A)
-            slope = _dot(found.u, _times(found.inverse, found.v))
-            slope /= found.sign * _dot(found.v, _times(A, found.v))
+            slope = vectors.dot(found.u, vectors.times(found.inverse, found.v))
+            slope /= found.sign * vectors.dot(found.v, vectors.times(A, found.v))
             # w' = u + (β/α)v with β/α = −(u,A'v)/(v,A'v)
             w = [x - slope * y for x, y in zip(found.u, found.v, strict=True)]
-            q_dot = [x / found.L[0] for x in _cross(found.v, _times(A, w))]
+            q_dot = [x / found.L[0] for x in vectors.cross(found.v, vectors.times(A, w))]
             q, q_dot = _moving(found.v, q_dot, momentum.angle)
-            normal = _cross(found.u, found.v)
+            normal = vectors.cross(found.u, found.v)
             columns = (q, found.u, [-x for x in normal])
             super().__init__(
                 [Fraction(a / unit) for a in A],
@@ -175,7 +176,7 @@ class AreaVeselova(Veselova):
                 across=float((found.mu[0] - found.mu[1]) * momentum.horizontal),
                 u=_floats(found.u),
                 normal=_floats(normal),
-                horizontal=_floats(_cross(normal, momentum.gamma)),
+                horizontal=_floats(vectors.cross(normal, momentum.gamma)),
             )
 
     @property
@@ -224,32 +225,32 @@ class _Momentum:
 def _momentum(data: AreaData) -> _Momentum:
     # The motion does not depend on the unit of inertia. K_h does, and (Ω,γ) does not.
     unit = max(data.inverse)
-    inverse = [_decimal(b / unit) for b in data.inverse]
-    gamma = _unit([_decimal(x) for x in data.gamma])
-    Omega = [_decimal(x) for x in data.Omega]
-    along = _dot([x / b for x, b in zip(Omega, inverse, strict=True)], gamma)
-    spin = _dot(Omega, gamma)
+    inverse = [vectors.of_rational(b / unit) for b in data.inverse]
+    gamma = vectors.unit([vectors.of_rational(x) for x in data.gamma])
+    Omega = [vectors.of_rational(x) for x in data.Omega]
+    along = vectors.dot([x / b for x, b in zip(Omega, inverse, strict=True)], gamma)
+    spin = vectors.dot(Omega, gamma)
     across = _across(data, unit)
-    D = None if data.added is None else _decimal(data.added * unit)
+    D = None if data.added is None else vectors.of_rational(data.added * unit)
     area = spin if D is None else along - D * spin
-    horizontal = _dot(across, across).sqrt()
+    horizontal = vectors.dot(across, across).sqrt()
     size = (horizontal**2 + area**2).sqrt()
     angle = horizontal / size
     if not horizontal:
         least = min(range(3), key=lambda i: abs(gamma[i]))
-        across = list(_cross(gamma, [Decimal(int(i == least)) for i in range(3)]))
-    direction = _unit(across)
+        across = list(vectors.cross(gamma, [Decimal(int(i == least)) for i in range(3)]))
+    direction = vectors.unit(across)
     if angle < _LEAST_ANGLE:
         horizontal = _LEAST_ANGLE * size
     if angle < _NEAR:
         inverse = _separated(inverse)
-    B_direction, B_gamma = (_times(inverse, x) for x in (direction, gamma))
+    B_direction, B_gamma = (vectors.times(inverse, x) for x in (direction, gamma))
     # Gram_B in the basis (K, γ)
-    Kg = horizontal * _dot(B_direction, gamma) + area * _dot(B_gamma, gamma)
-    KK = horizontal**2 * _dot(B_direction, direction) + area * (
-        2 * horizontal * _dot(B_direction, gamma) + area * _dot(B_gamma, gamma)
+    Kg = horizontal * vectors.dot(B_direction, gamma) + area * vectors.dot(B_gamma, gamma)
+    KK = horizontal**2 * vectors.dot(B_direction, direction) + area * (
+        2 * horizontal * vectors.dot(B_direction, gamma) + area * vectors.dot(B_gamma, gamma)
     )
-    gg = _dot(B_gamma, gamma)
+    gg = vectors.dot(B_gamma, gamma)
     if D is None:
         form = (KK - (Kg - area) ** 2 / gg - 2 * area**2, area, Decimal(0))
     else:
@@ -262,7 +263,7 @@ def _across(data: AreaData, unit: Fraction) -> list[Decimal]:
     """Return JΩ − (JΩ,γ)γ/(γ,γ), orthogonal to γ however small it is."""
     JOmega = [x * unit / b for x, b in zip(data.Omega, data.inverse, strict=True)]
     along = sum(map(mul, JOmega, data.gamma)) / sum(map(mul, data.gamma, data.gamma))
-    return [_decimal(x - along * y) for x, y in zip(JOmega, data.gamma, strict=True)]
+    return [vectors.of_rational(x - along * y) for x, y in zip(JOmega, data.gamma, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -333,27 +334,6 @@ def _separated(inverse: Sequence[Decimal]) -> list[Decimal]:
 
 def _exact(rows: Iterable[Iterable[Decimal]]) -> tuple[tuple[Fraction, ...], ...]:
     return tuple(tuple(Fraction(x) for x in row) for row in rows)
-
-
-def _decimal(number: Fraction) -> Decimal:
-    return Decimal(number.numerator) / Decimal(number.denominator)
-
-
-def _dot(a: Sequence[Decimal], b: Sequence[Decimal]) -> Decimal:
-    return sum((x * y for x, y in zip(a, b, strict=True)), Decimal(0))
-
-
-def _times(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
-    return tuple(x * y for x, y in zip(a, b, strict=True))
-
-
-def _cross(a: Sequence[Decimal], b: Sequence[Decimal]) -> Vector:
-    return tuple(a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3))
-
-
-def _unit(vector: Sequence[Decimal]) -> Vector:
-    length = _dot(vector, vector).sqrt()
-    return tuple(x / length for x in vector)
 
 
 def _floats(vector: Sequence[Any]) -> Array:
