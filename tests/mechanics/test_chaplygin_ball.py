@@ -80,7 +80,7 @@ def test_the_service_answers_and_refuses_by_name(server: Server) -> None:
     torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
     assert torus["frequencies_t"] == vs.torus(ChaplyginBall(**DATA)).frequencies_t.tolist()
     assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
-    digits = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30})
+    digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
     assert (digits.status_code, "chaplygin-ball" in digits.text) == (422, True)
 
 

@@ -260,7 +260,7 @@ def test_the_service_answers_for_a_ball(server: Server) -> None:
     assert np.allclose(answer["series"]["position"], expected.position, atol=1e-13)
     assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
     assert server.ask("POST", "/v1/tori", json={"problem": document}).status_code == 200
-    digits = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30})
+    digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
     assert (digits.status_code, "contact point" in digits.text) == (422, True)
 
 

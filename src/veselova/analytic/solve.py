@@ -30,7 +30,6 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
-from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -97,7 +96,6 @@ def solve(
     ):
         if beyond_double(digits, certified):
             _require_digits(problem, digits, certified)
-            assert isinstance(problem, VeselovaSO3)
             _require_options(method, time_map, digits, certified)
             from veselova.analytic.motion.area_digits import AreaMotionInBalls
 
@@ -169,11 +167,11 @@ def _require_digits(problem: AreaBody, digits: int, certified: bool) -> None:
     none.
     """
     of = "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
-    if isinstance(problem, RollingBall):
-        raise _needs_doubles(digits, f"system {problem.system}{of}")
     _require_exact_axes(problem, digits, certified)
     if certified:
-        raise InvalidInput(("certified",), f"false for system {problem.system}{of}", "true")
+        reason = "dt/dτ₁ has no proven strip of analyticity there"
+        required = f"false for system {problem.system}{of} ({reason})"
+        raise InvalidInput(("certified",), required, "true")
     if not problem.moves:
         raise _needs_doubles(digits, f"system {problem.system}{of} at rest")
     torus = problem.on_torus()
@@ -189,15 +187,17 @@ def _needs_doubles(digits: int, what: str) -> InvalidInput:
     return InvalidInput((field,), f"{FEWEST_DIGITS}, not certified, for {what}", given)
 
 
-def _require_exact_axes(problem: VeselovaSO3, digits: int, certified: bool) -> None:
+def _require_exact_axes(problem: AreaBody, digits: int, certified: bool) -> None:
     """Raise InvalidInput where more than doubles are asked for along axes that are known in double
     precision.
     """
     if not beyond_double(digits, certified):
         return
-    if isinstance(problem, RubberBall):
-        further = "the attitude alone has more: system veselova-so3 with inertia I + ma²"
-        raise _needs_doubles(digits, f"the contact point ({further})")
+    if isinstance(problem, RubberBall) and problem.is_rank_one and certified:
+        further = "the attitude alone has them: system veselova-so3 with inertia I + ma²"
+        raise InvalidInput(("certified",), f"false for the contact point ({further})", "true")
+    if isinstance(problem, RubberBall) and not problem.moves:
+        raise _needs_doubles(digits, f"system {problem.system} at rest")
     if problem.axes is not None:
         field = "digits" if digits > FEWEST_DIGITS else "certified"
         required = "inertia as 3 principal moments or a diagonal matrix (others have no exact axes)"

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from veselova.analytic.motion.motion_balls import MotionInBalls
+from veselova.analytic.motion.rank_one_so3 import exact_position
 from veselova.mechanics.core.decimal_balls import DecimalBalls
 from veselova.mechanics.core.decimals import Decimals, Later, Pair
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_start import AreaStart, exact_start
 from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["AreaMotionInBalls"]
@@ -32,7 +36,7 @@ class AreaMotionInBalls:
     E(t) = [v u −n](t) [v u −n](0)ᵀ E(0), and Ω = B(K + σγ) with K fixed in space.
     """
 
-    problem: VeselovaSO3
+    problem: VeselovaSO3 | ChaplyginBall
     digits: int
     method: str | None
 
@@ -61,7 +65,12 @@ class AreaMotionInBalls:
 
     @cached_property
     def _start(self) -> AreaStart:
-        return exact_start(self.problem, self.digits)
+        return exact_start(self.problem, self.digits, self._added)
+
+    @property
+    def _added(self) -> Fraction | None:
+        """Return ma² of Chaplygin's ball."""
+        return self.problem.ball.added if isinstance(self.problem, ChaplyginBall) else None
 
     def _decimals(self, point: Decimals) -> Decimals:
         """Return the decimals of the body; Ω and what follows from it are made when they are asked
@@ -76,6 +85,12 @@ class AreaMotionInBalls:
             "Omega": partial(self._angular_velocity, balls, frame),
             "frame": partial(balls.pair, frame),
         }
+        if isinstance(problem, RollingBall):
+            plane = np.array(self._torus.exact_plane, dtype=object)
+            horizontal = np.array(self._start.frame, dtype=object)[:, 1:]
+            pairs["position"] = partial(
+                exact_position, balls, problem, point, balls.of(-(plane @ horizontal))
+            )
         middles = Later(pairs, 0)
         radii = Later(pairs, 1)
         for name in problem.derived:
@@ -84,12 +99,18 @@ class AreaMotionInBalls:
         return Decimals(self.digits, False, Later(ordered, 0), Later(ordered, 1), problem.bounded)
 
     def _angular_velocity(self, balls: DecimalBalls, frame: Any) -> Pair:
-        """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ)."""
+        """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""
         momentum = balls.of(self._start.momentum)
         moments = balls.of(self.problem.moments)
         gamma = frame[:, :, 0]
         free = (frame @ momentum) / moments
         across = gamma / moments
-        share = momentum[:1] - np.sum(free * gamma, axis=1)
-        share = share / np.sum(across * gamma, axis=1)
+        if self._added is None:
+            share = momentum[:1] - np.sum(free * gamma, axis=1)
+            share = share / np.sum(across * gamma, axis=1)
+        else:
+            # 1 − D(Bγ,γ) = (Bγ,Iγ), without cancellation
+            inertia = balls.of([moment - self._added for moment in self.problem.moments])
+            share = balls.of([self._added]) * np.sum(free * gamma, axis=1)
+            share = share / np.sum(across * (inertia * gamma), axis=1)
         return balls.pair(free + share[:, None] * across)

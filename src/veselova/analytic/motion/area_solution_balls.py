@@ -4,9 +4,8 @@ direction of the flow and time as ``AreaSolution`` has them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +13,10 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.area_solution import AreaSolution
+from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
-from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
 from veselova.analytic.time_map.rate import time_rate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.area_veselova import AreaVeselova
@@ -38,6 +38,7 @@ class AreaSolutionInBalls(SolutionInBalls):
             reason = "on a separatrix motions with an area constant have 15 digits"
             raise Unsolved("too-far", reason)
         super().__init__(coarse, digits, certified, method, reach)
+        self._area = coarse
         self._costs = replace(self._costs, rate_of_state=True)
 
     def _frequencies(self, periods: Periods) -> Values:
@@ -60,7 +61,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         """Return the orbit whose rates are those of attitudes."""
         of_neumann = orbit.rate.inversion.periods.frequencies
         paces = [max(abs(float(f)) for f in rates) for rates in (of_neumann, orbit.frequencies)]
-        return AreaOrbit(
+        return GeneralOrbit(
             orbit.spectrum,
             orbit.rate,
             orbit.start,
@@ -77,47 +78,53 @@ class AreaSolutionInBalls(SolutionInBalls):
 
     def _time_rate(self, attitude: Attitude) -> Values:
         """Return dτ₁/dt = dτ₁/dt'/(1 − tilt (u,A'v)/(v,A'v))."""
-        xp: Any = self.arithmetic
-        own = time_rate(self.spectrum, self.problem.time, xp)(attitude.q)
+        own = time_rate(self.spectrum, self.problem.time, self.arithmetic)(attitude.q)
         if attitude.q.shape[1] < 3:
             return own
+        return np.asarray(own / (1 - self._ratio(attitude)))
+
+    def _odd_rate(self, attitude: Attitude) -> Values:
+        """Return the part of dt/dτ₁ that changes sign with u."""
+        own = time_rate(self.spectrum, self.problem.time, self.arithmetic)(attitude.q)
+        return np.asarray(-self._ratio(attitude) / own)
+
+    def _ratio(self, attitude: Attitude) -> Values:
+        """Return tilt (u,A'v)/(v,A'v)."""
+        xp: Any = self.arithmetic
         A = xp.array(self.moving.A)
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
         tilt = self._side * xp.number(self.problem.exact_tilt)
-        return np.asarray(own / (1 - tilt * across / along))
+        return np.asarray(tilt * across / along)
+
+    def _displacement(self, times: Values, tau1: Values) -> Values:
+        """Return the coefficients of n and e_⊥ in the path of a ball, (N, 2)."""
+        xp: Any = self.arithmetic
+        problem = self.problem
+        result = xp.array(np.zeros((len(times), 2)))
+        result[:, 0] = xp.number(problem.exact_uniform) * times
+        if self.frame.periods.genus < 2:
+            return np.asarray(result)
+        side = self.body.rotation[:, 0]
+        # (q',n_2) to the sign of u, and the odd part of the time over what it may be
+        largest = xp.number(2 * (self._area.odd_peak or 1.0))
+        functions: list[Along] = [
+            lambda attitude: attitude.components @ side,
+            lambda attitude: self._odd_rate(attitude) / largest,
+        ]
+        if not self._area.odd_peak:
+            functions = functions[:1]
+        found = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
+        result[:, 1] = problem.sign * found[:, 0]
+        if self._area.odd_peak:
+            result[:, 0] = result[:, 0] - xp.number(problem.exact_across) * largest * found[:, 1]
+        return np.asarray(result)
 
     @property
     def _side(self) -> int:
         """Return the sign of u against n_2."""
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
         return 1 if n_2 @ self.problem.u > 0 else -1
-
-
-@dataclass(frozen=True)
-class AreaOrbit(Orbit):
-    """The orbit of a motion with an area constant.
-
-    - rates_at: dt/dτ₁ at phases (N, g)
-    - slower: by how much its τ₁ is longer than that of Neumann's flow on this torus, about
-    """
-
-    rates_at: Callable[[Values], Values]
-    slower: float
-
-    has_fourier_map: ClassVar[bool] = False
-
-    def rates(self, tau1: Values) -> Values:
-        """Return dt/dτ₁ at Neumann times (N,)."""
-        return self.rates_at(self.phases(tau1))
-
-    @property
-    def strip(self) -> tuple[float, Any]:
-        """Return about how wide the strip is where dt/dτ₁ is analytic, not a bound, and its scale:
-        that of Neumann's flow.
-        """
-        width, largest = super().strip
-        return width * self.slower, largest
 
 
 def solution_in_balls(

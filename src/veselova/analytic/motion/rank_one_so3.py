@@ -14,10 +14,11 @@ from veselova.analytic.motion.area_motion import largest_component, roll
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Decimals, Later, Pair
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["motion_of_body"]
+__all__ = ["exact_position", "motion_of_body"]
 
 
 def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
@@ -58,6 +59,9 @@ def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
         "Omega": partial(_angular_velocity, point),
         "frame": lambda: (point.midpoints["frame"], point.radii["frame"]),
     }
+    if isinstance(problem, RubberBall):
+        balls = DecimalBalls(point.digits)
+        pairs["position"] = partial(exact_position, balls, problem, point, None)
     middles = Later(pairs, 0)
     radii = Later(pairs, 1)
     for name in problem.derived:
@@ -66,6 +70,17 @@ def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
     return Decimals(
         point.digits, point.certified, Later(ordered, 0), Later(ordered, 1), problem.bounded
     )
+
+
+def exact_position(balls: DecimalBalls, ball: RollingBall, point: Decimals, plane: Any) -> Pair:
+    """Return the contact point x(0) − a·displacement, its components along the rows of ``plane``
+    where there is one.
+    """
+    moved = balls.array(point.midpoints["displacement"], point.radii["displacement"])
+    if plane is not None:
+        moved = moved @ plane
+    start, radius = balls.of(list(ball.ball.contact)), balls.of([ball.ball.radius])
+    return balls.pair(start - radius * moved)
 
 
 def _angular_velocity(point: Decimals) -> Pair:

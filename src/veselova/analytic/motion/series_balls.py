@@ -25,12 +25,14 @@ class States:
     - velocity: (N, n): dq/d(time) in the problem's own time
     - frame: (N, n, n)
     - spheroconic: (N, n−1)
+    - displacement: (N, n−1) of a rolling ball, else None
     """
 
     tau1: Values
     velocity: Values
     frame: Values
     spheroconic: Values
+    displacement: Values | None = None
 
 
 def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
@@ -46,6 +48,8 @@ def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: 
 def series_of(problem: TorusProblem, states: States, arithmetic: Any) -> Mapping[str, Values]:
     """Return the series of a problem by name, in the order of its outputs."""
     engine = {name: getattr(states, name) for name in ("tau1", "frame", "spheroconic")}
+    if states.displacement is not None:
+        engine["displacement"] = states.displacement
     stored = dict(problem.complete({"q_dot": states.velocity, **engine}))
     derived = {name: problem.derive(name, stored) for name in problem.derived if name != "X"}
     if "X" in problem.derived:

@@ -25,6 +25,7 @@ from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
+from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
 from veselova.analytic.motion.time_map_balls import choose_time_map
 from veselova.analytic.motion.torus_solution import Solution
@@ -37,6 +38,7 @@ from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.rate import TimeMap, TimeRate, time_rate
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
 __all__ = ["SolutionInBalls"]
 
@@ -171,13 +173,34 @@ class SolutionInBalls:
         unit = xp.number(self.moving.unit)
         points = to_all_directions(points / unit, self.moving.frozen, xp)
         states = States(
-            tau1 * xp.sqrt(unit), self.body.to_axes(velocity), self.body.frames(attitude), points
+            tau1 * xp.sqrt(unit),
+            self.body.to_axes(velocity),
+            self.body.frames(attitude),
+            points,
+            self._displacement(times, tau1) if "displacement" in problem.outputs else None,
         )
         return series_of(
             problem,
             states if self._drift is None else self._add_perturbation(states, self._drift, tau1),
             xp,
         ), details
+
+    def _displacement(self, times: Values, tau1: Values) -> Values:
+        """Return the displacement of a ball that neither slips nor twists, (N, n−1): uniform along
+        the momentum, and the integrals of (q',n_k) across it.
+        """
+        xp = self.arithmetic
+        problem = self.problem
+        assert isinstance(problem, RollingVeselova)
+        if self._drift is not None:
+            raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
+        functions: list[Along] = [
+            lambda attitude, k=k: attitude.components[:, k]  # type: ignore[misc]
+            for k in range(self.frame.periods.genus - 1)
+        ]
+        across = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
+        along = xp.sqrt(xp.number(problem.exact_square_of_speed)) * times
+        return np.asarray(np.concatenate([across, along[:, None]], axis=1) @ self.body.rotation)
 
     def _add_perturbation(self, states: States, drift: PerturbationBound, tau1: Values) -> States:
         """Return the states of the moved start, widened to hold those of the given one."""

@@ -29,7 +29,7 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 
-__all__ = ["Orbit"]
+__all__ = ["GeneralOrbit", "Orbit"]
 
 #: Derived: by the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what
 #: makes up for the rounding of the half width to a double; and by how much d(time)/dτ₁ may be above
@@ -103,3 +103,29 @@ class Orbit:
         return 2 * d / (speed + math.sqrt(speed * speed + 2 * bend * d)), _ABOVE_REAL[
             self.rate.time
         ] * self.rate.scale
+
+
+@dataclass(frozen=True)
+class GeneralOrbit(Orbit):
+    """An orbit with another direction, or along which another function is integrated.
+
+    - rates_at: dt/dτ₁, or the function, at phases (N, g)
+    - slower: by how much its τ₁ is longer than that of Neumann's flow on this torus, about
+    """
+
+    rates_at: Callable[[Values], Values]
+    slower: float
+
+    has_fourier_map: ClassVar[bool] = False
+
+    def rates(self, tau1: Values) -> Values:
+        """Return dt/dτ₁ at Neumann times (N,)."""
+        return self.rates_at(self.phases(tau1))
+
+    @property
+    def strip(self) -> tuple[float, Any]:
+        """Return about how wide the strip is where dt/dτ₁ is analytic, not a bound, and its scale:
+        that of Neumann's flow.
+        """
+        width, largest = super().strip
+        return width * self.slower, largest

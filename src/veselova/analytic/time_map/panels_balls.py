@@ -110,6 +110,16 @@ class ChebyshevTimeMapInBalls:
                 result[chosen] = sign * side.roots(sign * times[chosen], sign * approximate[chosen])
         return np.asarray(result)
 
+    def integral(self, tau1: Values) -> Values:
+        """Return the integral of the rate from zero to Neumann times (N,) within the panels."""
+        approximate = tau1.astype(float)
+        result = self._xp.array(np.zeros(tau1.shape))
+        for side, sign in ((self._forward, 1), (self._backward, -1)):
+            chosen = np.flatnonzero(sign * approximate > 0)
+            if side is not None and chosen.size:
+                result[chosen] = sign * side.values(sign * tau1[chosen])
+        return np.asarray(result)
+
     def _panels(self, reach: float, direction: int) -> _Panels | None:
         if reach == 0:
             return None
@@ -275,6 +285,25 @@ class _Panels:
             rows = np.flatnonzero(places == place)
             time_maps = {digits: partial(series, place) for digits, series in steps.items()}
             result[rows] = self._roots_on(panel, time_maps, times[rows], approximate[rows])
+        return result
+
+    def values(self, x: Values) -> Values:
+        """Return t(x), (N,)."""
+        xp = self.arithmetic
+        middle = xp.midpoints(x)
+        spread = xp.upper_bound(x - middle)
+        last = len(self.centres) - 1
+        places = np.minimum((middle.astype(float) / (2 * float(self.half))).astype(int), last)
+        panels, places = np.unique(places, return_inverse=True)
+        series = self._series(panels, xp.digits)
+        result = np.empty(x.shape, dtype=object)
+        for place, p in enumerate(panels.tolist()):
+            rows = np.flatnonzero(places == place)
+            constant = self._ends[p] - np.sum(self._exponentials[p])
+            value = constant + series(place, (self.centres[p] - middle[rows]) / self.half)[:, 0]
+            steepest = np.sum(xp.upper_bound(self.rates[p])) + self.truncation[p]
+            lost = 2 * self.half * self.truncation[p] + spread[rows] * steepest
+            result[rows] = xp.add_error(value, lost)
         return result
 
     def _series(self, panels: NDArray[np.intp], digits: int) -> ChebyshevSeriesInBalls:

@@ -35,8 +35,9 @@ class AreaStart:
     momentum: tuple[Fraction, ...]
 
 
-def exact_start(body: RigidBody, digits: int) -> AreaStart:
-    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ.
+def exact_start(body: RigidBody, digits: int, added: Fraction | None = None) -> AreaStart:
+    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, or, with
+    ``added`` D, that of Chaplygin's ball, K = JΩ − D(Ω,γ)γ.
 
     The frame is the natural one of γ and γ̇ = γ×Ω where none was given and double precision knows
     it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
@@ -56,7 +57,11 @@ def exact_start(body: RigidBody, digits: int) -> AreaStart:
         if columns is None:
             columns = _orthonormal(gamma, body)
         M = vectors.times(Omega, moments)
-        shift = vectors.dot(Omega, gamma) - vectors.dot(M, gamma)
+        shift = vectors.dot(Omega, gamma)
+        if added is None:
+            shift -= vectors.dot(M, gamma)
+        else:
+            shift *= -vectors.of_rational(added)
         K = tuple(x + shift * y for x, y in zip(M, gamma, strict=True))
         momentum = tuple(Fraction(vectors.dot(column, K)) for column in columns)
         rows = tuple(tuple(map(Fraction, row)) for row in zip(*columns, strict=True))

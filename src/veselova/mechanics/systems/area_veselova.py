@@ -115,7 +115,8 @@ class AreaVeselova(Veselova):
     - normal: (3,) n at the start
     - horizontal: (3,) e_⊥ at the start
     - angle: the sine of the angle between K and γ
-    - exact_tilt, columns: the tilt, and [v u −n] at the start by its columns, rationals
+    - exact_tilt, exact_uniform, exact_across: the same as rationals
+    - columns, exact_plane: [v u −n] at the start by its columns, and n, e_⊥, rationals
 
     With ``digits`` the data are rounded so far below them that nothing is lost. The frame is then
     [v u −n], otherwise the natural one. Where K is along γ, to 1e-5, they are not served.
@@ -134,6 +135,9 @@ class AreaVeselova(Veselova):
     horizontal: Array
     angle: float
     exact_tilt: Fraction
+    exact_uniform: Fraction
+    exact_across: Fraction
+    exact_plane: tuple[tuple[Fraction, ...], ...]
     columns: tuple[tuple[Fraction, ...], ...]
 
     def __init__(self, data: AreaData, digits: int = 0) -> None:
@@ -172,6 +176,9 @@ class AreaVeselova(Veselova):
                 exact_tilt=Fraction(found.L[1] / found.L[0]),
                 columns=_exact(columns),
                 angle=float(momentum.angle),
+                exact_uniform=Fraction(found.mu[0] * momentum.horizontal),
+                exact_across=Fraction((found.mu[0] - found.mu[1]) * momentum.horizontal),
+                exact_plane=_exact((normal, vectors.cross(normal, momentum.gamma))),
                 uniform=float(found.mu[0] * momentum.horizontal),
                 across=float((found.mu[0] - found.mu[1]) * momentum.horizontal),
                 u=_floats(found.u),

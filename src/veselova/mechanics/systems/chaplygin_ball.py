@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
+from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
@@ -40,7 +42,8 @@ class ChaplyginBall(RollingBall):
     ``velocity``, which is that of the centre, the horizontal ``force`` of the plane on the ball,
     and the momentum K about the contact point, which is fixed in space.
 
-    Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with 15 digits.
+    Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with any number of
+    digits where the momentum is not along γ.
     Formulations: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
     point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises
     InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
@@ -81,6 +84,10 @@ class ChaplyginBall(RollingBall):
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
         return RollingAreaVeselova(AreaData.of(self, self.ball.added))
 
+    def with_digits(self, digits: int) -> AreaVeselova:
+        """Return the problem on the torus with data for so many digits."""
+        return RollingAreaVeselova(AreaData.of(self, self.ball.added), digits)
+
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
         D(BK,γ)/(Bγ,Iγ).
@@ -117,6 +124,31 @@ class ChaplyginBall(RollingBall):
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""
         return self._solve(np.cross(Omega @ self.ball.tensor, Omega), gamma)
+
+    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
+        moments = balls.of(self.moments)
+        added = balls.of([self.ball.added])
+        inertia = balls.of([moment - self.ball.added for moment in self.moments])
+        free, across = cross(Omega * inertia, Omega) / moments, gamma / moments
+        share = added * np.sum(free * gamma, axis=1)
+        share = share / np.sum(across * (inertia * gamma), axis=1)
+        return free + share[:, None] * across
+
+    def derive_decimals(
+        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
+    ) -> Pair:
+        """Return gamma, velocity, force or momentum with their radii."""
+        if name == "gamma":
+            return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
+        if name != "momentum":
+            return super().derive_decimals(name, midpoints, radii, digits)
+        balls = DecimalBalls(digits)
+        Omega, frame = (
+            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
+        )
+        gamma = frame[:, :, 0]
+        spin = balls.of([self.ball.added]) * np.sum(Omega * gamma, axis=1)
+        return balls.pair(Omega * balls.of(self.moments) - spin[:, None] * gamma)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, velocity, force or momentum."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.flows.ball_flow import RollingFlow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
@@ -76,3 +77,9 @@ class RubberBall(RollingBall, VeselovaSO3):
         torque = np.cross(Omega @ self.inertia, Omega)
         torque = torque + multiplier(self, Omega, gamma)[..., None] * gamma
         return np.asarray(torque @ self.inverse)
+
+    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
+        moments = balls.of(self.moments)
+        torque, across = cross(Omega * moments, Omega), gamma / moments
+        share = np.sum(torque * across, axis=1) / np.sum(gamma * across, axis=1)
+        return torque / moments - share[:, None] * across

@@ -143,7 +143,7 @@ class VeselovaSO3(RigidBody):
 
     def with_digits(self, digits: int) -> AreaVeselova:
         """Return the ``AreaVeselova`` of (Ω,γ) ≠ 0 with data for so many digits."""
-        return AreaVeselova(AreaData.of(self), digits)
+        return self.area_class(AreaData.of(self), digits)
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0."""
