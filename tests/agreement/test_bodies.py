@@ -220,6 +220,17 @@ def test_the_odd_part_of_the_time_has_the_series_of_its_determinants(system: str
     assert largest(by_series - by_frame) < 1e-13 * solution.odd_peak
 
 
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_rate_varies_by_no_more_than_its_bound(system: str, seed: int) -> None:
+    rng = np.random.default_rng([4, seed])
+    gamma, Omega = rng.normal(size=(2, 3))
+    case = BodyCase("random", rng.uniform(0.2, 2, 3).tolist(), gamma, Omega)
+    solution = AreaSolution(case.problem(system).on_torus())
+    rates = solution.rate_at(rng.uniform(0, 2, (400, 2)), in_angles=True)
+    assert np.max(rates) / np.min(rates) <= solution.rate_variation * (1 + 1e-12)
+
+
 def test_on_a_separatrix_errors_grow_with_the_motion() -> None:
     """Euler's top on the separatrix of its middle axis: γ_1 = γ_3, B_1 − B_2 = B_2 − B_3."""
     problem = vs.VeselovaSO3(["1/5", "1/4", "1/3"], ["2/3", "1/3", "2/3"], ["10/3", "4/3", 2])

@@ -32,6 +32,9 @@ __all__ = ["AreaSolution", "solution_of"]
 
 Array = NDArray[np.float64]
 
+#: Derived: a variation of dt/dτ₁ below this is mild, whatever samples add to it.
+_MILD = 5.0
+
 #: Calibrated: by how much more than at the sampled phases dt/dτ₁ may vary.
 _BETWEEN = 2.0
 
@@ -90,13 +93,21 @@ class AreaSolution(DirectedSolution):
         n_2 = self.moving.directions @ self._sampling.start.normals[0][:, 0]
         return float(np.sign(n_2 @ self.problem.u))
 
+    @cached_property
+    def _A(self) -> Array:
+        return to_float(self.moving.A)
+
+    @cached_property
+    def _excess(self) -> Array:
+        """Return A' less its least entry, which (u,A'v) does not have: it would cancel."""
+        return to_float([a - 1 for a in self.moving.A])
+
     def _ratio(self, attitude: Attitude) -> Array:
         """Return tilt (u,A'v)/(v,A'v), which is between −1 and 1."""
         if self.curve.genus == 1:
             return np.zeros(len(attitude.q))
-        excess = to_float([a - 1 for a in self.moving.A])
-        across = np.asarray((attitude.normals[:, :, 0] * attitude.q) @ excess)
-        along = (attitude.q * attitude.q) @ to_float(self.moving.A)
+        across = np.asarray((attitude.normals[:, :, 0] * attitude.q) @ self._excess)
+        along = (attitude.q * attitude.q) @ self._A
         return np.asarray(self.side * self.problem.tilt * across / along)
 
     def rate_at(self, z: Array, in_angles: bool) -> Array:
@@ -119,11 +130,24 @@ class AreaSolution(DirectedSolution):
 
     @cached_property
     def rate_variation(self) -> float:
-        """Return by how much dt/dτ₁ may vary, from its values at sampled phases."""
+        """Return by how much dt/dτ₁ may vary: from its values at sampled phases, or a bound where
+        that is below what any decision asks for.
+        """
+        if (widest := self._widest_variation) < _MILD:
+            return widest
         z = np.concatenate([sample_phases(self.curve.genus), self._origin[None, :]])
         rates = self.rate_at(z, in_angles=not self.near_separatrix)
         spread = _BETWEEN * float(np.max(rates) / np.min(rates))
         return max(super().rate_variation, spread)
+
+    @property
+    def _widest_variation(self) -> float:
+        """Return a bound: |(u,A'v)|/(v,A'v) ≤ (κ−1)/2√κ for orthonormal u, v, κ the ratio of the
+        largest A' to the least.
+        """
+        root = super().rate_variation
+        odd = abs(self.problem.tilt) * (root * root - 1) / (2 * root)
+        return root * (1 + odd) / (1 - odd) if odd < 1 else np.inf
 
     @cached_property
     def at_half_periods(self) -> tuple[Array, Attitude]:
