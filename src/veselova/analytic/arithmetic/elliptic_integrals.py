@@ -17,16 +17,16 @@ Array = NDArray[np.float64]
 
 #: Derived: relative distance of both means from which one more step leaves its square, below a
 #: rounding.
-_NEAR_MEAN = 1e-8
+NEAR_MEAN = 1e-8
 
 #: Derived: relative distances of the arguments of R_F from their mean from which its series of the
 #: eighth order leaves 1e-17.
-_NEAR = 7e-3
+NEAR = 7e-3
 
 #: Derived: steps from any doubles: exponents are halved ten times, and digits doubled five times;
 #: arguments come nearer by a factor of four.
-_MOST_MEANS = 20
-_MOST_DUPLICATIONS = 20
+MOST_MEANS = 20
+MOST_DUPLICATIONS = 20
 
 #: Tuning: arrays with so few entries are done one by one: a call costs more than an entry.
 _FEW = 16
@@ -41,8 +41,8 @@ def quarter_period(complement: Any) -> Any:
         return np.array(found).reshape(complement.shape)
     a = np.ones(complement.shape)
     b = np.sqrt(complement)
-    for _ in range(_MOST_MEANS):
-        remaining = np.abs(a - b) > _NEAR_MEAN * a
+    for _ in range(MOST_MEANS):
+        remaining = np.abs(a - b) > NEAR_MEAN * a
         if not remaining.any():
             break
         # no entry depends on how many steps others take
@@ -56,7 +56,7 @@ def _quarter(complement: float) -> float:
         return math.inf if complement == 0 else math.nan
     a = 1.0
     b = math.sqrt(complement)
-    while abs(a - b) > _NEAR_MEAN * a:
+    while abs(a - b) > NEAR_MEAN * a:
         a, b = (a + b) / 2, math.sqrt(a * b)
     return math.pi / (a + b)
 
@@ -68,10 +68,10 @@ def carlson_rf(x: Any, y: Any, z: Any) -> Any:
     if not any(isinstance(value, np.ndarray) for value in (x, y, z)):
         return _rf(float(x), float(y), float(z))
     x, y, z = (np.array(value) for value in np.broadcast_arrays(x, y, z))
-    for _ in range(_MOST_DUPLICATIONS):
+    for _ in range(MOST_DUPLICATIONS):
         mean = (x + y + z) / 3
         spread = np.maximum(np.maximum(np.abs(x - mean), np.abs(y - mean)), np.abs(z - mean))
-        remaining = spread > _NEAR * mean
+        remaining = spread > NEAR * mean
         if not remaining.any():
             break
         rx, ry, rz = np.sqrt(x), np.sqrt(y), np.sqrt(z)
@@ -82,9 +82,9 @@ def carlson_rf(x: Any, y: Any, z: Any) -> Any:
 
 
 def _rf(x: float, y: float, z: float) -> Any:
-    for _ in range(_MOST_DUPLICATIONS):
+    for _ in range(MOST_DUPLICATIONS):
         mean = (x + y + z) / 3
-        if max(abs(x - mean), abs(y - mean), abs(z - mean)) <= _NEAR * mean:
+        if max(abs(x - mean), abs(y - mean), abs(z - mean)) <= NEAR * mean:
             break
         rx, ry, rz = math.sqrt(x), math.sqrt(y), math.sqrt(z)
         shift = rx * ry + rx * rz + ry * rz

@@ -32,7 +32,7 @@ from veselova.analytic.curve.periods import Periods
 __all__ = ["Attitude", "Differences", "Frame", "PointRoots", "orthogonal", "slopes"]
 
 #: Derived: step of the difference quotients: truncation and rounding both near 1e-8.
-_STEP = 1e-8
+STEP = 1e-8
 
 #: Budget: distances |λ_s−b_i| held at once: 16 MB.
 _BLOCK = 2_000_000
@@ -135,7 +135,7 @@ class Differences:
     def _lengths(self) -> Values:
         # Where angles are ill-conditioned their directions are long, and a fixed step would lead
         # out of the neighbourhood.
-        return np.asarray(_STEP / np.maximum(1.0, np.max(np.abs(self.directions), axis=1)))
+        return np.asarray(STEP / np.maximum(1.0, np.max(np.abs(self.directions), axis=1)))
 
     @property
     def ends(self) -> Values:

@@ -20,15 +20,15 @@ __all__ = ["AngleMaps"]
 Array = NDArray[np.float64]
 
 #: Budget: Newton's steps: from ψ = 2πz four to eight are usual. Points that need more are named.
-_MOST_STEPS = 24
+MOST_STEPS = 24
 
 #: Calibrated: a residual of this many ε is rounding; one of this many times that, which no step
 #: betters, is that of long sums (as in analytic.curve.abel_jacobi).
-_CONVERGED = 8.0
-_STALLED = 1e3
+CONVERGED = 8.0
+STALLED = 1e3
 
 #: Tuning: radians by which one step may move an angle: far from the solution slopes say little.
-_LONGEST_STEP = 1.5
+LONGEST_STEP = 1.5
 
 
 @dataclass(frozen=True)
@@ -94,20 +94,20 @@ class AngleMaps:
         maps = self
         rows = np.arange(z.shape[0])
         converged = np.zeros(z.shape[0], dtype=bool)
-        for _ in range(_MOST_STEPS):
+        for _ in range(MOST_STEPS):
             checkpoint()
             cosines, sines = _cosines_and_sines(psi[rows], self.series.shape[3] - 1)
             residual = maps._phases(psi[rows], sines) - reduced[rows]
             size = np.max(np.abs(residual), axis=2)
-            tolerance = _CONVERGED * DOUBLE.epsilon
-            stays = (size >= last[rows] / 2) & (size <= _STALLED * tolerance)
+            tolerance = CONVERGED * DOUBLE.epsilon
+            stays = (size >= last[rows] / 2) & (size <= STALLED * tolerance)
             done = np.all((size <= tolerance) | stays, axis=1)
             converged[rows[done]] = True
             if done.all():
                 break
             step = _solve(maps._slopes(cosines), residual)
             longest = np.max(np.abs(step), axis=2, keepdims=True)
-            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _LONGEST_STEP))
+            step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
             keep = ~done
             psi[rows[keep]] -= step[keep]
             last[rows] = size

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import DoubleDouble, stack_double_doubles
+from veselova.analytic.compiled.compiler import prepare, ready
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.angle_maps import AngleMaps
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion.ensemble import States, states_of_stack
+from veselova.analytic.motion.ensemble import States, states_compiled, states_of_stack
+from veselova.analytic.motion.ensemble_compiled import Interpolation
 from veselova.analytic.motion.torus_stack import (
     TorusStack,
     branch_points,
@@ -99,8 +101,11 @@ class _Panel:
 
     def at(self, distances: Array) -> Array:
         """Return the interpolated numbers at c_2 − I_2 (N,), (N, L)."""
-        x = (2 * distances - self.low - self.high) / (self.high - self.low)
-        return _chebyshev(x) @ self.coefficients
+        return _chebyshev(self.places(distances)) @ self.coefficients
+
+    def places(self, distances: Array) -> Array:
+        """Return c_2 − I_2 (N,) as places between −1 and 1."""
+        return np.asarray((2 * distances - self.low - self.high) / (self.high - self.low))
 
 
 def _chebyshev(x: Array) -> Array:
@@ -203,6 +208,7 @@ class Atlas:
         """Yield the states of starts (N, 3), exact as they stand, at the times of a grid, for as
         many of the starts as lie on a panel.
         """
+        prepare(len(q) * grid.doubles.size)
         A = np.broadcast_to(self._A, q.shape)
         chosen = known_starts(A, q, q_dot)
         for first in range(0, chosen.size, _BLOCK):
@@ -214,8 +220,13 @@ class Atlas:
                 members = np.flatnonzero(on_it)
                 if members.size:
                     checkpoint()
-                    stack, tables = _stack(panel, rows, spectra, members, distances)
-                    yield from states_of_stack(stack, tables, grid, None)
+                    stack = _stack(panel, rows, spectra, members)
+                    if ready():
+                        numbers = _interpolation(panel, stack, distances[members])
+                        yield from states_compiled(stack, numbers, grid, None)
+                    else:
+                        tables = _tables(panel, stack, distances[members])
+                        yield from states_of_stack(stack, tables, grid, None)
 
 
 def _graded(width: float) -> Iterator[tuple[float, float]]:
@@ -261,34 +272,42 @@ class _Tori:
 
 
 def _stack(
-    panel: _Panel,
-    rows: NDArray[np.intp],
-    spectra: Spectra,
-    members: NDArray[np.intp],
-    distances: Array,
-) -> tuple[TorusStack, ModeTables]:
-    """Return the tori of some starts on one panel, with what is interpolated of them."""
+    panel: _Panel, rows: NDArray[np.intp], spectra: Spectra, members: NDArray[np.intp]
+) -> TorusStack:
+    """Return the tori of some starts on one panel, without what is interpolated of them."""
     points, origins = branch_points(spectra, members, np.array([panel.high <= 0]))
     between = (points[:, None, :] - points[:, :, None]).high
-    curve = Curve(DOUBLE, points.high, between, origins)
-    periods = Periods(curve, panel.terms)
+    periods = Periods(Curve(DOUBLE, points.high, between, origins), panel.terms)
     stack = TorusStack(rows[members], spectra.part(members), points, periods)
-    numbers = panel.at(distances[members])
     count = members.size
-    end = 3 + 4 * panel.terms
-    vars(periods)["angle_series"] = np.ascontiguousarray(numbers[:, 3:end]).reshape(count, 2, 2, -1)
-    values = np.zeros((count, (panel.highest + 1) * (2 * panel.highest + 1)))
-    values[:, panel.modes] = numbers[:, end:]
-    tables = ModeTables(
-        values.reshape(count, panel.highest + 1, -1), np.full(count, panel.off), panel.modes
-    )
-    slopes = np.abs(stack.maps.slopes(stack.angles[:, None])[:, 0])
-    of_angles = (slopes @ np.abs(stack.angles)[..., None])[..., 0] + panel.cancellation
+    base = panel.cancellation * DOUBLE.epsilon + panel.of_phases
     vars(stack).update(
-        frequencies=np.ascontiguousarray(numbers[:, :2]),
-        mean=numbers[:, 2] * stack.rate.scale,
         rate_rounding=np.full(count, panel.of_rates + _RATE_ROUNDING * DOUBLE.epsilon),
         phase_error=np.full(count, panel.of_phases),
-        start_rounding=of_angles * DOUBLE.epsilon + panel.of_phases,
+        base_rounding=np.tile(base, (count, 1)),
     )
-    return stack, tables
+    return stack
+
+
+def _interpolation(panel: _Panel, stack: TorusStack, distances: Array) -> Interpolation:
+    """Return what compiled loops take of the panel."""
+    scale = np.asarray(stack.rate.scale)
+    arguments = panel.coefficients, panel.places(distances), scale, panel.modes
+    return Interpolation(*arguments, panel.terms, panel.highest, panel.off)
+
+
+def _tables(panel: _Panel, stack: TorusStack, distances: Array) -> ModeTables:
+    """Fill what is interpolated of tori, and return their tables."""
+    numbers = panel.at(distances)
+    count = distances.size
+    end = 3 + 4 * panel.terms
+    series = np.ascontiguousarray(numbers[:, 3:end]).reshape(count, 2, 2, -1)
+    vars(stack.periods)["angle_series"] = series
+    vars(stack).update(
+        frequencies=np.ascontiguousarray(numbers[:, :2]), mean=numbers[:, 2] * stack.rate.scale
+    )
+    values = np.zeros((count, (panel.highest + 1) * (2 * panel.highest + 1)))
+    values[:, panel.modes] = numbers[:, end:]
+    return ModeTables(
+        values.reshape(count, panel.highest + 1, -1), np.full(count, panel.off), panel.modes
+    )

@@ -15,15 +15,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.attitude.frame import STEP, Attitude
 from veselova.analytic.attitude.frame_batch import attitudes
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
+from veselova.analytic.compiled.compiler import prepare, ready
+from veselova.analytic.motion.ensemble_compiled import Interpolation, compiled_states
 from veselova.analytic.motion.torus_stack import TorusStack, torus_stacks
 from veselova.analytic.time_map.mode_tables import ModeTables, TimeMaps
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["States", "states_of_stack", "states_of_starts"]
+__all__ = ["States", "states_compiled", "states_of_stack", "states_of_starts"]
 
 Array = NDArray[np.float64]
 
@@ -49,9 +51,6 @@ _MOST_CANCELLATION = 10.0
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 _CERTAIN = 1e-9
-
-#: Derived: step of the difference quotients, as in analytic.attitude.frame.
-_STEP = 1e-8
 
 #: The constants of analytic.motion.error_bound and analytic.motion.base, in ε where they are
 #: roundings: of a phase, of the start's phases, of one evaluation, and the factor of the whole.
@@ -92,6 +91,7 @@ def states_of_starts(
     """
     if A.shape[1] - 1 not in _BOXES:
         return
+    prepare(len(A) * times.doubles.size)
     for stack in torus_stacks(A, q, q_dot, _NODE_COUNTS):
         for part, tables in _tables(stack):
             yield from states_of_stack(part, tables, times, frames)
@@ -140,6 +140,9 @@ def states_of_stack(
     stack: TorusStack, tables: ModeTables, times: TimeGrid, frames: Array | None
 ) -> Iterator[States]:
     """Yield the states at the times of a grid of those problems of a stack that can be served."""
+    if ready():
+        yield from states_compiled(stack, tables, times, frames)
+        return
     maps = TimeMaps(tables, stack.phases, stack.frequencies, stack.mean)
     cycles = maps.fastest / maps.mean * np.max(np.abs(times.doubles))
     rows = np.flatnonzero(~maps.has_slow_modes & (cycles < _MOST_CYCLES))
@@ -153,6 +156,15 @@ def states_of_stack(
             yield found
         elif served.any():
             yield States(*(getattr(found, name)[served] for name in States.__annotations__))
+
+
+def states_compiled(
+    stack: TorusStack, tables: ModeTables | Interpolation, times: TimeGrid, frames: Array | None
+) -> Iterator[States]:
+    """Yield the same by compiled loops."""
+    limits = (_CERTAIN, _PHASE, _START_PHASE, _EVALUATION, _SAFETY, _LARGEST_ERROR, _MOST_CYCLES)
+    for places, found in compiled_states(stack, tables, times, frames, limits):
+        yield States(stack.rows[places], found.tau1, found.q_dot, found.frame, found.error)
 
 
 @dataclass(frozen=True)
@@ -211,7 +223,7 @@ class _Motions:
         served = converged & inverted & self.is_certain
         count, number, genus = psi.shape
         inverses = np.linalg.inv(stack.maps.slopes(psi))  # ∂ψ/∂z
-        steps = _STEP / np.maximum(1.0, np.max(np.abs(inverses), axis=2))  # (N, T, g)
+        steps = STEP / np.maximum(1.0, np.max(np.abs(inverses), axis=2))  # (N, T, g)
         shifted = psi[:, None] + np.moveaxis(inverses * steps[:, :, None], 3, 1)
         ends = np.concatenate([psi[:, None], shifted], axis=1).reshape(count, -1, genus)
         at = self._attitudes(ends)

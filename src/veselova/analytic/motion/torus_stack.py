@@ -66,6 +66,7 @@ _BY_ROWS = (
     "rate_rounding",
     "phase_error",
     "start_rounding",
+    "base_rounding",
 )
 
 #: Derived: N nodes of half a period have the mean of what has less than 2N waves in it, those of
@@ -113,15 +114,23 @@ class TorusStack:
     @cached_property
     def angles(self) -> Array:
         """Return the angles ψ_s of the starts, (N, g)."""
-        angles = []
-        spheroconic = self.spectra.spheroconic
-        for s, cut in enumerate(self.periods.cuts):
-            place = spheroconic[:, s, None]
-            below = (place - self.points[:, 2 * s + 1, None]).high
-            above = (self.points[:, 2 * s + 2, None] - place).high
-            increasing = self.spectra.increasing[:, s, None]
-            angles.append(cut.points.angles(below, above, increasing))
+        below, above = self.on_cuts
+        angles = [
+            cut.points.angles(below[:, s, None], above[:, s, None], increasing)
+            for s, cut in enumerate(self.periods.cuts)
+            for increasing in [self.spectra.increasing[:, s, None]]
+        ]
         return np.concatenate(angles, axis=1)
+
+    @cached_property
+    def on_cuts(self) -> tuple[Array, Array]:
+        """Return λ_s−b_{2s−1} and b_{2s}−λ_s at the starts, (N, g) each."""
+        spheroconic = self.spectra.spheroconic
+        last = 2 * self.periods.genus + 1
+        return (
+            (spheroconic - self.points[:, 1:last:2]).high,
+            (self.points[:, 2:last:2] - spheroconic).high,
+        )
 
     @cached_property
     def maps(self) -> AngleMaps:
@@ -175,13 +184,18 @@ class TorusStack:
         ``Solution.start_rounding`` has it.
         """
         slopes = self.maps.slopes(self.angles[:, None])[:, 0]
+        of_angles = np.abs(slopes) @ np.abs(self.angles)[..., None]
+        return np.asarray(of_angles[..., 0] * DOUBLE.epsilon + self.base_rounding)
+
+    @cached_property
+    def base_rounding(self) -> Array:
+        """Return the part of it that the angles have no share in, (N, g)."""
         periods = self.periods
         integrals = np.sum(
             [np.sum(np.abs(series), axis=2) for series in periods.cut_series], axis=0
         )
         inverse = np.abs(periods.inverse_cycles)
-        of_angles = np.abs(slopes) @ np.abs(self.angles)[..., None]
-        return np.asarray((of_angles + inverse @ integrals[..., None])[..., 0] * DOUBLE.epsilon)
+        return np.asarray((inverse @ integrals[..., None])[..., 0] * DOUBLE.epsilon)
 
     @cached_property
     def signs(self) -> Array:

@@ -22,7 +22,7 @@ __all__ = ["Jacobi"]
 
 #: Derived: of many moduli, which have as many terms as the largest nome takes, cosh 2y stops here:
 #: terms are below e^−200 of the first.
-_LARGEST_WAVE = 1e86
+LARGEST_WAVE = 1e86
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Jacobi:
         square = 4 * sine * sine
         wave = 2 - square if self._is_direct is True else 2 + square
         if self._stacked:
-            wave = np.minimum(np.where(self._is_direct, 2 - square, wave), _LARGEST_WAVE)
+            wave = np.minimum(np.where(self._is_direct, 2 - square, wave), LARGEST_WAVE)
         exponentials = [0 * wave + 1, wave]  # 1, then 2 cos 2mz or 2 cosh 2my
         for m in range(2, self._terms + 1):
             exponentials.append(wave * exponentials[-1] - (exponentials[-2] if m > 2 else 2))

@@ -26,23 +26,23 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Tuning: largest |m_k| of the first steps towards τ₁.
-_COARSE = 3
+COARSE = 3
 
 #: Derived: cycles of the fastest phase of which a last step of Newton's method leaves its square.
-_CONVERGED = 1e-10
+CONVERGED = 1e-10
 
 #: Derived: slowest pace of a mode that is divided by.
-_STANDING = 1e-300
+STANDING = 1e-300
 
 #: Budget: steps before a torus is left to others: four to six are usual.
-_MOST_STEPS = 30
+MOST_STEPS = 30
 
 #: Tuning: smallest dt/dτ₁, as a part of its mean, that the first step divides by.
-_LEAST_SLOPE = 0.05
+LEAST_SLOPE = 0.05
 
 #: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start:
 #: beyond, m·z has to be a phase of its own, as analytic.time_map.fourier has it.
-_SLOW = 4.0
+SLOW = 4.0
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class TimeMaps:
             counts &= np.any(self.tables.orders != 0, axis=1)
         else:
             counts = np.ones(self._flat.shape, dtype=bool)
-        lengths = np.minimum(1 / np.maximum(self.paces, _STANDING), elapsed[:, None])
+        lengths = np.minimum(1 / np.maximum(self.paces, STANDING), elapsed[:, None])
         of_all = np.sqrt(np.sum(np.where(counts, lengths * lengths, 0.0), axis=1))
         of_modes = self.tables.off * (of_all + 1 / self.fastest)
         # with the amplitudes F_m/(F_0 π m·f), or what they reach until then
@@ -283,7 +283,7 @@ class TimeMaps:
         orders = self.tables.orders
         largest = np.max(np.abs(orders), axis=1) * (np.count_nonzero(orders, axis=1) > 1)
         pull = 4 * np.abs(self._flat) * largest * self.fastest[:, None]
-        return np.asarray(np.any(pull > _SLOW * self.paces / np.pi, axis=1))
+        return np.asarray(np.any(pull > SLOW * self.paces / np.pi, axis=1))
 
     @cached_property
     def _reach(self) -> Array:
@@ -319,12 +319,12 @@ class TimeMaps:
         reach = self._reach[:, None]
         delta = np.zeros(uniform.shape[:2])
         value, slope = self._excess(self._coarse, delta, uniform, slice(None))
-        delta = np.clip(-value / np.maximum(slope, _LEAST_SLOPE), -reach, reach)
+        delta = np.clip(-value / np.maximum(slope, LEAST_SLOPE), -reach, reach)
         slopes = np.empty_like(delta)
         converged = np.zeros(len(delta), dtype=bool)
         rows = np.arange(len(delta))
         tables = self._stacked
-        for _ in range(_MOST_STEPS):
+        for _ in range(MOST_STEPS):
             checkpoint()
             value, slope = self._excess(tables, delta[rows], uniform[rows], rows)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -334,7 +334,7 @@ class TimeMaps:
             step = np.clip(np.where(slope > 0, step, uphill), -reach, reach)
             delta[rows] -= step
             slopes[rows] = slope
-            done = np.all(size <= _CONVERGED, axis=1)
+            done = np.all(size <= CONVERGED, axis=1)
             converged[rows[done]] = True
             rows = rows[~done]
             reach = reach[~done] / 2
@@ -353,7 +353,7 @@ class TimeMaps:
 
     @cached_property
     def _coarse(self) -> Array:
-        few = min(_COARSE, self.tables.highest)
+        few = min(COARSE, self.tables.highest)
         middle = slice(self.tables.highest - few, self.tables.highest + few + 1)
         inner = (slice(None), slice(None), slice(0, few + 1), *(middle,) * (self.tables.genus - 1))
         return np.ascontiguousarray(self._stacked[inner])

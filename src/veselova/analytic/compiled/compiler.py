@@ -1,0 +1,99 @@
+"""Whether compiled loops serve, and what compiles them: numba (extra ``fast``), which is loaded only
+where the work is worth it.
+
+Machine code is kept beside the source, in the user's cache or in NUMBA_CACHE_DIR. Without numba,
+for few starts, and within a budget, NumPy does all of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from veselova.mechanics.core.budget import has_budget
+
+__all__ = ["compiled", "forced", "prepare", "ready"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: Tuning (benchmarks/ensembles.py): states from which loading numba, and machine code that is kept,
+#: pays for itself: half a second.
+_WORTH_LOADING = 10_000
+
+#: The module of the loops that are called first.
+_LOOPS = "veselova.analytic.compiled.states"
+
+#: What a test asks for: True, False, or None for what pays.
+_wanted: ContextVar[bool | None] = ContextVar("veselova_compiled", default=None)
+
+
+def prepare(states: int) -> None:
+    """Load the compiled loops where so many states are worth it, and no budget is in force."""
+    wanted = _wanted.get()
+    if wanted is None:
+        wanted = states >= _WORTH_LOADING and not has_budget()
+    if wanted and importlib.util.find_spec("numba") is not None:
+        importlib.import_module(_LOOPS)
+
+
+def ready() -> bool:
+    """Return whether compiled loops serve: once they have been loaded."""
+    return _LOOPS in sys.modules and _wanted.get() is not False
+
+
+@contextmanager
+def forced(wanted: bool) -> Iterator[None]:
+    """Ask for compiled loops, or for none, whatever pays."""
+    before = _wanted.set(wanted)
+    try:
+        yield
+    finally:
+        _wanted.reset(before)
+
+
+def compiled(*, fast: bool = False) -> Callable[[F], F]:
+    """Return the decorator of a compiled loop. ``fast`` ones are sums in any order."""
+    import numba
+
+    options: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+    if fast:
+        options["fastmath"] = {"contract", "nsz", "reassoc"}
+
+    def decorate(function: F) -> F:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = _folder(before)
+        try:
+            return cast("F", numba.njit(cache=True, **options)(function))
+        except RuntimeError:  # no folder to keep machine code in
+            return cast("F", numba.njit(**options)(function))
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return decorate
+
+
+def _folder(chosen: str) -> str:
+    """Return where machine code of these sources is kept: below NUMBA_CACHE_DIR, or the user's
+    cache. Numba looks at the source of a function alone, and not at those of what it calls.
+    """
+    base = chosen or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "veselova"
+    )
+    return os.path.join(base, f"compiled-{_sources()}")
+
+
+@cache
+def _sources() -> str:
+    """Return a digest of the sources that machine code is made from, and of their constants."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
