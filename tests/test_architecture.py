@@ -46,7 +46,7 @@ ALLOWED_LATER = {
         "mpmath",
         "flint",
     },
-    "analytic": {"mpmath"},
+    "analytic": {"mpmath", "numba"},
     "numeric": {"heyoka"},
 }
 
@@ -116,9 +116,11 @@ CHAPTERS = {
         "theta": {"arithmetic", "attitude", "curve"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
         "dense_output": {"arithmetic", "numerics", "time_map"},
+        "compiled": {"arithmetic", "attitude", "curve", "numerics", "spectrum", "time_map"},
         "motion": {
             "arithmetic",
             "attitude",
+            "compiled",
             "curve",
             "dense_output",
             "spectrum",

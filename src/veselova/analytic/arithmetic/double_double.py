@@ -22,7 +22,7 @@ __all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves", "stack_double
 Array = NDArray[np.float64]
 
 #: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
-_SPLITTER = 134217729.0
+SPLITTER = 134217729.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def exact_product(
 
 def halves(x: Array) -> tuple[Array, Array]:
     """Return (h, l) with x = h + l exactly, h of half as many bits."""
-    scaled = _SPLITTER * x
+    scaled = SPLITTER * x
     high = scaled - (scaled - x)
     return high, x - high
 

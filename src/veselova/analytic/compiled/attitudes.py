@@ -35,6 +35,7 @@ _BEFORE, _WIDTH, _MODULUS, _COMPLEMENT, _QUARTER, _TILT, _SN, _CN, _DN, _SERIES 
 #: Derived: numbers of such a row.
 _ROW = _SERIES + 4 * (_TERMS + 1)
 
+
 class Places(NamedTuple):
     """A ``Layout`` of branch points of one kind, with the ends of cuts as arrays: the cut that each
     ends and the number of its other end, −1 where there is none.
@@ -207,7 +208,7 @@ def angle(below: float, above: float, increasing: bool, row: Array) -> float:
     else:
         reflected = row[_COMPLEMENT] / dn
         v = row[_QUARTER] - math.sqrt(cn / dn) * _carlson(reflected * sn, reflected, 1.0)
-    psi = math.pi * v / row[_QUARTER]
+    psi = float(math.pi * v / row[_QUARTER])
     return psi if increasing else -psi
 
 
@@ -222,9 +223,7 @@ def set_torus(torus: Torus, of_I: Places, of_c: Places) -> None:
                 stretches[s, k] = 1.0
                 if layout.beyond[s, k] < count:
                     other = layout.places[layout.beyond[s, k]]
-                    stretches[s, k] = 1 / math.sqrt(
-                        abs(torus.differences[layout.places[k], other])
-                    )
+                    stretches[s, k] = 1 / math.sqrt(abs(torus.differences[layout.places[k], other]))
 
 
 @compiled()
@@ -287,8 +286,8 @@ def attitude(
     for s in range(genus):
         for j in range(s + 1, genus):
             above, below = own[2 * s + 2], own[2 * j + 1]
-            stretch = differences[2 * s + 2, 2 * j + 1]
-            torus.between[s, j] = math.sqrt(above * above + stretch + below * below)
+            between = differences[2 * s + 2, 2 * j + 1]
+            torus.between[s, j] = math.sqrt(above * above + between + below * below)
             torus.between[j, s] = torus.between[s, j]
     _orthogonal(torus, of_I, torus.of_I, torus.signs, torus.q, torus.position)
     _orthogonal(torus, of_c, torus.of_c, torus.ones, torus.v, torus.velocity)

@@ -1,8 +1,9 @@
-"""Whether compiled loops serve, and what compiles them: numba (extra ``fast``), which is loaded only
-where the work is worth it.
+"""Whether compiled loops serve, and what compiles them: numba (extra ``fast``), which is loaded
+only where the work is worth it.
 
-Machine code is kept beside the source, in the user's cache or in NUMBA_CACHE_DIR. Without numba,
-for few starts, and within a budget, NumPy does all of it.
+Machine code is kept in the user's cache or in NUMBA_CACHE_DIR; ``python -m
+veselova.analytic.compiled`` makes it ahead. Without numba, for few starts, and within a budget,
+NumPy does all of it.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.budget import has_budget
 
-__all__ = ["compiled", "forced", "prepare", "ready"]
+__all__ = ["compiled", "forced", "is_kept", "prepare", "ready"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: Tuning (benchmarks/ensembles.py): states from which loading numba, and machine code that is kept,
-#: pays for itself: half a second.
+#: Tuning: states (benchmarks/ensembles.py) from which loading numba and machine code that is kept
+#: pays for itself, half a second, and from which compiling does, half a minute.
 _WORTH_LOADING = 10_000
+_WORTH_COMPILING = 300_000
 
 #: The module of the loops that are called first.
 _LOOPS = "veselova.analytic.compiled.states"
@@ -39,9 +41,16 @@ def prepare(states: int) -> None:
     """Load the compiled loops where so many states are worth it, and no budget is in force."""
     wanted = _wanted.get()
     if wanted is None:
-        wanted = states >= _WORTH_LOADING and not has_budget()
+        worth = states >= _WORTH_COMPILING or (states >= _WORTH_LOADING and is_kept())
+        wanted = worth and not has_budget()
     if wanted and importlib.util.find_spec("numba") is not None:
         importlib.import_module(_LOOPS)
+
+
+def is_kept() -> bool:
+    """Return whether there is machine code of the loops where it is looked for first."""
+    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
+    return any(folder.rglob("states._states-*.nbi"))
 
 
 def ready() -> bool:

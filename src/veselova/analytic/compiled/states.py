@@ -24,28 +24,28 @@ from veselova.analytic.compiled.attitudes import (
     set_torus,
 )
 from veselova.analytic.compiled.compiler import compiled
+from veselova.analytic.compiled.spectra import rounded_product
 from veselova.analytic.compiled.time_maps import (
-    Waves,
+    Modes,
     error,
     excess,
     find_tau1,
     invert,
     largest,
-    new_waves,
+    new_modes,
     phases,
     powers,
+    set_modes,
     set_ranges,
-    set_waves,
     solve,
 )
 
-__all__ = ["Limits", "Motions", "Panel", "Results", "Times", "states"]
+__all__ = ["Limits", "Motions", "Panel", "Places", "Results", "Times", "states"]
 
 Array = NDArray[np.float64]
 
-#: Derived: the rounding of a double, and Veltkamp's constant.
+#: Derived: the rounding of a double.
 _EPSILON = float(DOUBLE.epsilon)
-_SPLITTER = 134217729.0
 
 
 class Motions(NamedTuple):
@@ -136,7 +136,7 @@ class _Room(NamedTuple):
     """Numbers of one motion: attitudes at ``ends``, z and slopes, of the start; the rotation."""
 
     torus: Torus
-    waves: Waves
+    modes: Modes
     of_sines: Any
     powers: Any
     angles: Any
@@ -160,13 +160,11 @@ class _Room(NamedTuple):
     numbers: Any
 
 
-def _new_room(
-    genus: int, terms: int, rows: int, columns: int, table: tuple[int, int]
-) -> _Room:
+def _new_room(genus: int, terms: int, rows: int, columns: int, table: tuple[int, int]) -> _Room:
     n = genus + 1
     return _Room(
         new_torus(genus),
-        new_waves(rows, columns),
+        new_modes(rows, columns),
         np.empty((genus, genus, terms)),
         np.empty((2, terms + 1)),
         np.empty(genus),
@@ -196,7 +194,9 @@ def _interpolate(given: Motions, i: int, room: _Room) -> None:
     """Fill the tables of one motion: atlas._Panel.at, _stack."""
     panel = given.panel
     count, length = panel.coefficients.shape
-    powers(math.acos(min(max(panel.x[i], -1.0), 1.0)), count - 1, room.chebyshev[0], room.chebyshev[1])
+    powers(
+        math.acos(min(max(panel.x[i], -1.0), 1.0)), count - 1, room.chebyshev[0], room.chebyshev[1]
+    )
     for j in range(length):
         room.numbers[j] = 0.0
     for k in range(count):
@@ -215,19 +215,6 @@ def _interpolate(given: Motions, i: int, room: _Room) -> None:
     for mode in panel.modes:
         given.values[0, mode // columns, mode % columns] = room.numbers[place]
         place += 1
-
-
-@compiled()
-def _rounded_product(a: float, b: float) -> float:
-    """Return a·b modulo 2 with its rounding: double_double.exact_product."""
-    product = a * b
-    scaled = _SPLITTER * a
-    a_high = scaled - (scaled - a)
-    scaled = _SPLITTER * b
-    b_high = scaled - (scaled - b)
-    a_low, b_low = a - a_high, b - b_high
-    rest = a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
-    return np.fmod(product, 2.0) + rest
 
 
 @compiled()
@@ -367,15 +354,15 @@ def _motion(
         row = 0
         _interpolate(given, i, room)
     else:
-        set_ranges(room.waves, given.values[i])
+        set_ranges(room.modes, given.values[i])
     frequencies, mean, genus = given.frequencies[row], given.mean[row], room.psi.size
     last = largest(times.doubles)
     if not largest(frequencies) / mean * last < limits.most_cycles:
         return False
-    reach, steady = set_waves(room.waves, given.values[row], frequencies)
+    reach, steady = set_modes(room.modes, given.values[row], frequencies)
     if not steady or not _set_start(given, i, row, room, limits):
         return False
-    at_start = excess(room.waves, room.start, given.values.shape[1])[0]
+    at_start = excess(room.modes, room.start, given.values.shape[1])[0]
     series, rounding = given.series[row], given.rate_rounding[i]
     evaluation = max(limits.evaluation, 3.0 * genus + 3.0) * _EPSILON
     elapsed = 0.0
@@ -383,9 +370,10 @@ def _motion(
         time, rest = times.doubles[j], times.remainders[j]
         for k in range(genus):
             rate = frequencies[k] / mean
-            room.uniform[k] = room.start[k] + _rounded_product(time, rate) + rest * rate
+            product, error_of_it = rounded_product(time, rate)
+            room.uniform[k] = room.start[k] + np.fmod(product, 2.0) + (error_of_it + rest * rate)
         delta, slope, found = find_tau1(
-            room.waves, frequencies, room.uniform, at_start, reach, room.z
+            room.modes, frequencies, room.uniform, at_start, reach, room.z
         )
         if not found or not invert(
             room.z, series, room.of_sines, room.powers, room.psi, room.slopes, room.unit, room.steps
@@ -402,7 +390,7 @@ def _motion(
         phase = limits.phase * _EPSILON + 2 * given.phase_error[i]
         results.error[i, j] = rounding * abs(tau1) * by_rates + phase * together + evaluation
     of_map, drift = error(
-        room.waves, frequencies, elapsed, room.of_start, room.of_rates, given.off[i], reach
+        room.modes, frequencies, elapsed, room.of_start, room.of_rates, given.off[i], reach
     )
     for j in range(times.doubles.size):
         lag = abs(times.doubles[j]) / mean * (rounding + drift) + of_map
@@ -429,7 +417,7 @@ def states(given: Motions, times: Times, limits: Limits, results: Results) -> No
     if panel.modes.size:
         which = np.zeros((rows, columns))
         which.ravel()[panel.modes] = 1.0
-        set_ranges(room.waves, which)
-        room.waves.counted[:] = which != 0
-        room.waves.counted[0, columns // 2] = False
+        set_ranges(room.modes, which)
+        room.modes.counted[:] = which != 0
+        room.modes.counted[0, columns // 2] = False
     _states(given, times, limits, room, results)

@@ -17,7 +17,20 @@ from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.curve import angle_maps
 from veselova.analytic.time_map import mode_tables
 
-__all__ = ["Waves", "error", "excess", "find_tau1", "invert", "largest", "new_waves", "phases", "powers", "set_ranges", "set_waves", "solve"]
+__all__ = [
+    "Modes",
+    "error",
+    "excess",
+    "find_tau1",
+    "invert",
+    "largest",
+    "new_modes",
+    "phases",
+    "powers",
+    "set_modes",
+    "set_ranges",
+    "solve",
+]
 
 Array = NDArray[np.float64]
 
@@ -32,7 +45,7 @@ _MOST_ANGLE_STEPS, _STALLED = angle_maps.MOST_STEPS, angle_maps.STALLED
 _SMALL, _LONGEST_STEP = angle_maps.CONVERGED * _EPSILON, angle_maps.LONGEST_STEP
 
 
-class Waves(NamedTuple):
+class Modes(NamedTuple):
     """The modes of one torus in a box (M+1, 2M+1), of genus one (M+1, 1), and room for powers.
 
     - amplitudes, doubled: F_m/(F_0 π m·f) and 2F_m/F_0
@@ -50,9 +63,9 @@ class Waves(NamedTuple):
     sines: Any
 
 
-def new_waves(rows: int, columns: int) -> Waves:
+def new_modes(rows: int, columns: int) -> Modes:
     """Return room for the modes of a torus."""
-    return Waves(
+    return Modes(
         np.zeros((rows, columns)),
         np.zeros((rows, columns)),
         np.zeros(rows, dtype=np.intp),
@@ -88,25 +101,25 @@ def powers(angle: float, highest: int, cosines: Array, sines: Array) -> None:
 
 
 @compiled()
-def set_ranges(waves: Waves, values: Array) -> None:
+def set_ranges(modes: Modes, values: Array) -> None:
     """Fill between which places of each row modes are not zero, and which count, by
     mode_tables._with_neighbours.
     """
     rows, columns = values.shape
-    waves.counted.fill(False)
+    modes.counted.fill(False)
     for i in range(rows):
-        waves.first[i], waves.last[i] = columns, 0
+        modes.first[i], modes.last[i] = columns, 0
         for j in range(columns):
             if values[i, j] != 0:
-                waves.first[i], waves.last[i] = min(waves.first[i], j), j + 1
+                modes.first[i], modes.last[i] = min(modes.first[i], j), j + 1
                 for a in range(max(i - 1, 0), min(i + 2, rows)):
-                    waves.counted[a, j] = True
+                    modes.counted[a, j] = True
                 for b in range(max(j - 1, 0), min(j + 2, columns)):
-                    waves.counted[i, b] = True
+                    modes.counted[i, b] = True
 
 
 @compiled()
-def set_waves(waves: Waves, values: Array, frequencies: Array) -> tuple[float, bool]:
+def set_modes(modes: Modes, values: Array, frequencies: Array) -> tuple[float, bool]:
     """Fill the modes of a torus; return Σ|amplitudes| and whether none of them is slow:
     TimeMaps._amplitudes and has_slow_modes.
     """
@@ -116,12 +129,12 @@ def set_waves(waves: Waves, values: Array, frequencies: Array) -> tuple[float, b
     fastest = largest(frequencies)
     reach, steady = 0.0, True
     for i in range(rows):
-        for j in range(waves.first[i], waves.last[i]):
+        for j in range(modes.first[i], modes.last[i]):
             value = values[i, j]
-            waves.amplitudes[i, j], waves.doubled[i, j] = 0.0, 2 * value
+            modes.amplitudes[i, j], modes.doubled[i, j] = 0.0, 2 * value
             if value != 0:
                 pace = math.pi * (i * frequencies[0] + (j - middle) * second)
-                waves.amplitudes[i, j] = value / pace
+                modes.amplitudes[i, j] = value / pace
                 reach += abs(value / pace)
                 if i != 0 and j != middle:
                     pull = 4 * abs(value) * max(i, abs(j - middle)) * fastest
@@ -130,27 +143,27 @@ def set_waves(waves: Waves, values: Array, frequencies: Array) -> tuple[float, b
 
 
 @compiled(fast=True)
-def _row(waves: Waves, i: int, first: int, last: int) -> tuple[float, float, float, float]:
+def _row(modes: Modes, i: int, first: int, last: int) -> tuple[float, float, float, float]:
     """Return Σ_j (amplitude, doubled)·(cos, sin) along a row, between two places."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for j in range(first, last):
-        cosine, sine = waves.cosines[1, j], waves.sines[1, j]
-        a += waves.amplitudes[i, j] * cosine
-        b += waves.amplitudes[i, j] * sine
-        c += waves.doubled[i, j] * cosine
-        d += waves.doubled[i, j] * sine
+        cosine, sine = modes.cosines[1, j], modes.sines[1, j]
+        a += modes.amplitudes[i, j] * cosine
+        b += modes.amplitudes[i, j] * sine
+        c += modes.doubled[i, j] * cosine
+        d += modes.doubled[i, j] * sine
     return a, b, c, d
 
 
 @compiled()
-def excess(waves: Waves, z: Array, most: int) -> tuple[float, float]:
+def excess(modes: Modes, z: Array, most: int) -> tuple[float, float]:
     """Return the sum of the time map, and that of its slope, at z over |m_k| ≤ ``most``:
     TimeMaps._excess.
     """
-    rows, columns = waves.amplitudes.shape
+    rows, columns = modes.amplitudes.shape
     middle = (columns - 1) // 2
     highest = min(rows - 1, most)
-    cosines, sines = waves.cosines, waves.sines
+    cosines, sines = modes.cosines, modes.sines
     powers(_TURN * z[0], highest, cosines[0], sines[0])
     aside = min(middle, most)
     powers(_TURN * z[z.size - 1], aside, cosines[1, middle:], sines[1, middle:])
@@ -159,9 +172,9 @@ def excess(waves: Waves, z: Array, most: int) -> tuple[float, float]:
         sines[1, middle - m] = -sines[1, middle + m]
     value, slope = 0.0, 0.0
     for i in range(highest + 1):
-        first = max(waves.first[i], middle - aside)
-        last = min(waves.last[i], middle + aside + 1)
-        a, b, c, d = _row(waves, i, first, last)
+        first = max(modes.first[i], middle - aside)
+        last = min(modes.last[i], middle + aside + 1)
+        a, b, c, d = _row(modes, i, first, last)
         value += a * sines[0, i] + b * cosines[0, i]
         slope += c * cosines[0, i] - d * sines[0, i]
     return value, slope
@@ -169,21 +182,21 @@ def excess(waves: Waves, z: Array, most: int) -> tuple[float, float]:
 
 @compiled()
 def find_tau1(
-    waves: Waves, frequencies: Array, uniform: Array, at_start: float, reach: float, z: Array
+    modes: Modes, frequencies: Array, uniform: Array, at_start: float, reach: float, z: Array
 ) -> tuple[float, float, bool]:
     """Return δ = τ₁ − t/F_0, the slope there, and whether it converged; z is filled:
     TimeMaps.tau1.
     """
     genus = z.size
     fastest = largest(frequencies)
-    value, slope = excess(waves, uniform, _COARSE)
+    value, slope = excess(modes, uniform, _COARSE)
     delta = -(value - at_start) / max(1 + slope, _LEAST_SLOPE)
     delta = min(max(delta, -reach), reach)
     found = False
     for _ in range(_MOST_STEPS):
         for k in range(genus):
             z[k] = uniform[k] + delta * frequencies[k]
-        value, slope = excess(waves, z, waves.amplitudes.shape[0])
+        value, slope = excess(modes, z, modes.amplitudes.shape[0])
         value += delta - at_start
         slope += 1
         step = value / slope
@@ -201,7 +214,7 @@ def find_tau1(
 
 @compiled()
 def error(
-    waves: Waves,
+    modes: Modes,
     frequencies: Array,
     elapsed: float,
     of_start: Array,
@@ -212,22 +225,22 @@ def error(
     """Return what the modes add to the error of τ₁, and what is to be multiplied with |τ₁|:
     TimeMaps.error.
     """
-    rows, columns = waves.amplitudes.shape
+    rows, columns = modes.amplitudes.shape
     middle = (columns - 1) // 2
     genus = frequencies.size
     second = frequencies[1] if genus > 1 else 0.0
     of_all, first, last = 0.0, 0.0, 0.0
     for i in range(rows):
-        begin, end = waves.first[i], waves.last[i]
+        begin, end = modes.first[i], modes.last[i]
         for k in range(max(i - 1, 0), min(i + 2, rows)):
-            begin, end = min(begin, waves.first[k]), max(end, waves.last[k])
+            begin, end = min(begin, modes.first[k]), max(end, modes.last[k])
         for j in range(max(begin - 1, 0), min(end + 1, columns)):
-            if waves.counted[i, j] and (i != 0 or j != middle):
+            if modes.counted[i, j] and (i != 0 or j != middle):
                 pace = math.pi * abs(i * frequencies[0] + (j - middle) * second)
                 length = min(1 / max(pace, _STANDING), elapsed)
                 of_all += length * length
-                if waves.first[i] <= j < waves.last[i]:
-                    shift = _TURN * waves.doubled[i, j] * length
+                if modes.first[i] <= j < modes.last[i]:
+                    shift = _TURN * modes.doubled[i, j] * length
                     first += shift * shift * (i * i)
                     last += shift * shift * ((j - middle) * (j - middle))
     total = off * (math.sqrt(of_all) + 1 / largest(frequencies))

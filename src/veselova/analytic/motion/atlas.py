@@ -31,6 +31,7 @@ from veselova.analytic.motion.torus_stack import (
     columns_at_nodes,
     known_starts,
     origins_of,
+    spectra_of_starts,
 )
 from veselova.analytic.spectrum.branch_points_batch import Spectra
 from veselova.analytic.time_map.fourier import SMALLEST_MODE
@@ -70,7 +71,7 @@ _BETWEEN = 2.0
 _RATE_ROUNDING = 2.0
 
 #: Budget: starts that are evaluated at once.
-_BLOCK = 4000
+_BLOCK = 20_000
 
 
 @dataclass(frozen=True)
@@ -213,7 +214,7 @@ class Atlas:
         chosen = known_starts(A, q, q_dot)
         for first in range(0, chosen.size, _BLOCK):
             rows = chosen[first : first + _BLOCK]
-            spectra = Spectra.of(A[rows], q[rows], q_dot[rows])
+            spectra = spectra_of_starts(A[rows], q[rows], q_dot[rows])
             distances = (spectra.constants[:, 1] - spectra.inverse[:, 1]).high
             for panel in self.panels:
                 on_it = spectra.known & (distances >= panel.low) & (distances <= panel.high)

@@ -149,8 +149,8 @@ def _motions(
         stack.rate_rounding,
         stack.phase_error,
     )
-    contiguous = map(np.ascontiguousarray, arrays)
-    return Motions(_places(stack, "I"), _places(stack, "c"), *contiguous, panel)
+    contiguous = [np.ascontiguousarray(array) for array in arrays]
+    return Motions._make([_places(stack, "I"), _places(stack, "c"), *contiguous, panel])
 
 
 def _places(stack: TorusStack, kind: Literal["I", "c"]) -> Places:

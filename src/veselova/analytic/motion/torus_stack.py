@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import DoubleDouble, stack_double_doubles
+from veselova.analytic.compiled.compiler import ready
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.angle_maps import AngleMaps
 from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
@@ -32,6 +33,7 @@ __all__ = [
     "columns_at_nodes",
     "known_starts",
     "origins_of",
+    "spectra_of_starts",
     "torus_stacks",
 ]
 
@@ -240,7 +242,7 @@ def torus_stacks(
     chosen = known_starts(A, q, q_dot)
     if not chosen.size:
         return
-    spectra = Spectra.of(A[chosen], q[chosen], q_dot[chosen])
+    spectra = spectra_of_starts(A[chosen], q[chosen], q_dot[chosen])
     lower = spectra.constants.high[:, 1:] < spectra.inverse.high[:, 1:-1]  # c_s < I_s
     order = lower @ (1 << np.arange(lower.shape[1]))
     for code in np.unique(order[spectra.known]):
@@ -258,6 +260,15 @@ def torus_stacks(
             periods = Periods(stack, int(count))
             rows = members[part]
             yield TorusStack(chosen[rows], spectra.part(rows), points[part], periods)
+
+
+def spectra_of_starts(A: Array, q: Array, q_dot: Array) -> Spectra:
+    """Return ``Spectra.of``, by compiled loops where they serve: no bit depends on that."""
+    if ready():
+        from veselova.analytic.compiled.spectra import spectra_of
+
+        return spectra_of(A, q, q_dot)
+    return Spectra.of(A, q, q_dot)
 
 
 def known_starts(A: Array, q: Array, q_dot: Array) -> NDArray[np.intp]:

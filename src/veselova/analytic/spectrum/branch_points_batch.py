@@ -21,7 +21,7 @@ __all__ = ["Spectra"]
 Array = NDArray[np.float64]
 
 #: Derived: how far 1 − Σ x_s²/λ_s may be from zero, which it is where c_1 = 0.
-_CONTRADICTION = 1e-18
+CONTRADICTION = 1e-18
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Spectra:
             increasing=np.stack([(row * velocity).total().high >= 0 for row in rows], axis=1),
             time_rate=rate.high,
             signs=np.sign(position.high),
-            known=found & converged & (excess < _CONTRADICTION),
+            known=found & converged & (excess < CONTRADICTION),
         )
 
 

@@ -27,11 +27,11 @@ Array = NDArray[np.float64]
 _MOST_STEPS = 300
 
 #: Where a bracket still begins at zero, its logarithm is halved down to this part of its end.
-_LEAST_PART = Decimal("1e-30")
+LEAST_PART = Decimal("1e-30")
 
 #: Derived: a bracket over more than this is not one in which Newton's method converges
 #: quadratically.
-_WIDE_BRACKET = 1000
+WIDE_BRACKET = 1000
 
 #: Newton's method that changes less than this part of the distance converges, however wide the
 #: bracket.
@@ -41,16 +41,16 @@ _CONVERGING = Decimal("1e-3")
 #: plain Newton step doubles the digits.
 _CONVERGED = Decimal("1e-300")
 _SETTLED_DIGITS = 300
-_ROUNDINGS = 4
+ROUNDINGS = 4
 
 #: Budget: steps in doubles for many functions at once; one that has not settled by then goes its
 #: own way.
-_FEW_STEPS = 40
+FEW_STEPS = 40
 
 #: Derived: steps with twice the digits: from eight digits to sixteen to all, and one that shows
 #: that they are.
-_FINE_STEPS = 3
-_FINE_SETTLED = 1e-25
+FINE_STEPS = 3
+FINE_SETTLED = 1e-25
 
 
 class TooFewDigits(Exception):
@@ -133,12 +133,12 @@ def _distance(
         new = own - value / derivative if derivative < 0 else 2 * most
         # Towards a nearly double zero at the pole Newton's method only halves the distance, which
         # may be 1e-300.
-        slow = step % 4 == 3 and most > _WIDE_BRACKET * least and abs(new - own) > _CONVERGING * own
+        slow = step % 4 == 3 and most > WIDE_BRACKET * least and abs(new - own) > _CONVERGING * own
         if slow or not (least <= new <= most and new > 0):
-            new = arithmetic.sqrt(most * max(least, most * _LEAST_PART))
+            new = arithmetic.sqrt(most * max(least, most * LEAST_PART))
         change = abs(new - own)
         own = new
-        if change <= _ROUNDINGS * max(arithmetic.epsilon, _CONVERGED) * own:
+        if change <= ROUNDINGS * max(arithmetic.epsilon, _CONVERGED) * own:
             for _ in range(math.ceil(math.log2(max(1.0, arithmetic.digits / _SETTLED_DIGITS)))):
                 value, derivative = _scaled_secular(near, far, constant, width, own)
                 own = own - value / derivative
@@ -173,12 +173,12 @@ def zeros_of_many(
     ]
     kappa = np.where(from_low, float(constant), -float(constant))
     own = DoubleDouble.of(_distances(_round(near), _round(far), kappa, width.high))
-    for _ in range(_FINE_STEPS):
+    for _ in range(FINE_STEPS):
         value, derivative = _scaled_secular(near, far, kappa, width, own)
         change = value.high / derivative.high
         own = own - change
     converged = (
-        (np.abs(change) <= _FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
+        (np.abs(change) <= FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
     )
     return where(from_low, low + own, high - own), np.all(converged, axis=1)
 
@@ -220,18 +220,18 @@ def _distances(
     most = width / 2
     own = np.minimum(width * near[0][1] / (near[0][1] + far[0][1]), most)
     moving = np.ones(width.shape, dtype=bool)
-    for step in range(_FEW_STEPS):
+    for step in range(FEW_STEPS):
         value, derivative = _scaled_secular(near, far, constant, width, own)
         least = np.where(moving & (value > 0), own, least)
         most = np.where(moving & (value <= 0), own, most)
         new = own - value / np.where(derivative < 0, derivative, -np.inf)
-        slow = (step % 4 == 3) & (most > _WIDE_BRACKET * least)
+        slow = (step % 4 == 3) & (most > WIDE_BRACKET * least)
         inside = (derivative < 0) & (new >= least) & (new <= most) & (new > 0)
         new = np.where(
-            inside & ~slow, new, np.sqrt(most * np.maximum(least, most * float(_LEAST_PART)))
+            inside & ~slow, new, np.sqrt(most * np.maximum(least, most * float(LEAST_PART)))
         )
         new = np.where(moving & (value != 0), new, own)
-        moving &= np.abs(new - own) > _ROUNDINGS * DOUBLE.epsilon * own
+        moving &= np.abs(new - own) > ROUNDINGS * DOUBLE.epsilon * own
         own = new
         if not np.any(moving):
             break

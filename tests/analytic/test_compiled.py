@@ -1,0 +1,210 @@
+"""Compiled loops against the arrays of NumPy: the same numbers, and the same without numba."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from test_ensembles import BODY, TIMES, body_starts, require_truth, starts
+
+import veselova as vs
+from draws import adversarial_start, near_unstable_circle, random_problem
+from veselova.analytic.arithmetic.double_double import DoubleDouble
+from veselova.analytic.compiled import compiler
+from veselova.analytic.spectrum.branch_points_batch import Spectra
+
+Array = np.ndarray[Any, Any]
+
+
+@pytest.fixture(scope="module")
+def loops() -> Iterator[None]:
+    """Skip a test where numba is not installed, and let compiled loops serve in the others."""
+    pytest.importorskip("numba")
+    with compiler.forced(True):
+        yield
+
+
+def require_alike(found: vs.Ensemble, reference: vs.Ensemble) -> None:
+    """Hold two ensembles together to a tenth of their errors, and the errors to one another."""
+    assert found.outcome.tolist() == reference.outcome.tolist()
+    assert found.together.tolist() == reference.together.tolist()
+    rows = found.together
+    error = reference.error[rows]
+    off = np.abs(found.frame - reference.frame)[rows].max(axis=(2, 3))
+    assert np.all(off <= error / 10)
+    assert found.error[rows] == pytest.approx(error, rel=1e-5)
+    speed = np.abs(reference.q_dot[rows]).max(axis=(1, 2))
+    off = np.abs(found.q_dot - reference.q_dot)[rows].max(axis=(1, 2)) / speed
+    assert np.all(off <= error.max(axis=1))
+    assert found.tau1[rows] == pytest.approx(reference.tau1[rows], rel=1e-14, abs=1e-14)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_states_are_those_of_arrays(n: int, loops: None, rng: np.random.Generator) -> None:
+    given = {**starts(rng, 200, n), "normalize": True}
+    found = vs.solve_many(given, TIMES)
+    with compiler.forced(False):
+        reference = vs.solve_many(given, TIMES)
+    require_alike(found, reference)
+
+
+def test_given_frames_are_those_of_arrays(loops: None, rng: np.random.Generator) -> None:
+    problems = [random_problem(rng, 3, framed=k % 2 == 0) for k in range(10)]
+    found = vs.solve_many(problems, TIMES)
+    with compiler.forced(False):
+        reference = vs.solve_many(problems, TIMES)
+    require_alike(found, reference)
+
+
+@pytest.mark.parametrize("A", [BODY, [1.0, 40.0, 3.0]])
+def test_flow_maps_are_those_of_arrays(
+    A: list[float], loops: None, rng: np.random.Generator
+) -> None:
+    q, q_dot = body_starts(rng, 200)
+    q[7, 1] = np.nan
+    q_dot[8] = 0.0
+    flow = vs.FlowMap(A)
+    found = flow.solve(q, q_dot, TIMES, normalize=True)
+    with compiler.forced(False):
+        reference = flow.solve(q, q_dot, TIMES, normalize=True)
+    require_alike(found, reference)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 6])
+def test_spectra_are_those_of_arrays_to_the_bit(
+    n: int, loops: None, rng: np.random.Generator
+) -> None:
+    from veselova.analytic.compiled.spectra import spectra_of
+
+    given = starts(rng, 300, n)
+    given["A"][:20, 0] = given["A"][:20, 1] * (1 + 1e-9)
+    given["q"][20:40, 0] *= 1e-9
+    expected = Spectra.of(**given)
+    found = spectra_of(**given)
+    rows = expected.known
+    assert np.count_nonzero(rows) > 250
+    for entry in fields(Spectra):
+        one, other = getattr(found, entry.name), getattr(expected, entry.name)
+        parts = ("high", "low") if isinstance(other, DoubleDouble) else ()
+        pairs = [(getattr(one, x), getattr(other, x)) for x in parts] or [(one, other)]
+        for values, reference in pairs:
+            assert np.array_equal(values[rows], reference[rows]), entry.name
+
+
+def test_errors_of_compiled_states_bound_the_truth(loops: None, rng: np.random.Generator) -> None:
+    problems = [near_unstable_circle("1e-2", "0"), *(random_problem(rng, 3, 30) for _ in "abcdef")]
+    problems = [vs.Veselova(p.A, p.q, p.q_dot, normalize=True) for p in problems]
+    found = vs.solve_many(problems, TIMES)
+    for i in np.flatnonzero(found.together):
+        require_truth(found, i, problems[i], TIMES)
+    q, q_dot = body_starts(rng, 6)
+    found = vs.FlowMap(BODY).solve(q, q_dot, TIMES, normalize=True)
+    for i in range(6):
+        require_truth(found, i, vs.Veselova(BODY, q[i], q_dot[i], normalize=True), TIMES)
+
+
+@pytest.mark.slow
+def test_errors_of_compiled_states_bound_adversarial_truth(
+    loops: None, rng: np.random.Generator
+) -> None:
+    drawn = [adversarial_start(rng, 3)[1] for _ in range(200)]
+    problems = [vs.Veselova(d.A, d.q, d.q_dot, normalize=True) for d in drawn]
+    found = vs.solve_many(problems, TIMES)
+    assert np.count_nonzero(found.together) > 25
+    for i in np.flatnonzero(found.together):
+        require_truth(found, i, problems[i], TIMES)
+
+
+def test_no_compiled_number_depends_on_the_others(loops: None, rng: np.random.Generator) -> None:
+    given = starts(rng, 60, 3)
+    whole = vs.solve_many({**given, "normalize": True}, TIMES)
+    chosen = rng.permutation(60)[:17]
+    part = {name: values[chosen] for name, values in given.items()}
+    found = vs.solve_many({**part, "normalize": True}, TIMES)
+    for name in ("frame", "q_dot", "tau1"):
+        assert np.array_equal(getattr(found, name), getattr(whole, name)[chosen])
+    assert np.array_equal(found.error, whole.error[chosen])
+
+
+def test_machine_code_is_kept_where_it_is_asked_for(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numba = pytest.importorskip("numba")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    @compiler.compiled()
+    def twice(x: float) -> float:
+        return 2 * x
+
+    assert twice(2.0) == 4.0
+    assert list(tmp_path.rglob("*.nbi"))
+
+
+@pytest.mark.slow
+def test_loops_are_compiled_ahead_by_a_command(tmp_path: Any) -> None:
+    pytest.importorskip("numba")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-m", "veselova.analytic.compiled"]
+    subprocess.run(command, env=environment, check=True)
+    check = "from veselova.analytic.compiled import compiler; print(compiler.is_kept())"
+    command = [sys.executable, "-c", check]
+    answer = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    assert answer.stdout.strip() == "True"
+
+
+def test_loops_compile_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    numba = pytest.importorskip("numba")
+    njit = numba.njit
+
+    def without_folder(*, cache: bool = False, **options: Any) -> Any:
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return njit(**options)
+
+    monkeypatch.setattr(numba, "njit", without_folder)
+
+    @compiler.compiled()
+    def thrice(x: float) -> float:
+        return 3 * x
+
+    assert thrice(2.0) == 6.0
+
+
+def _modules_after(statement: str) -> str:
+    code = f"import sys, numpy as np, veselova as vs\n{statement}\nprint('numba' in sys.modules)"
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    return answer.stdout.split()[-1]
+
+
+def test_few_starts_and_budgets_load_no_compiler() -> None:
+    given = "dict(A=[3, 2, 1], q=np.ones((9, 3)), q_dot=np.eye(3)[[0] * 9], normalize=True)"
+    assert _modules_after(f"vs.solve_many({given}, [1.0])") == "False"
+    code = [
+        "from veselova.analytic.compiled import compiler",
+        "from veselova.mechanics.core import budget",
+        "with budget.limits(60.0): compiler.prepare(10**9)",
+    ]
+    assert _modules_after("\n".join(code)) == "False"
+
+
+def test_without_numba_arrays_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "numba", None)
+    for name in [name for name in sys.modules if name.startswith(f"{compiler.__package__}.")]:
+        if name != compiler.__name__:
+            monkeypatch.delitem(sys.modules, name)
+    with compiler.forced(True):
+        compiler.prepare(10**9)
+        assert not compiler.ready()
+        found = vs.solve_many(
+            {"A": [3, 2, 1], "q": [[0.6, 0.1, 0.8]], "q_dot": [[0, 1, 0.3]], "normalize": True},
+            [1.0],
+        )
+    assert found.solved.all()
