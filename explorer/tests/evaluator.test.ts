@@ -22,6 +22,7 @@ interface Case {
   position?: number[][];
   velocity?: number[][];
   Omega?: number[][];
+  drift?: [number, number];
 }
 
 const file = process.env.EVALUATOR_CASES;
@@ -29,7 +30,7 @@ const cases: Case[] = file ? JSON.parse(readFileSync(file, "utf8")) : [];
 
 const largest = (values: number[]): number => Math.max(...values.map(Math.abs));
 
-for (const { name, document, times, bounds, frame, position, velocity, Omega } of cases) {
+for (const { name, document, times, bounds, frame, position, velocity, Omega, drift } of cases) {
   test(`${name}: frame, contact point and velocities are those of the engine`, () => {
     requireDocument(document);
     const motion = new ClosedFormMotion(document);
@@ -49,6 +50,10 @@ for (const { name, document, times, bounds, frame, position, velocity, Omega } o
       if (Omega) {
         const off = largest(Omega[k].map((entry, i) => entry - sample.Omega[i]));
         assert.ok(off <= 20 * bounds[k], `t = ${time}: Ω ${off} exceeds ${20 * bounds[k]}`);
+      }
+      if (drift) {
+        const off = largest(drift.map((entry, i) => entry - motion.meanVelocity![i]));
+        assert.ok(off < 1e-11, `mean velocity ${off}`);
       }
     });
   });

@@ -39,6 +39,11 @@ export class AreaBody {
     return { frame, q, velocity: cross(q, Omega), prime: new Float64Array(0), Omega };
   }
 
+  /** The horizontal components of K, along e_2 and e_3. */
+  get horizontalMomentum(): [number, number] {
+    return [this.#momentum[1], this.#momentum[2]];
+  }
+
   /** Return v in the body, of which the torus knows the coordinates λ, from a frame at a place. */
   axisOf(frame: ArrayLike<number>, from = 0): Float64Array {
     return columnOf(frame, this.#attitude[0], from);

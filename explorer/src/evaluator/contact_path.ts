@@ -16,6 +16,9 @@ import { dot } from "./linear_algebra.ts";
 /** Modes with |M·f| below this part of the largest frequency count as resonant. */
 const RESONANCE = 1e-9;
 
+/** Modes with |M·f| below so many roundings of Σ|M_s f_s| stand still: the ball drifts by them. */
+const STANDING = 64 * Number.EPSILON;
+
 interface Series {
   modes: number[][];
   amplitudes: number[];
@@ -32,6 +35,8 @@ export class ContactPath {
   readonly #odd: number;
   readonly #series: Series[];
   readonly #offsets: number[];
+  /** The mean velocity of the contact point over all times. */
+  readonly meanVelocity: [number, number];
 
   constructor(document: ClosedFormDocument) {
     const path = document.path;
@@ -61,6 +66,25 @@ export class ContactPath {
       return series;
     });
     this.#offsets = this.#integrals(z0);
+    const even: PathSeries = {
+      modes: document.modes.map((m) => m.map((entry) => 2 * entry)),
+      coefficients: document.coefficients,
+      turn: 0,
+    };
+    const means = [even, ...path.transverse, odd].map((series) => meanOf(series, f, z0));
+    this.meanVelocity = this.#mean(means, number(document.mean_rate));
+  }
+
+  /** Return the mean of dx/dt, from the means of even part, transverse series and odd part. */
+  #mean([even, ...means]: number[], meanRate: number): [number, number] {
+    const odd = means.pop() ?? 0;
+    const rate = meanRate + even + odd;
+    const rates = means.map((mean) => mean / rate);
+    rates.push(this.#speed + (this.#odd * odd) / rate);
+    const [u, v] = [0, 1].map((j) =>
+      rates.reduce((sum, rate, k) => sum - this.#radius * rate * this.#plane[k][j], 0),
+    );
+    return [u, v];
   }
 
   /** Return the contact point at phases z (modulo 2) and a time. */
@@ -85,6 +109,15 @@ export class ContactPath {
       }, 0),
     );
   }
+}
+
+/** Return the mean of a series along the orbit, over τ₁: that of the modes that stand still. */
+function meanOf({ modes, coefficients, turn }: PathSeries, f: number[], z0: number[]): number {
+  return modes.reduce((sum, m, k) => {
+    const size = m.reduce((total, entry, s) => total + Math.abs(entry * f[s]), 0);
+    if (Math.abs(dot(m, f)) > STANDING * size) return sum;
+    return sum + 2 * number(coefficients[k]) * Math.cos(2 * Math.PI * (dot(m, z0) / 2 + turn));
+  }, 0);
 }
 
 /** Return what the resonant modes of a series add until τ₁. */

@@ -43,6 +43,8 @@ export interface Motion {
   readonly moments: number[];
   /** The body with an area constant that moves on this torus; null where q itself does. */
   readonly body: AreaBody | null;
+  /** The mean velocity of a ball over all times; null where it is not known. */
+  readonly meanVelocity: [number, number] | null;
   at(t: DoubleDouble | number): Sample;
 }
 
@@ -83,6 +85,10 @@ export class ClosedFormMotion implements Motion {
     this.moments = this.#order.map((i) => moments[i]);
     this.#path = document.path ? new ContactPath(document) : null;
     this.body = document.area ? new AreaBody(document.area) : null;
+  }
+
+  get meanVelocity(): [number, number] | null {
+    return this.#path?.meanVelocity ?? null;
   }
 
   at(t: DoubleDouble | number): Sample {

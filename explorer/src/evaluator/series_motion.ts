@@ -25,6 +25,7 @@ export class SeriesMotion implements Motion {
   readonly n: number;
   readonly genus = 0;
   readonly body = null;
+  readonly meanVelocity = null;
   readonly moments: number[];
   readonly #order: number[];
   readonly #stretches = new Map<number, Stretch>();

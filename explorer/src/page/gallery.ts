@@ -46,7 +46,6 @@ export class Gallery {
   readonly #hooks: Hooks;
   /** Films that are being recorded; their views are drawn out of sight too. */
   readonly #recordings = new Map<View, Recording>();
-  readonly #sceneButtons = new Map<View3D, HTMLButtonElement>();
   #shown: View[] = [];
   #written = -TWIN_EVERY_MS;
   #time = NaN;
@@ -94,8 +93,7 @@ export class Gallery {
       );
     }
     if (view instanceof View3D) {
-      const made = add("GLB", "save the scene and its motion", () => void this.#saveScene(view));
-      this.#sceneButtons.set(view, made);
+      add("GLB", "save the scene and its motion", () => void this.#saveScene(view));
     }
     const type = filmType();
     if (type && (view instanceof View3D || view.name === "curve")) {
@@ -174,7 +172,6 @@ export class Gallery {
     }
     this.#absent.textContent = reasons.join(" ");
     for (const view of this.#shown) view.build(loaded);
-    for (const [view, made] of this.#sceneButtons) made.hidden = view.actors().length === 0;
     this.refresh();
   }
 

@@ -2,6 +2,7 @@
 import {
   AnimationClip,
   Group,
+  InterpolateDiscrete,
   Matrix4,
   Object3D,
   Quaternion,
@@ -34,19 +35,23 @@ export async function sceneFile(view: View3D, film: Film): Promise<Blob> {
   const seconds = secondsOf(film);
   const actors = view.actors();
   const poses = actors.map(() => [] as Matrix4[]);
-  const path: Point[] = [];
+  const paths: Point[][] = [[]];
   for (const second of seconds) {
     const sample = film.motion.at(film.from + second * film.speed);
     view.show(sample);
+    view.pose(sample);
     actors.forEach((actor, k) => {
       if (actor.matrixAutoUpdate) actor.updateMatrix();
       poses[k].push(actor.matrix.clone());
     });
     const point = view.pen(sample);
-    if (point) path.push(point);
+    if (!point) continue;
+    const before = paths[paths.length - 1].at(-1);
+    if (before && !view.joined(before, point)) paths.push([]);
+    paths[paths.length - 1].push(point);
   }
   const { scene, doubles } = copyOf(view.world, actors);
-  if (path.length > 1) scene.children[0].add(line(path, view.ink));
+  for (const path of paths) if (path.length > 1) scene.children[0].add(line(path, view.ink));
   const tracks = doubles.flatMap((double, k) => tracksOf(double, seconds, poses[k]));
   const clip = new AnimationClip("motion", seconds[seconds.length - 1], tracks);
   const options = { binary: true, trs: true, onlyVisible: false, animations: [clip] };
@@ -70,7 +75,9 @@ function copyOf(world: Group, actors: Object3D[]): { scene: Object3D; doubles: O
   const doubles = actors.map((actor) => copies[originals.indexOf(actor)]);
   // Trails are drawn by a program of their own, which no file can carry.
   for (const object of copies) {
-    if ((object as Mesh).material instanceof ShaderMaterial) object.removeFromParent();
+    const drawn = (object as Mesh).material instanceof ShaderMaterial || object.userData.live;
+    const unseen = !object.visible && !doubles.includes(object);
+    if (drawn || unseen) object.removeFromParent();
   }
   // Upwards is z here, and y in these files.
   const root = new Group();
@@ -96,8 +103,10 @@ function tracksOf(double: Object3D, seconds: number[], poses: Matrix4[]): Keyfra
   poses[0].decompose(double.position, double.quaternion, double.scale);
   double.matrixAutoUpdate = true;
   const name = double.uuid;
+  const places = new VectorKeyframeTrack(`${name}.position`, seconds, positions);
+  if (double.userData.leaps) places.setInterpolation(InterpolateDiscrete);
   return [
-    new VectorKeyframeTrack(`${name}.position`, seconds, positions),
+    places,
     new QuaternionKeyframeTrack(`${name}.quaternion`, seconds, turns),
     new VectorKeyframeTrack(`${name}.scale`, seconds, scales),
   ];

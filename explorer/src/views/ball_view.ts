@@ -1,11 +1,12 @@
-/** The ball on its plane: contact path, horizontal momentum, and the line of its mean drift. */
+/** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
 import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import { BufferAttribute, Color } from "three";
 import type { ArrowHelper, Line, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
-import { aim, arrow, line, moveLine } from "./shapes.ts";
+import { numberOf } from "../page/systems.ts";
+import { aim, arrow, line } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
@@ -14,24 +15,33 @@ import { TrailLine } from "./trail_line.ts";
 import { short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
+/** Components along e_2 and e_3. */
+type Plane = [number, number];
+
 /** The distance between lines of the plane, in radii. */
 const MESH = 1;
+
+const CAPTION = "Blue: path of the contact point. Green: its mean velocity. Orange: momentum K, fixed in space.";
 
 export class BallView extends View3D {
   #radius = 1;
   #ball = new Group();
   #plane = new Group();
   #trail: TrailLine | null = null;
-  #momentum: ArrowHelper | null = null;
+  /** The arrows of momentum and mean velocity, with their unit vectors. */
+  #arrows: { name: string; made: ArrowHelper; unit: Plane }[] = [];
   #drift: Line | null = null;
-  #mean: [number, number] = [0, 0];
-  #origin: [number, number] = [0, 0];
+  #mean: Plane = [0, 0];
+  #momentum: Plane = [0, 0];
+  /** How the ball goes on, in a sentence; empty where its mean over all times is not known. */
+  #course = "";
+  #origin: Plane = [0, 0];
 
   constructor() {
     super(
       "ball",
       "Rolling ball",
-      "The contact point draws its path (blue). Green: the line of its mean velocity (arrow).",
+      CAPTION,
       [4.4, -7.6, 5.0],
     );
   }
@@ -47,14 +57,35 @@ export class BallView extends View3D {
     this.#ball = new Group();
     this.#ball.matrixAutoUpdate = false;
     this.#ball.add(painted(this.#radius, colours.dark));
+    // The plane goes on by whole meshes.
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
     this.#trail = new TrailLine(10000, BLUE);
-    this.#momentum = arrow(ORANGE, 1.6 * this.#radius, 0.25 * this.#radius);
-    this.#drift = line(alongDrift(0, 0, 1, 0, 1), GREEN);
-    this.world.add(this.#plane, this.#ball, this.#trail.object, this.#momentum, this.#drift);
-    this.#mean = meanVelocity(loaded);
+    this.#plane.userData.leaps = true;
+    this.world.add(this.#plane, this.#ball, this.#trail.object);
+    this.#mean = loaded.motion.meanVelocity ?? meanOfStretch(loaded);
+    this.#momentum = horizontalMomentum(loaded);
+    this.#course = loaded.motion.meanVelocity ? courseOf(this.#mean, this.#momentum) : "";
+    this.caption.textContent = `${CAPTION} ${this.#course}`.trim();
+    this.#drift = null;
+    this.#arrows = [];
+    this.#point("mean velocity", GREEN, this.#mean);
+    this.#point("momentum K", ORANGE, this.#momentum);
+    if (this.#arrows[0]?.name === "mean velocity") {
+      this.#drift = line(alongDrift(this.#arrows[0].unit, this.#radius), GREEN);
+      this.world.add(this.#drift);
+    }
     this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
     this.camera.position.add(this.controls.target);
+  }
+
+  /** Add an arrow on the ground along a vector, unless that is zero. */
+  #point(name: string, colour: string, [u, v]: Plane): void {
+    const size = Math.hypot(u, v);
+    if (!(size > 1e-9)) return;
+    const made = arrow(colour, 1.6 * this.#radius, 0.25 * this.#radius);
+    aim(made, u, v, 0, 1.6 * this.#radius);
+    this.#arrows.push({ name, made, unit: [u / size, v / size] });
+    this.world.add(made);
   }
 
   override extend(samples: Samples, anew: boolean): void {
@@ -91,28 +122,24 @@ export class BallView extends View3D {
     this.controls.target.set(x, y, 0.5 * a);
     this.camera.position.copy(moved.add(this.controls.target));
     this.camera.lookAt(this.controls.target);
-    const [u, v] = this.#mean;
-    const size = Math.hypot(u, v);
-    if (this.#momentum && this.#drift) {
-      aim(this.#momentum, u, v, 0, 1.6 * a);
-      // On the ground, from where the ball ends.
-      const ahead = size > 0 ? (1.1 * a) / size : 0;
-      this.#momentum.position.set(x + ahead * u, y + ahead * v, 0.06 * a);
-      this.#drift.visible = size > 0;
-      if (size > 0) moveLine(this.#drift, alongDrift(x, y, u / size, v / size, a));
+    // On the ground, from where the ball ends.
+    for (const { made, unit } of this.#arrows) {
+      made.position.set(x + 1.1 * a * unit[0], y + 1.1 * a * unit[1], 0.06 * a);
     }
+    this.#drift?.position.set(x, y, 0);
   }
 
   protected override labels(): Label[] {
-    if (!this.#momentum?.visible) return [];
-    const [u, v] = this.#mean;
-    const reach = (1.85 * this.#radius) / Math.hypot(u, v);
-    const { x, y } = this.#momentum.position;
-    return [{ text: "mean velocity", at: [x + reach * u, y + reach * v, 0] }];
+    return this.#arrows.map(({ name, made, unit }) => {
+      const reach = 1.85 * this.#radius;
+      const { x, y } = made.position;
+      return { text: name, at: [x + reach * unit[0], y + reach * unit[1], 0] };
+    });
   }
 
   override actors(): Object3D[] {
-    return [this.#ball];
+    const line = this.#drift ? [this.#drift] : [];
+    return [this.#ball, this.#plane, ...this.#arrows.map(({ made }) => made), ...line];
   }
 
   override pen({ position }: Sample): Point | null {
@@ -123,27 +150,58 @@ export class BallView extends View3D {
 
   describe({ position, q }: Sample): string {
     if (!position) return "";
-    const [u, v] = this.#mean;
-    return (
-      `The contact point is (${short(position[0], 6)}, ${short(position[1], 6)}). ` +
-      `Its mean velocity is (${short(u)}, ${short(v)}). The vertical in the body is ` +
-      `(${Array.from(q, (entry) => short(entry)).join(", ")}).`
-    );
+    const vector = (values: ArrayLike<number>) =>
+      `(${Array.from(values, (entry) => short(Math.abs(entry) < 1e-12 ? 0 : entry)).join(", ")})`;
+    const momentum = Math.hypot(...this.#momentum) > 1e-9;
+    return [
+      `The contact point is (${short(position[0], 6)}, ${short(position[1], 6)}).`,
+      `Its mean velocity is ${vector(this.#mean)}.`,
+      ...(momentum ? [`The horizontal momentum K is ${vector(this.#momentum)}.`] : []),
+      this.#course,
+      `The vertical in the body is ${vector(q)}.`,
+    ].join(" ");
   }
 }
 
-/** Return points of the line through the contact point along a unit vector, one each radius. */
-function alongDrift(x: number, y: number, u: number, v: number, a: number): Point[] {
-  return Array.from({ length: 31 }, (_, k): Point => {
-    const s = (k - 20) * a;
-    return [x + s * u, y + s * v, 0.03 * a];
-  });
+/** Return how a ball goes on with a mean velocity and a horizontal momentum, in a sentence. */
+function courseOf([u, v]: Plane, [k, l]: Plane): string {
+  const size = Math.hypot(k, l);
+  if (!(size > 1e-9)) return "";
+  const along = (u * k + v * l) / size;
+  return Math.abs(along) > 1e-9 * Math.hypot(u, v)
+    ? `By a resonance it drifts along K, by ${short(along)} a unit of time.`
+    : "It goes on across K and keeps to a strip.";
 }
 
-/** Return the mean velocity of the contact point over a long time. */
-function meanVelocity({ motion, reach, range }: Loaded): [number, number] {
-  const known: [number, number] = motion.genus ? [0, 4 * reach] : [0, STRETCH_LENGTH];
-  const [first, last] = range ?? known;
+/** Return points of the line along a unit vector. */
+function alongDrift([u, v]: Plane, a: number): Point[] {
+  return [-20, 10].map((s): Point => [s * a * u, s * a * v, 0.03 * a]);
+}
+
+/**
+ * Return the horizontal momentum about the contact point, along e_2 and e_3, in which it is fixed:
+ * that of JΩ with J = I + ma², since K − JΩ is vertical.
+ */
+function horizontalMomentum({ motion, problem }: Loaded): Plane {
+  if (motion.body) return motion.body.horizontalMomentum;
+  const { frame, Omega } = motion.at(0);
+  const value = (entry: unknown) => numberOf(String(entry));
+  const added = value(problem.mass) * value(problem.radius) ** 2;
+  const moments = Array.isArray(problem.inertia) ? (problem.inertia as unknown[]) : [];
+  const momentum = moments.map((row, i) => {
+    const own = Array.isArray(row) ? row.map(value) : moments.map((_, j) => (i === j ? value(row) : 0));
+    return own.reduce((sum, entry, j) => sum + entry * Omega[j], added * Omega[i]);
+  });
+  if (momentum.length !== 3 || !momentum.every(Number.isFinite)) return [0, 0];
+  const [first, second] = [1, 2].map((j) =>
+    momentum.reduce((sum, entry, i) => sum + entry * frame[3 * i + j], 0),
+  );
+  return [first, second];
+}
+
+/** Return the mean velocity of the contact point over the times that series have. */
+function meanOfStretch({ motion, range }: Loaded): Plane {
+  const [first, last] = range ?? [0, STRETCH_LENGTH];
   const [far, near] = [motion.at(last - 1e-9).position, motion.at(first).position];
   if (!far || !near) return [0, 0];
   return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];

@@ -7,11 +7,11 @@ import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
 import type { ArrowHelper, Object3D } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
-import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
+import { aim, arrow, line, onEllipsoid, rod, stretch, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
-import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
+import { AXES, BLUE, ORANGE, SERIES, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
@@ -35,6 +35,8 @@ export class BodyView extends View3D {
   #tip: TrailLine | null = null;
   #omega: ArrowHelper | null = null;
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
+  /** The edges of the hypercube as rods, which files of the scene have in the place of lines. */
+  #rods: Mesh[] = [];
   #scale = 1;
   #end: Point = [0, 0, 0];
 
@@ -69,6 +71,7 @@ export class BodyView extends View3D {
     this.#solid = new Group();
     this.#solid.matrixAutoUpdate = false;
     this.#cube = null;
+    this.#rods = [];
     this.world.add(this.#solid);
     if (this.#n <= 3) this.#addSolid(colours.dark);
     else this.#addCube();
@@ -117,6 +120,7 @@ export class BodyView extends View3D {
     const material = new LineBasicMaterial({ vertexColors: true });
     const lines = new LineSegments(geometry, material);
     lines.frustumCulled = false;
+    lines.userData.live = true;
     this.#cube = { lines, edges };
     this.world.add(lines);
   }
@@ -140,18 +144,21 @@ export class BodyView extends View3D {
   }
 
   override extend(samples: Samples, anew: boolean): void {
-    const n = this.#n;
-    const size = n * n;
-    const longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, n)));
-    const reach = this.#axes[longest] + 0.28;
-    this.#tip?.extend(samples, anew, ({ frame }, k) => {
-      const row = k * size + longest * n;
-      return [reach * frame[row + 1], n > 2 ? reach * frame[row + 2] : 0, reach * frame[row]];
-    });
+    const size = this.#n * this.#n;
+    this.#tip?.extend(samples, anew, ({ frame }, k) => this.#tipAt(frame, k * size));
     if (!this.#omega) return;
     this.#trail?.extend(samples, anew, ({ frame, Omega }, k) =>
       this.#inSpace(frame, Omega, k * size, 3 * k),
     );
+  }
+
+  /** Return the end of the longest axis of the body. */
+  #tipAt(frame: ArrayLike<number>, from: number): Point {
+    const n = this.#n;
+    const longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, n)));
+    const reach = this.#axes[longest] + 0.28;
+    const row = from + longest * n;
+    return [reach * frame[row + 1], n > 2 ? reach * frame[row + 2] : 0, reach * frame[row]];
   }
 
   /** Return Ω in space: its components along e_2, e_3, e_1. */
@@ -203,23 +210,47 @@ export class BodyView extends View3D {
     return names;
   }
 
-  override readonly ink = ORANGE;
+  override get ink(): string {
+    return this.#omega ? ORANGE : BLUE;
+  }
 
   override actors(): Object3D[] {
-    if (this.#n > 3) return [];
+    if (this.#cube) return this.#makeRods();
     return this.#omega ? [this.#solid, this.#omega, this.#omega.line, this.#omega.cone] : [this.#solid];
   }
 
-  override pen({ frame, Omega }: Sample): Point | null {
-    return Omega.length ? this.#inSpace(frame, Omega) : null;
+  override pen({ frame, Omega }: Sample): Point {
+    return this.#omega ? this.#inSpace(frame, Omega) : this.#tipAt(frame, 0);
   }
 
-  /** Move the vertices of the hypercube: y = Eᵀx, in perspective along y_4, coloured by it. */
-  #showCube(frame: Float64Array): void {
-    if (!this.#cube) return;
+  /** Return the rods of the hypercube, in one colour for the edges of each direction. */
+  #makeRods(): Mesh[] {
+    if (!this.#rods.length && this.#cube) {
+      this.#rods = this.#cube.edges.map(([a, b]) => rod(SERIES[Math.log2(a ^ b) % SERIES.length], 0.012));
+      // The picture has the lines, whose colours change with their depth.
+      for (const one of this.#rods) one.visible = false;
+      this.world.add(...this.#rods);
+    }
+    return this.#rods;
+  }
+
+  override pose({ frame }: Sample): void {
+    if (!this.#cube || !this.#rods.length) return;
+    const vertices = this.#vertices(frame);
+    this.#cube.edges.forEach(([a, b], k) => {
+      const [from, to] = [vertices[a].point, vertices[b].point];
+      const middle = from.map((x, i) => (x + to[i]) / 2) as Point;
+      const half = Math.hypot(...from.map((x, i) => to[i] - x)) / 2;
+      const unit = from.map((x, i) => (to[i] - x) / (2 * half)) as Point;
+      stretch(this.#rods[k], middle, unit, half);
+    });
+  }
+
+  /** Return the vertices of the hypercube: y = Eᵀx in perspective along y_4, and their depth y_4. */
+  #vertices(frame: Float64Array): { point: Point; depth: number }[] {
     const n = this.#n;
     const m = Math.min(n, 7);
-    const vertices = Array.from({ length: 2 ** m }, (_, a) => {
+    return Array.from({ length: 2 ** m }, (_, a) => {
       const y = new Float64Array(n);
       for (let i = 0; i < m; i++) {
         const x = (a & (1 << i) ? 0.62 : -0.62) * this.#axes[i];
@@ -228,6 +259,12 @@ export class BodyView extends View3D {
       const near = 1 / (1 - 0.42 * y[3]);
       return { point: [near * y[1], near * y[2], near * y[0]] as Point, depth: y[3] };
     });
+  }
+
+  /** Move the edges of the hypercube, coloured by their depth. */
+  #showCube(frame: Float64Array): void {
+    if (!this.#cube) return;
+    const vertices = this.#vertices(frame);
     const { lines, edges } = this.#cube;
     const position = lines.geometry.getAttribute("position") as BufferAttribute;
     const colour = lines.geometry.getAttribute("color") as BufferAttribute;

@@ -8,7 +8,7 @@ import { cross } from "../evaluator/linear_algebra.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { confocalQuadric } from "./conics.ts";
-import { ball, line, moveLine, onEllipsoid, surface } from "./shapes.ts";
+import { ball, line, onEllipsoid, stretch, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
@@ -81,7 +81,7 @@ export class EllipsoidView extends View3D {
     this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");
     this.#point = ball(VERMILION, 0.035);
     this.#touch = ball(ORANGE, 0.03);
-    this.#tangent = line([[0, 0, 0], [0, 0, 0]], ORANGE);
+    this.#tangent = line([[0, -1, 0], [0, 1, 0]], ORANGE);
     this.world.add(this.#trail.object, this.#point, this.#touch, this.#tangent);
   }
 
@@ -121,7 +121,12 @@ export class EllipsoidView extends View3D {
     this.#trail?.lead(at(0));
     const touch = this.#touchAt(X, unit);
     const reach = Math.max(1.2, Math.min(2.6, Math.abs(touch ?? 0) + 0.3));
-    if (this.#tangent) moveLine(this.#tangent, [at(-reach), at(reach)]);
+    if (this.#tangent) {
+      // In four dimensions the shadow of the tangent, which is shorter.
+      const [x, y, z] = unit;
+      const part = Math.hypot(x, y, z) || 1;
+      stretch(this.#tangent, at(0), [x / part, y / part, z / part], part * reach);
+    }
     if (this.#touch) {
       this.#touch.visible = touch !== null && Math.abs(touch) < 2.6;
       this.#touch.position.set(...at(touch ?? 0));
@@ -134,12 +139,14 @@ export class EllipsoidView extends View3D {
   }
 
   override actors(): Object3D[] {
-    if (this.#A.length > 3 || !this.#point || !this.#touch) return [];
-    return this.#mu === null ? [this.#point] : [this.#point, this.#touch];
+    if (!this.#point || !this.#touch || !this.#tangent) return [];
+    const always = [this.#point, this.#tangent];
+    return this.#mu === null ? always : [...always, this.#touch];
   }
 
   override pen(sample: Sample): Point {
-    return this.#position(this.#state(sample)[0]).map((x) => 1.004 * x) as Point;
+    const [x, y, z] = this.#position(this.#state(sample)[0]);
+    return [1.004 * x, 1.004 * y, 1.004 * z];
   }
 
   /** Return where along the tangent it touches the quadric. */

@@ -1,9 +1,9 @@
 /** Surfaces, lines, arrows and points of the three-dimensional views. */
 import {
   ArrowHelper,
-  BufferAttribute,
   BufferGeometry,
   Color,
+  CylinderGeometry,
   DoubleSide,
   Float32BufferAttribute,
   Line,
@@ -11,9 +11,12 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  Quaternion,
   SphereGeometry,
   Vector3,
 } from "three";
+
+import type { Object3D } from "three";
 
 export type Point = [number, number, number];
 
@@ -30,11 +33,20 @@ export function line(points: Point[], colour: string, opacity = 1): Line {
   return made;
 }
 
-/** Move the points of a line. */
-export function moveLine(one: Line, points: Point[]): void {
-  const attribute = one.geometry.getAttribute("position") as BufferAttribute;
-  attribute.array.set(points.flat());
-  attribute.needsUpdate = true;
+/** Place an object that reaches from −1 to 1 along y: along a unit vector, with a half length. */
+export function stretch(one: Object3D, middle: Point, unit: Point, half: number): void {
+  one.position.set(...middle);
+  // The smallest turn from before, so that no frame between two of a film turns the other way.
+  const before = new Vector3(0, 1, 0).applyQuaternion(one.quaternion);
+  const turn = new Quaternion().setFromUnitVectors(before, new Vector3(...unit));
+  one.quaternion.premultiply(turn).normalize();
+  one.scale.set(1, half, 1);
+}
+
+/** Return a rod of length 2 along y, round or nearly so. */
+export function rod(colour: string, radius: number): Mesh {
+  const geometry = new CylinderGeometry(radius, radius, 2, 6, 1, true);
+  return new Mesh(geometry, new MeshStandardMaterial({ color: colour, roughness: 0.5 }));
 }
 
 export interface SurfaceOptions {

@@ -75,16 +75,25 @@ export abstract class View3D extends View {
   }
 
   /** The colour of the trail in a file. */
-  readonly ink: string = BLUE;
-
-  /** Return what moves as a whole when a time is shown, for files of the scene. */
-  actors(): Object3D[] {
-    return [];
+  get ink(): string {
+    return BLUE;
   }
 
+  /**
+   * Return what moves as a whole when a time is shown, for files of the scene. What has
+   * `userData.leaps` does not pass between two places, and `userData.live` is left out of files.
+   */
+  abstract actors(): Object3D[];
+
+  /** Place actors that are for files alone; called after a time is shown. */
+  pose(_sample: Sample): void {}
+
   /** Return the point that draws the trail of such a file. */
-  pen(_sample: Sample): Point | null {
-    return null;
+  abstract pen(sample: Sample): Point | null;
+
+  /** Return whether the trail goes on from one of its points to the next. */
+  joined(_before: Point, _after: Point): boolean {
+    return true;
   }
 
   override draw(): void {
@@ -124,8 +133,11 @@ export abstract class View3D extends View {
     context.fillStyle = colours.text;
     for (const { text, at } of this.labels()) {
       const { x, y, z } = new Vector3(...at).project(this.camera);
-      if (Math.abs(x) > 1 || Math.abs(y) > 1 || z > 1) continue;
-      const place = [(0.5 + 0.5 * x) * width, (0.5 - 0.5 * y) * height] as const;
+      if (Math.abs(x) > 1.1 || Math.abs(y) > 1 || z > 1) continue;
+      // Within the canvas, whole.
+      const half = context.measureText(text).width / 2 + 4 * ratio;
+      const across = Math.min(Math.max((0.5 + 0.5 * x) * width, half), width - half);
+      const place = [across, (0.5 - 0.5 * y) * height] as const;
       context.strokeText(text, ...place);
       context.fillText(text, ...place);
     }
