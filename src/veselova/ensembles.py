@@ -36,6 +36,7 @@ from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = [
     "MOST_BYTES",
+    "MOST_TIMES_TOGETHER",
     "Starts",
     "fill",
     "series_of",
@@ -52,7 +53,7 @@ MOST_BYTES = 2**31
 
 #: Tuning (benchmarks/ensembles.py): times from which ``solve``, which interpolates, is as fast as
 #: states side by side.
-_MOST_TIMES_TOGETHER = 200
+MOST_TIMES_TOGETHER = 200
 
 #: A start this near to the bound of the tolerance is left to the problem itself, which refuses or
 #: takes it.
@@ -353,7 +354,7 @@ def fill(
     served = np.zeros(starts.count, dtype=bool)
     details = [""] * starts.count
     outcomes = np.full(starts.count, SOLVED, dtype="U32")
-    if grid.doubles.size <= _MOST_TIMES_TOGETHER and starts.surely.any():
+    if grid.doubles.size <= MOST_TIMES_TOGETHER and starts.surely.any():
         for rows, found in together(starts, np.flatnonzero(starts.surely), grid, names):
             for name, values in found.items():
                 arrays[name][rows] = values[:, places]

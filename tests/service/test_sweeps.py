@@ -37,6 +37,7 @@ from veselova.mechanics.core.errors import InvalidRequest, Unsolved
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_parameters import components
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import chunk_dispatch as dispatch
@@ -44,9 +45,9 @@ from veselova.service.sweeps import runner as running
 from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
 from veselova.service.sweeps.chunk_dispatch import answers
 from veselova.service.sweeps.cluster import open_cluster
+from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
 from veselova.service.sweeps.job_store import Job, Jobs
 from veselova.service.sweeps.result_files import Result
-from veselova.service.sweeps.torus_columns import columns_of_torus
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
@@ -318,7 +319,43 @@ def test_tori_that_are_computed_together_are_those_of_torus() -> None:
             ), name
 
 
-def test_rows_do_not_depend_on_how_a_sweep_is_cut() -> None:
+def test_motions_that_are_computed_together_are_those_of_solve() -> None:
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
+    times = [2, 0, "0.1", 30]
+    sweep = request(problem=plain, vary={"/A/0": {"uniform": [2, 4]}}, samples=12, times=times)
+    answers = columns_at_once(sweep, {row: sweep.values(row) for row in range(12)})
+    assert len(answers) == 12
+    for row, (columns, kept) in answers.items():
+        assert kept == {}
+        motion = vs.solve(sweep.request_of(sweep.values(row)).problem.problem(), times)
+        most = columns["error.max"] + motion.error.max()
+        assert columns["error.max"] < 1e-11
+        assert columns["drift.energy"] < 1e-13
+        for name in ("q", "q_dot", "frame"):
+            for kind in ("min", "max"):
+                extremes = dict(
+                    components(
+                        f"{name}.{kind}", getattr(motion.series(name), kind)(axis=0).tolist()
+                    )
+                )
+                for column, value in extremes.items():
+                    assert abs(columns[column] - value) <= 10 * most
+
+
+def test_many_times_other_methods_and_conditioning_are_computed_alone() -> None:
+    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
+    for asked in (
+        {"times": {"start": 0, "stop": 1, "count": 500}},
+        {"times": [1], "method": "theta"},
+        {"times": [1], "engine": "numeric"},
+        {"times": [1], "outputs": ["q", "conditioning"]},
+    ):
+        sweep = request(problem=plain, vary={"/A/0": [2, 4]}, samples=1, **asked)
+        assert columns_at_once(sweep, {row: sweep.values(row) for row in range(2)}) == {}
+
+
+@pytest.mark.parametrize("times", [None, [0, 1, 5]])
+def test_rows_do_not_depend_on_how_a_sweep_is_cut(times: Any) -> None:
     """Problems that can be computed together stand beside others, which are computed, or refused,
     one by one.
     """
@@ -327,6 +364,7 @@ def test_rows_do_not_depend_on_how_a_sweep_is_cut() -> None:
         problem=plain,
         vary={"/A/0": [2, "2", 1.5, -1, "x", 4], "/q/1": [0.1, 0], "/q_dot/1": [0, 0.5]},
         samples=1,
+        times=times,
     )
     whole = rows(sweep, 0, sweep.total)
     alone = [rows(sweep, row, row + 1)[0] for row in range(sweep.total)]

@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 
 from veselova.mechanics.core.errors import Faults, InvalidInput, VeselovaError, show
 from veselova.mechanics.core.exact_input import plain
-from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
@@ -297,11 +297,22 @@ class SweepRequest(TorusRequest):
         return read_request(TrajectoryRequest, {"problem": problem, **asked})
 
     @property
-    def tori_at_once(self) -> bool:
-        """Return whether tori alone are asked for, of a system whose tori can be computed many at a
-        time.
+    def asked_at_once(self) -> bool:
+        """Return whether what is asked for can be computed for many problems at a time: the tori of
+        Veselova problems, and their motions in closed form.
         """
-        return self.times is None and self.problem.system == Veselova.system
+        plain_motion = (
+            self.engine in (None, "analytic")
+            and self.method is None
+            and self.formulation is None
+            and CONDITIONING not in (self.outputs or ())
+        )
+        return self.problem.system == Veselova.system and (self.times is None or plain_motion)
+
+    @property
+    def tori_at_once(self) -> bool:
+        """Return whether tori alone are asked for, many at a time."""
+        return self.times is None and self.asked_at_once
 
     @property
     def _states_doubles(self) -> bool:

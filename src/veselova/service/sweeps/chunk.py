@@ -18,13 +18,17 @@ import orjson
 from veselova.engines import Prepared
 from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
-from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.problem_details import problem_code
 from veselova.service.api.request_models import TorusRequest, TrajectoryRequest, read_request
-from veselova.service.api.sweep_parameters import Path, components
+from veselova.service.api.sweep_parameters import Path
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.sweeps.torus_columns import columns_at_once, columns_of_torus
+from veselova.service.sweeps.columns import (
+    Answer,
+    columns_at_once,
+    columns_of_motion,
+    columns_of_torus,
+    series_to_keep,
+)
 from veselova.service.workers.tasks import solve_request, warm_up
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
@@ -99,7 +103,7 @@ def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
     return Chunk(1, _parquet([_row(sweep, row, sweep.values(row), "worker-lost", detail)]))
 
 
-def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Row]:
+def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Answer]:
     """Return what can be found for many problems at once, within the budgets of all; the others are
     answered one by one.
     """
@@ -123,14 +127,15 @@ def _within(seconds: float) -> Iterator[None]:
 
 
 def _answer(
-    sweep: SweepRequest, row: int, values: Mapping[Path, Any], found: Row | None
+    sweep: SweepRequest, row: int, values: Mapping[Path, Any], together: Answer | None
 ) -> tuple[Row, Mapping[str, Any]]:
-    """Return the row of one problem, unless its columns were ``found`` already, and the series that
-    are kept of it.
+    """Return the row of one problem, computed alone unless it was ``together`` with others, and the
+    series that are kept of it.
     """
-    if found is not None:
-        return {**_row(sweep, row, values, SOLVED, ""), **found}, {}
-    found = {}
+    if together is not None:
+        columns, series = together
+        return {**_row(sweep, row, values, SOLVED, ""), **columns}, series
+    found: Row = {}
     kept: dict[str, Any] = {}
     try:
         with _within(sweep.budget_s):
@@ -171,20 +176,8 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
         trajectory = solve_request(request, prepared)
         names = request.outputs or list(problem.outputs)
         if keep:
-            kept.update({name: trajectory.series(name) for name in names}, error=trajectory.error)
-        yield from _of_motion(problem, trajectory, names)
-
-
-def _of_motion(
-    problem: Problem, trajectory: Trajectory, names: list[str]
-) -> Iterator[tuple[str, Any]]:
-    yield "error.max", float(np.max(trajectory.error))
-    for name, drift in trajectory.drift.items():
-        yield f"drift.{name}", drift
-    for name in names:
-        series = trajectory.series(name)
-        for kind, extremes in (("min", series.min(axis=0)), ("max", series.max(axis=0))):
-            yield from components(f"{name}.{kind}", extremes.tolist())
+            kept.update(series_to_keep(trajectory, names))
+        yield from columns_of_motion(problem, trajectory, names)
 
 
 def _parquet(rows: list[Row]) -> bytes:
