@@ -67,6 +67,10 @@ _LEAST_SLOPE = 0.05
 #: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
 _SLOW = 4.0
 
+#: Budget: times from which all have the error of the farthest; and halvings of that one's time.
+_MANY_TIMES = 1000
+_MOST_HALVINGS = 40
+
 #: Budget: entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
 
@@ -161,33 +165,41 @@ class FourierTimeMap(TimeMap):
         z = self._period * (self._in_time.start + advance)
         return np.asarray(self._sum.at(advance)[0]), z[:, : self._genus]
 
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
-        """Return the error of the modes: each is off by about the smallest kept, for 1/(π m·f) or
-        for the time elapsed.
+    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, Array]:
+        """Return the error of the modes at increasing Neumann times, and what is to be multiplied
+        with |τ₁|, (N,) each, or one for all of many: each mode is off by about the smallest kept,
+        for 1/(π m·f) or for the time elapsed.
 
         So are those next to them that are left out, and others are smaller. An error of phase k
         moves τ₁ by 2F_m 2πm_k/F_0 of it for as long. Errors of different modes add in squares. To
         these comes one rounding of δ.
         """
-        elapsed = max(abs(tau1.item(0)), abs(tau1.item(-1)))
-        of_all, sway = (
-            self._swayed if elapsed > self._longest_of_all else self._bound_modes(elapsed)
-        )
-        return of_all + float(sway @ of_start), float(sway @ of_rates)
+        elapsed = np.abs(tau1)
+        most = max(elapsed.item(0), elapsed.item(-1))
+        if tau1.size == 1 or tau1.size > _MANY_TIMES or most == 0:
+            bounds = self._swayed if most > self._longest_of_all else self._bound_modes([most])
+            which: Any = slice(None)
+        else:
+            # the time elapsed of each, up to a factor of two
+            shortest = max(most * 2.0**-_MOST_HALVINGS, 0.5 / self._fastest)
+            halvings = np.floor(np.log2(most / np.minimum(np.maximum(elapsed, shortest), most)))
+            found, which = np.unique(halvings, return_inverse=True)
+            bounds = self._bound_modes(most * 0.5**found)
+        of_all, sway = bounds
+        return (of_all + of_start @ sway)[which], (of_rates @ sway)[which]
 
     @cached_property
-    def _swayed(self) -> tuple[float, Array]:
-        return self._bound_modes(np.inf)
+    def _swayed(self) -> tuple[Array, Array]:
+        return self._bound_modes([np.inf])
 
-    def _bound_modes(self, elapsed: float) -> tuple[float, Array]:
-        """Return the error of the modes and of δ, and how far τ₁ moves with each phase, (g,), for
-        the time elapsed.
+    def _bound_modes(self, elapsed: Any) -> tuple[Array, Array]:
+        """Return the error of the modes and of δ, (K,), and how far τ₁ moves with each phase, (g,
+        K), for K times elapsed.
         """
-        lengths = np.minimum(self._longest, elapsed)
-        of_modes = self._off * (math.sqrt(lengths @ lengths) + 1 / self._fastest)
-        shifts = self._pull * lengths[: self.size, None]
-        sway = np.sqrt((shifts * shifts).sum(axis=0)) / self._period
-        return of_modes + np.finfo(float).eps * min(self._reach, elapsed), sway
+        lengths = np.minimum(self._longest[:, None], elapsed)
+        of_modes = self._off * (np.linalg.norm(lengths, axis=0) + 1 / self._fastest)
+        sway = np.sqrt((self._pull**2).T @ lengths[: self.size] ** 2) / self._period
+        return of_modes + np.finfo(float).eps * np.minimum(self._reach, elapsed), sway
 
     def time(self, tau1: Array) -> Array:
         """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""

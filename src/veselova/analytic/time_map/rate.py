@@ -207,7 +207,9 @@ class TimeMap(ABC):
         """Return t at Neumann times."""
 
     @abstractmethod
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array | float, float]:
+    def error(
+        self, tau1: Array, of_start: Array, of_rates: Array
+    ) -> tuple[Array | float, Array | float]:
         """Return a bound on the error in τ₁ that this time map adds to the rounding of F_0: what
         does not grow, (N,) or one for all times, and what is to be multiplied with |τ₁|.
 
