@@ -184,6 +184,26 @@ def _add_further_names(app: Any, name: str, source: list[str]) -> None:
         source[0] += "\n```{eval-rst}\n" + "\n".join(entries) + "```\n"
 
 
+def _add_modules_of_the_paper(app: Any, name: str, source: list[str]) -> None:
+    """Add the modules of the engines that the page of the paper names, and no page of the API has,
+    to the page of the engine.
+    """
+    if name != "docs/reference/api/engine":
+        return
+    paper = ROOT / "docs" / "paper.md"
+    app.env.note_dependency(str(paper))
+    pages = "".join(path.read_text() for path in (ROOT / "docs/reference/api").glob("*.md"))
+    named = re.findall(r"`a((?:\.[a-z_]\w*)+)", paper.read_text())
+    modules = [f"veselova.analytic{each}" for each in dict.fromkeys(named)]
+    further = [
+        f".. automodule:: {module}\n   :members:\n"
+        for module in modules
+        if module not in pages and (ROOT / "src" / f"{module.replace('.', '/')}.py").is_file()
+    ]
+    if further:
+        source[0] += "\n```{eval-rst}\n" + "\n".join(further) + "```\n"
+
+
 def _start_katex(app: Any) -> None:
     """Start KaTeX, again where its socket is there before it listens."""
     for _ in range(20):
@@ -197,5 +217,6 @@ def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
     app.connect("builder-inited", _start_katex, priority=900)
     app.connect("source-read", _add_further_names)
+    app.connect("source-read", _add_modules_of_the_paper)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _drop_downloads)

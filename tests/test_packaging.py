@@ -372,6 +372,17 @@ def test_the_server_needs_no_sweeps() -> None:
     assert answer.returncode == 0, answer.stderr
 
 
+def test_a_sweep_is_refused_by_a_server_that_cannot_run_it() -> None:
+    statement = (
+        "import asyncio\nfrom veselova.service.api.settings import Settings\n"
+        "from veselova.service.http.job_service import JobService\n"
+        "asyncio.run(JobService(Settings()).sweeps())"
+    )
+    answer = _without("service", statement)
+    assert answer.returncode == 1
+    assert re.search(r"BackendMissing: A sweep needs \w+, .*\[sweeps\]'$", answer.stderr.strip())
+
+
 def test_the_demo_needs_the_service_alone() -> None:
     answer = _without(
         "service", "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()"

@@ -78,6 +78,16 @@ class Names:
         return next((each for each in self._candidates(name, before) if each in self.objects), None)
 
 
+def _write_again(app: Any, env: Any) -> list[str]:
+    """Return the pages to be written anew: all that may have links, where there are new entries."""
+    names = sorted(env.domains["py"].objects)
+    if getattr(env, "guide_entries", names) == names:
+        env.guide_entries = names
+        return []
+    env.guide_entries = names
+    return [page for page in sorted(env.found_docs) if not page.startswith(_WITHOUT)]
+
+
 def _link(app: Any, doctree: nodes.document, page: str) -> None:
     if page.startswith(_WITHOUT) or app.builder.format != "html":
         return
@@ -116,5 +126,6 @@ def _entry_of(node: nodes.Node) -> nodes.Node | None:
 
 def setup(app: Any) -> dict[str, bool]:
     """Connect the links to Sphinx."""
+    app.connect("env-updated", _write_again)
     app.connect("doctree-resolved", _link)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,6 +8,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
 import anyio
@@ -75,6 +76,10 @@ class JobService:
         try:
             from veselova.service.sweeps.job_store import Jobs
             from veselova.service.sweeps.runner import Sweeps
+
+            # It is loaded when the first sweep arrives, which is to be refused and not to fail.
+            if find_spec("distributed") is None:
+                raise ModuleNotFoundError("distributed is missing", name="distributed")
         except ImportError as error:
             self.failure = f"{error.name} is not installed"
             raise BackendMissing(
