@@ -77,14 +77,15 @@ def compiled(*, fast: bool = False) -> Callable[[F], F]:
         options["fastmath"] = {"contract", "nsz", "reassoc"}
 
     def decorate(function: F) -> F:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = _folder(before)
+        settings: Any = numba.config
+        before = settings.CACHE_DIR
+        settings.CACHE_DIR = _folder(before)
         try:
             return cast("F", numba.njit(cache=True, **options)(function))
         except RuntimeError:  # no folder to keep machine code in
             return cast("F", numba.njit(**options)(function))
         finally:
-            numba.config.CACHE_DIR = before
+            settings.CACHE_DIR = before
 
     return decorate
 
