@@ -22,7 +22,7 @@ from veselova.analytic.arithmetic.elliptic_integrals import (
 from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.numerics.jacobi_elliptic import LARGEST_WAVE
 
-__all__ = ["Places", "Torus", "angle", "attitude", "new_torus", "set_torus"]
+__all__ = ["Places", "Torus", "angle", "attitude", "cut_roots", "new_torus", "set_cut", "set_torus"]
 
 Array = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def _carlson(x: float, y: float, z: float) -> float:
 
 
 @compiled()
-def _set_cut(differences: Array, s: int, row: Array) -> None:
+def set_cut(differences: Array, s: int, row: Array) -> None:
     """Fill the constants of cut s: elliptic_angle.FourPoints, jacobi_elliptic.Jacobi."""
     j = 2 * s + 1
     before, width = differences[j - 1, j], differences[j, j + 1]
@@ -197,6 +197,16 @@ def _sn_cn(psi: float, row: Array) -> tuple[float, float]:
 
 
 @compiled()
+def cut_roots(psi: float, row: Array) -> tuple[float, float]:
+    """FourPoints.roots."""
+    before, width = row[_BEFORE], row[_WIDTH]
+    sn, cn = _sn_cn(psi, row)
+    rest = before + width * cn * cn
+    below = math.sqrt(width) * math.sqrt(before / rest) * sn
+    return below, math.sqrt(width) * math.sqrt((width + before) / rest) * cn
+
+
+@compiled()
 def angle(below: float, above: float, increasing: bool, row: Array) -> float:
     """FourPoints.angles."""
     below, above = max(below, 0.0), max(above, 0.0)
@@ -216,7 +226,7 @@ def angle(below: float, above: float, increasing: bool, row: Array) -> float:
 def set_torus(torus: Torus, of_I: Places, of_c: Places) -> None:
     """Fill the constants of a torus; the stretches are those of frame_batch."""
     for s in range(torus.cuts.shape[0]):
-        _set_cut(torus.differences, s, torus.cuts[s])
+        set_cut(torus.differences, s, torus.cuts[s])
         for layout, stretches in ((of_I, torus.of_I), (of_c, torus.of_c)):
             count = layout.places.size
             for k in range(count):
@@ -270,12 +280,7 @@ def attitude(
     own[0] = 1.0
     for s in range(genus):
         j = 2 * s + 1
-        row = torus.cuts[s]
-        before, width = row[_BEFORE], row[_WIDTH]
-        sn, cn = _sn_cn(psi[s], row)
-        rest = before + width * cn * cn
-        own[j] = math.sqrt(width) * math.sqrt(before / rest) * sn
-        own[j + 1] = math.sqrt(width) * math.sqrt((width + before) / rest) * cn
+        own[j], own[j + 1] = cut_roots(psi[s], torus.cuts[s])
         for i in range(2 * genus + 1):
             if i < j:
                 roots[s, i] = math.sqrt(differences[i, j] + own[j] * own[j])

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import STEP, Attitude
 from veselova.analytic.attitude.frame_batch import attitudes
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
@@ -93,8 +94,24 @@ def states_of_starts(
         return
     prepare(len(A) * times.doubles.size)
     for stack in torus_stacks(A, q, q_dot, _NODE_COUNTS):
+        _form_nodes(stack)
         for part, tables in _tables(stack):
             yield from states_of_stack(part, tables, times, frames)
+
+
+def _form_nodes(stack: TorusStack) -> None:
+    """Fill the forms at nodes of many curves, by compiled loops where they serve, and the means
+    that need them: parts of a stack would form them anew.
+    """
+    periods = stack.periods
+    if ready() and periods.genus > 1:
+        from veselova.analytic.compiled.forms import forms_on_cuts
+
+        psi = DOUBLE.nodes(int(periods.nodes or 0))
+        vars(periods)["forms_at_nodes"] = tuple(
+            forms_on_cuts(stack.curve.differences, s, psi) for s in range(periods.genus)
+        )
+    vars(stack)["mean"] = stack.mean
 
 
 def _tables(stack: TorusStack) -> Iterator[tuple[TorusStack, ModeTables]]:

@@ -168,7 +168,10 @@ class TorusStack:
         turn by ``pace`` radians at most by one of ψ.
         """
         columns = columns_at_nodes(self.periods, self.rate, pace)
-        return form_tables(*columns, self.rate.scale, self.mean, highest)
+        form = form_tables
+        if self.periods.genus == 2 and ready():
+            from veselova.analytic.compiled.mode_coefficients import form_tables as form
+        return form(*columns, np.asarray(self.rate.scale), self.mean, highest)
 
     @cached_property
     def rate_rounding(self) -> Array:
@@ -223,8 +226,17 @@ def columns_at_nodes(periods: Periods, rate: TimeRate, pace: float) -> tuple[Arr
     G = np.ascontiguousarray(np.swapaxes(series[..., 1:], 1, 2)) @ powers
     cuts = np.arange(periods.genus)
     G[:, cuts, cuts] += psi / (2 * np.pi)
-    weights = np.stack([rate.weights(s, psi) for s in cuts.tolist()], axis=1)
+    weights = np.stack([_weights(periods, rate, s, psi) for s in cuts.tolist()], axis=1)
     return weights, G
+
+
+def _weights(periods: Periods, rate: TimeRate, s: int, psi: Array) -> Array:
+    """Return the weights of dt/dτ₁ on cut s at nodes, (N, g, J)."""
+    if not ready():
+        return np.asarray(rate.weights(s, psi))
+    from veselova.analytic.compiled.forms import forms_on_cuts
+
+    return np.asarray(rate.weights_of(s, *forms_on_cuts(periods.curve.differences, s, psi)))
 
 
 def torus_stacks(
