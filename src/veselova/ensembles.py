@@ -83,7 +83,7 @@ def solve_many(
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
     Veselova problems with n = 2 and 3, up to 200 times and generic starts are computed side by
-    side: by the Fourier time map (MATHEMATICS, section 7) and in angles, at any time. ``solve``
+    side: by the Fourier time map and in angles, at any time. ``solve``
     does the others, one by one. A problem that cannot be solved has NaN and says why in
     ``outcome`` and ``detail``; the others are served. ``error`` bounds the true error of q and
     frame: true ≤ error. Side by side it grows like 4ε|ω||t|, without guard digits. Tested for

@@ -1,6 +1,5 @@
-"""The tori of one body with n = 3 as functions of its one constant c_2 (MATHEMATICS.md, section
-15): frequencies, angle maps and Fourier coefficients of dt/dτ₁, interpolated from those at
-Chebyshev points.
+"""The tori of one body with n = 3 as functions of its one constant c_2: frequencies, angle maps and
+Fourier coefficients of dt/dτ₁, interpolated from those at Chebyshev points.
 
 Where c_2 meets I_2 is a separatrix: periods grow like the logarithm of the distance. Panels on
 either side are halved towards it, and their places are counted from there.
