@@ -33,7 +33,7 @@ _WORTH_COMPILING = 300_000
 #: The module of the loops that are called first.
 _LOOPS = "veselova.analytic.compiled.states"
 
-#: What a test asks for: True, False, or None for what pays.
+#: What is asked for: True, False, or None for what pays.
 _wanted: ContextVar[bool | None] = ContextVar("veselova_compiled", default=None)
 
 
