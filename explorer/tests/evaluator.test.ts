@@ -22,7 +22,7 @@ interface Case {
   position?: number[][];
   velocity?: number[][];
   Omega?: number[][];
-  drift?: [number, number];
+  drift?: number[];
 }
 
 const file = process.env.EVALUATOR_CASES;

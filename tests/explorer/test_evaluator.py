@@ -55,6 +55,11 @@ BODIES: dict[str, Problem] = {
     ),
 }
 
+for name, ball in (("ball in R^4", vs.RubberBall), ("Chaplygin's ball in R^4", vs.ChaplyginBall)):
+    turning = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
+    data = {"special": [1.6, 1.2, 0.9, 0.5]}, 0.5, 0.8, [1, 0, 0, 0], turning
+    BODIES[name] = ball(*data, normalize=True)
+
 
 def problems() -> dict[str, Problem]:
     """Return the problems of the presets that have a closed form, and further ones."""
@@ -89,8 +94,7 @@ def case(name: str, problem: Problem, times: list[Any], digits: int, bound: floa
     }
     if "path" in document:
         found["position"] = truth.position.tolist()
-        assert isinstance(problem, (vs.RubberBall, vs.ChaplyginBall))
-        found["drift"] = problem.drift.velocity.tolist()
+        found["drift"] = problem.drift.velocity.tolist()  # type: ignore[attr-defined]
     if "area" in document:
         found["Omega"] = truth.Omega.tolist()
     if document["problem"]["system"] == "veselova" and digits == 15 and not bound:

@@ -36,7 +36,7 @@ export class ContactPath {
   readonly #series: Series[];
   readonly #offsets: number[];
   /** The mean velocity of the contact point over all times. */
-  readonly meanVelocity: [number, number];
+  readonly meanVelocity: number[];
 
   constructor(document: ClosedFormDocument) {
     const path = document.path;
@@ -76,29 +76,27 @@ export class ContactPath {
   }
 
   /** Return the mean of dx/dt, from the means of even part, transverse series and odd part. */
-  #mean([even, ...means]: number[], meanRate: number): [number, number] {
+  #mean([even, ...means]: number[], meanRate: number): number[] {
     const odd = means.pop() ?? 0;
     const rate = meanRate + even + odd;
     const rates = means.map((mean) => mean / rate);
     rates.push(this.#speed + (this.#odd * odd) / rate);
-    const [u, v] = [0, 1].map((j) =>
+    return this.#start.map((_, j) =>
       rates.reduce((sum, rate, k) => sum - this.#radius * rate * this.#plane[k][j], 0),
     );
-    return [u, v];
   }
 
   /** Return the contact point at phases z (modulo 2) and a time. */
-  at(z: ArrayLike<number>, tau: number, time: DoubleDouble): [number, number] {
+  at(z: ArrayLike<number>, tau: number, time: DoubleDouble): number[] {
     const y = this.#integrals(z).map(
       (value, k) => value - this.#offsets[k] + drift(this.#series[k], tau),
     );
     const odd = y.pop() ?? 0;
     y.push(this.#odd * odd + this.#speed * time[0]);
-    const [first, second] = this.#start.map((entry, j) => {
+    return this.#start.map((entry, j) => {
       const turned = y.reduce((sum, value, k) => sum + this.#plane[k][j] * value, 0);
       return entry - this.#radius * turned;
     });
-    return [first, second];
   }
 
   #integrals(z: ArrayLike<number>): number[] {

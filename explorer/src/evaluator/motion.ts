@@ -32,8 +32,8 @@ export interface Sample extends BodyState {
   lambda: Float64Array;
   /** The sign of dλ_s/dt. */
   directions: number[];
-  /** The contact point of a ball. */
-  position: [number, number] | null;
+  /** The contact point of a ball, along e_2 … e_n. */
+  position: number[] | null;
 }
 
 export interface Motion {
@@ -44,7 +44,7 @@ export interface Motion {
   /** The body with an area constant that moves on this torus; null where q itself does. */
   readonly body: AreaBody | null;
   /** The mean velocity of a ball over all times; null where it is not known. */
-  readonly meanVelocity: [number, number] | null;
+  readonly meanVelocity: number[] | null;
   at(t: DoubleDouble | number): Sample;
 }
 
@@ -87,7 +87,7 @@ export class ClosedFormMotion implements Motion {
     this.body = document.area ? new AreaBody(document.area) : null;
   }
 
-  get meanVelocity(): [number, number] | null {
+  get meanVelocity(): number[] | null {
     return this.#path?.meanVelocity ?? null;
   }
 

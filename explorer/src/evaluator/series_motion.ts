@@ -106,7 +106,7 @@ export class SeriesMotion implements Motion {
       z: new Float64Array(0),
       lambda,
       directions: directions(sorted, sortedDot, this.moments, lambda),
-      position: position.length ? [position[0], position[1]] : null,
+      position: position.length ? Array.from(position) : null,
     };
   }
 }

@@ -19,6 +19,7 @@ export const elements = {
   speed: find<HTMLInputElement>("speed"),
   speedText: find<HTMLOutputElement>("speed-text"),
   message: find("message"),
+  data: find<HTMLDetailsElement>("data"),
   fields: find("fields"),
   facts: find("facts"),
   status: find("status"),

@@ -7,7 +7,7 @@ import { Controls } from "./controls.ts";
 import { button, elements } from "./elements.ts";
 import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
 import { Facts } from "./facts.ts";
-import { EVALUATION, typeset } from "./formulas.ts";
+import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
 import { BUSY, FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
@@ -58,6 +58,7 @@ export class Explorer {
   #addressTimer = 0;
   #asksPrecise = false;
   #written = "";
+  #formulas = "";
   #rest = 0;
   #tries = 0;
 
@@ -81,12 +82,21 @@ export class Explorer {
     this.#fillChoosers();
     this.#listen();
     this.#adopt(this.#state);
-    for (const tex of EVALUATION) {
+    requestAnimationFrame((instant) => this.#picture(instant));
+  }
+
+  /** Write the formulas by which the page computes a motion; series have none. */
+  #showFormulas({ document }: Loaded): void {
+    const lines = document ? evaluationOf(document) : [];
+    elements.formulas.hidden = !lines.length;
+    if (lines.join() === this.#formulas) return;
+    this.#formulas = lines.join();
+    elements.formulas.replaceChildren();
+    for (const tex of lines) {
       const line = element("div");
       elements.formulas.append(line);
       void typeset(tex, line, true);
     }
-    requestAnimationFrame((instant) => this.#picture(instant));
   }
 
   #stateOf(fragment: string): State {
@@ -148,6 +158,11 @@ export class Explorer {
     window.addEventListener("hashchange", () => {
       if (location.hash !== this.#written) this.#adopt(this.#stateOf(location.hash));
     });
+    // On a narrow page the data are folded, so that the motion comes first.
+    const narrow = matchMedia("(max-width: 820px)");
+    const fold = () => (elements.data.open = !narrow.matches);
+    narrow.addEventListener("change", fold);
+    fold();
     this.#listenToExports();
   }
 
@@ -257,7 +272,7 @@ export class Explorer {
     const [point, velocity] = [place(q), place(prime, scale)];
     const changed = { ...problem, normalize: true };
     if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
-    else if ("Omega" in problem) {
+    else if ("Omega" in problem && motion.n === 3) {
       const [g, v] = [point.map(Number), velocity.map(Number)];
       // Ω = q̇×q.
       const Omega = [0, 1, 2].map((i) => {
@@ -350,6 +365,7 @@ export class Explorer {
       return false;
     }
     const rest = this.#controls.mark(faults);
+    if (rest.length < faults.length) elements.data.open = true;
     elements.message.textContent = faults.length ? rest.join(" ") : sentence;
     return false;
   }
@@ -368,6 +384,7 @@ export class Explorer {
     elements.letter.textContent = loaded.time;
     this.#gallery.build(loaded);
     this.#facts.build(loaded);
+    this.#showFormulas(loaded);
     this.#sampler = new Sampler(loaded.motion);
     this.#trail = new Trail(this.#sampler, loaded.reach, loaded.motion.genus, (samples, anew) =>
       this.#gallery.extend(samples, anew),

@@ -51,7 +51,7 @@ export function tableOf({ motion, reach, time }: Loaded, t: number, count = 1001
   add(samples.frame, indices.flatMap((i) => indices.map((j) => `frame.${i}.${j}`)));
   add(samples.lambda, Array.from({ length: samples.lambda.length / count }, (_, s) => `lambda.${s + 1}`));
   add(samples.z, Array.from({ length: motion.genus }, (_, s) => `z.${s + 1}`));
-  add(samples.position, ["position.1", "position.2"]);
+  add(samples.position, indices.slice(1).map((i) => `position.${i - 1}`));
   const rows = Array.from(times, (_, k) =>
     columns.flatMap(({ values, size }) => Array.from({ length: size }, (_, i) => values[k * size + i])),
   );

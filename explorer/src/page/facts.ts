@@ -15,11 +15,11 @@ export class Facts {
   }
 
   /** Begin with another motion. */
-  build({ torus, document, motion }: Loaded): void {
+  build({ torus, document, motion, problem }: Loaded): void {
     this.#table.replaceChildren();
     this.#live.clear();
     this.#formulas = motion.body ? { ...FORMULAS, ...AREA_FORMULAS } : FORMULAS;
-    this.#row("q", "q = e₁", "");
+    this.#row("q", "gamma" in problem ? "γ = e₁" : "q = e₁", "");
     this.#row("omega", "|Ω|", "", motion.n === 3);
     this.#row("lambda", "λ", "", motion.moments.length > 1);
     if (torus && document) {

@@ -1,4 +1,5 @@
 /** The formula and the paper's label of each number, for those who ask. */
+import type { ClosedFormDocument } from "../evaluator/document.ts";
 
 export interface Formula {
   tex: string;
@@ -69,11 +70,20 @@ export const FORMULAS: Record<string, Formula> = {
   omega: { tex: "\\omega=q\\wedge\\dot q", label: "(44.3)" },
 };
 
-/** The formulas by which the page computes a closed form. */
-export const EVALUATION = [
+const EVALUATION = [
   "t=F_0\\tau_1+\\sum_{m}\\frac{F_m}{\\pi\\,m\\cdot f}\\bigl[\\sin2\\pi m\\cdot(z^0+f\\tau_1)-\\sin2\\pi m\\cdot z^0\\bigr]",
   "E_{ij}=\\kappa_{ij}\\,\\frac{\\theta[\\eta_{ij}](z)}{\\theta(z)},\\qquad z=z^0+f\\tau_1",
 ];
+
+const AREA_EVALUATION = [
+  "t=F_0\\tau_1+\\sum_{2m}\\frac{F_m}{\\pi\\,m\\cdot f}\\bigl[\\sin2\\pi(m\\cdot z+\\delta_m)-\\sin2\\pi(m\\cdot z^0+\\delta_m)\\bigr]",
+  "E_{ij}=\\sum_k\\kappa_{ik}\\,\\frac{\\theta[\\eta_{ik}](z)}{\\theta(z)}\\,R_{kj},\\qquad z=z^0+f\\tau_1",
+];
+
+/** Return the formulas by which the page computes the motion of a document. */
+export function evaluationOf({ area }: ClosedFormDocument): string[] {
+  return area ? AREA_EVALUATION : EVALUATION;
+}
 
 /** Write a formula into an element; its source stays where the library does not come. */
 export async function typeset(tex: string, into: HTMLElement, display = false): Promise<void> {

@@ -115,7 +115,7 @@ export const SYSTEMS: Record<string, System> = {
       gamma,
       { ...Omega, text: "The angular velocity in the body; (Ω,γ) is free" },
     ],
-    example: { system: "chaplygin-ball", ...ball, Omega: ["0.8", "1", "0.5"] },
+    example: { system: "chaplygin-ball", ...ball, Omega: ["0.9", "0.6", "0.2"] },
   },
   "ellipsoid-geodesic": {
     title: "Geodesic on an ellipsoid",

@@ -47,7 +47,8 @@ export class BallView extends View3D {
   }
 
   refusal({ motion }: Loaded): string | null {
-    return motion.at(0).position ? null : "This system does not roll: choose a ball.";
+    if (!motion.at(0).position) return "This system does not roll: choose a ball.";
+    return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
   build(loaded: Loaded): void {
@@ -62,7 +63,8 @@ export class BallView extends View3D {
     this.#trail = new TrailLine(10000, BLUE);
     this.#plane.userData.leaps = true;
     this.world.add(this.#plane, this.#ball, this.#trail.object);
-    this.#mean = loaded.motion.meanVelocity ?? meanOfStretch(loaded);
+    const mean = loaded.motion.meanVelocity;
+    this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
     this.#momentum = horizontalMomentum(loaded);
     this.#course = loaded.motion.meanVelocity ? courseOf(this.#mean, this.#momentum) : "";
     this.caption.textContent = `${CAPTION} ${this.#course}`.trim();

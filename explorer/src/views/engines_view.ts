@@ -63,8 +63,9 @@ export class EnginesView extends View {
     this.#host.setAttribute("aria-describedby", this.twin.id);
   }
 
-  refusal(): string | null {
-    return null;
+  refusal({ motion, document }: Loaded): string | null {
+    if (document || motion.moments.length > 1) return null;
+    return "Without a closed form there is nothing to compare.";
   }
 
   build(loaded: Loaded): void {

@@ -1,0 +1,96 @@
+"""Balls, and bodies with an area constant, in a real browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import quote
+
+import httpx2
+import numpy as np
+import pytest
+from explorer_browser import Visit, needs_chromium, visiting
+from explorer_bundle import EXPLORER
+
+import veselova as vs
+from conftest import Server
+
+pytestmark = needs_chromium
+
+PRESETS = json.loads((EXPLORER / "src/presets.json").read_text())
+
+
+@pytest.fixture
+def visit(browser: Any, server: Server) -> Iterator[Visit]:
+    """Return a page of the server that all tests share."""
+    with visiting(browser, server.url) as found:
+        yield found
+
+
+def problem_of(preset: str) -> Any:
+    """Return the problem of a preset, as a request states it."""
+    return next(one for one in PRESETS if one["name"] == preset)["problem"]
+
+
+@pytest.mark.parametrize("preset", ["chaplygin", "spin"])
+def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) -> None:
+    visit.open(f"#preset={preset}&play=0")
+    assert visit.text("#status").startswith("Closed form")
+    for view in ("ball", "body", "sphere", "torus", "ellipsoid"):
+        visit.wait_for_ink(view, colours=100, part=0.1)
+    visit.wait_for_ink("curve", colours=20, part=0.01)
+    assert "Constants: With an area constant" in visit.text("#absent")
+    visit.wait_for("document.getElementById('twin-engines').textContent.includes('integration')")
+    for part in visit.text("#twin-engines").split("differ by at most ")[1:]:
+        assert float(part.split(" ")[0].rstrip(".").replace("−", "-")) < 1e-10
+    before = visit.text("#facts td")
+    visit.page.fill("#time", "1e6")
+    visit.page.keyboard.press("Enter")
+    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+    request = {
+        "problem": problem_of(preset),
+        "times": [10**6],
+        "outputs": ["gamma", "position"],
+    }
+    series = httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]
+    shown = [float(entry) for entry in visit.text("#facts td").replace("−", "-").split(", ")]
+    assert shown == pytest.approx(series["gamma"][0], abs=2e-4)
+    visit.wait_for("document.getElementById('twin-ball').textContent.includes('e+')")
+    twin = visit.text("#twin-ball").replace("−", "-").split("(")[1].split(")")[0]
+    point = [float(entry) for entry in twin.split(", ")]
+    assert point == pytest.approx(series["position"][0], rel=2e-4)
+
+
+def test_a_ball_in_four_dimensions_is_a_body_with_a_torus(visit: Visit) -> None:
+    turning = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
+    data = {"inertia": {"special": [1.6, 1.2, 0.9, 0.5]}, "mass": 0.5, "radius": 0.8}
+    start = {"gamma": [1, 0, 0, 0], "Omega": turning}
+    problem = {"system": "rubber-ball", **data, **start}
+    visit.open(f"#problem={quote(json.dumps(problem))}&play=0")
+    assert visit.text("#status").startswith("Closed form")
+    for view in ("body", "torus", "ellipsoid"):
+        visit.wait_for_ink(view, colours=50, part=0.01)
+    assert "A ball in more than three dimensions is not drawn." in visit.text("#absent")
+
+
+@pytest.mark.parametrize("preset", ["ball", "drift", "chaplygin"])
+def test_a_ball_shows_its_momentum_and_how_it_goes_on(visit: Visit, preset: str) -> None:
+    data = {name: value for name, value in problem_of(preset).items() if name != "system"}
+    ball = (vs.ChaplyginBall if preset == "chaplygin" else vs.RubberBall)(**data)
+    frame, Omega = (vs.solve(ball, [5.0]).series(name)[0] for name in ("frame", "Omega"))
+    added = float(data["mass"]) * float(data["radius"]) ** 2
+    momentum = (frame.T @ (np.diag(np.array(data["inertia"], float) + added) @ Omega))[1:]
+    visit.open(f"#preset={preset}&play=0")
+    visit.wait_for("document.getElementById('twin-ball').textContent.includes('momentum K is')")
+    twin = visit.text("#twin-ball").replace("−", "-")
+    for name, truth in (("momentum K is", momentum), ("velocity is", ball.drift.velocity)):
+        found = [float(x) for x in twin.split(f"{name} (")[1].split(")")[0].split(", ")]
+        assert found == pytest.approx(truth, rel=2e-3, abs=1e-12 if preset == "drift" else 1e-4)
+    caption = visit.text('[data-view="ball"] .caption').replace("−", "-")
+    if preset == "drift":
+        drift = float(caption.split("along K, by ")[1].split(" ")[0])
+        along = ball.drift.velocity @ momentum / np.linalg.norm(momentum)
+        assert drift == pytest.approx(along, rel=2e-3)
+    else:
+        assert caption.endswith("across K and keeps to a strip.")
