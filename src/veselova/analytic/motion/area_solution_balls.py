@@ -17,7 +17,13 @@ from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
+from veselova.analytic.time_map.cross_component import CrossComponent
+from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.rate import time_rate
+from veselova.analytic.time_map.torus_series_balls import (
+    GeneralFourierTimeMapInBalls,
+    SeriesInBalls,
+)
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 
@@ -37,6 +43,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         if coarse.separatrices:
             reason = "on a separatrix motions with an area constant have 15 digits"
             raise Unsolved("too-far", reason)
+        self._known_series: SeriesInBalls | None = None
         super().__init__(coarse, digits, certified, method, reach)
         self._area = coarse
         self._costs = replace(self._costs, rate_of_state=True)
@@ -70,7 +77,44 @@ class AreaSolutionInBalls(SolutionInBalls):
             orbit.coarse_rates,
             self._rates,
             paces[0] / paces[1],
+            self._fourier_map if self._has_even_torus else None,
         )
+
+    @property
+    def _has_even_torus(self) -> bool:
+        """Return whether neither a cut nor a gap is narrow: elsewhere the series are long."""
+        coarse = self._coarse
+        genus = self.frame.periods.genus
+        return genus == 2 and coarse.is_even and not coarse.near_separatrix
+
+    def _fourier_map(self, orbit: Orbit, expected: float) -> FourierTimeMapInBalls:
+        return GeneralFourierTimeMapInBalls(orbit, self._odd_series, expected=expected)
+
+    def _odd_series(self, smallest: Any) -> SeriesInBalls:
+        """Return the series of the odd part of dt/dτ₁, modes above a number: ``AreaSolution`` has
+        the formula.
+        """
+        if self._known_series is not None and self._known_series.smallest <= smallest:
+            return self._known_series
+        xp: Any = self.arithmetic
+        inversion = self.orbit.rate.inversion
+        component = CrossComponent.of(self.frame, inversion)
+        periods = inversion.periods
+        psi = xp.array([[1, 1]]) * xp.pi / 2
+        lower = np.array([periods.curve.point(1), periods.curve.point(3)])
+        coordinates = lower + periods.roots_on_cuts(psi)[0][:, 0] ** 2
+        c_2 = periods.curve.point(component.place)
+        scale = xp.number(self.problem.exact_tilt) * self.orbit.rate.at(psi)[0]
+        scale = scale / xp.sqrt(c_2 * np.prod(coordinates)) / xp.determinant(periods.cycles)
+        for size in component.row_sizes.tolist():
+            scale = scale * xp.number(size)
+        found = SeriesInBalls.of(component, scale, smallest)
+        points = xp.pi * np.asarray(self.frame.half_periods)
+        values = self._odd_rate(self.frame.at(points)).astype(float)
+        best = int(np.argmax(np.abs(values)))
+        z = np.asarray(self.frame.half_periods).astype(float)[best : best + 1] / 2
+        self._known_series = found.scaled(-1) if found.at(z)[0] * values[best] < 0 else found
+        return self._known_series
 
     def _rates(self, z: Values) -> Values:
         """Return dt/dτ₁ at phases z (N, g)."""
@@ -97,7 +141,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         tilt = self._side * xp.number(self.problem.exact_tilt)
         return np.asarray(tilt * across / along)
 
-    def _displacement(self, times: Values, tau1: Values) -> Values:
+    def _displacement(self, times: Values, tau1: Values, by_series: bool) -> Values:
         """Return the coefficients of n and e_⊥ in the path of a ball, (N, 2)."""
         xp: Any = self.arithmetic
         problem = self.problem
@@ -106,6 +150,13 @@ class AreaSolutionInBalls(SolutionInBalls):
         if self.frame.periods.genus < 2:
             return np.asarray(result)
         side = self.body.rotation[:, 0]
+        across = xp.number(problem.exact_across)
+        if by_series:
+            result[:, 1] = problem.sign * side[0] * self.normal_series(0).integral(self.orbit, tau1)
+            if self._area.odd_peak:
+                odd = self._odd_series(self.orbit.rate.mean * xp.epsilon)
+                result[:, 0] = result[:, 0] - across * odd.integral(self.orbit, tau1)
+            return np.asarray(result)
         # (q',n_2) to the sign of u, and the odd part of the time over what it may be
         largest = xp.number(2 * (self._area.odd_peak or 1.0))
         functions: list[Along] = [
@@ -117,7 +168,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         found = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
         result[:, 1] = problem.sign * found[:, 0]
         if self._area.odd_peak:
-            result[:, 0] = result[:, 0] - xp.number(problem.exact_across) * largest * found[:, 1]
+            result[:, 0] = result[:, 0] - across * largest * found[:, 1]
         return np.asarray(result)
 
     @property

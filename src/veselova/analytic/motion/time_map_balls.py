@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
 from veselova.analytic.spectrum.moving_part import Moving
-from veselova.analytic.time_map.analyticity_strip import Orbit
+from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
+
+#: Tuning: by how much more a Fourier map with an odd part takes, whose modes are doubled.
+_GENERAL = 20.0
 
 __all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes", "require_few_modes"]
 
@@ -96,6 +99,7 @@ def choose_time_map(
     known = known and orbit.has_fourier_map
     if known and modes <= MOST_MODES and not xp.certified:
         by_modes = costs.modes(modes, max(coarse.rate.needed_nodes), approximate.size)
+        by_modes *= _GENERAL if isinstance(orbit, GeneralOrbit) else 1
     has_modes = costs.is_affordable(by_modes + further)
 
     def require_nodes(count: float) -> None:
@@ -110,9 +114,11 @@ def choose_time_map(
     ]
     if has_modes:
         by_panels = estimate_nodes(orbit, approximate) * costs.rate
-        maps.insert(
-            int(by_panels < by_modes), partial(FourierTimeMapInBalls, orbit, expected=modes)
-        )
+        made = partial(FourierTimeMapInBalls, orbit, expected=modes)
+        if isinstance(orbit, GeneralOrbit):
+            assert orbit.fourier_map is not None
+            made = partial(orbit.fourier_map, orbit, modes)
+        maps.insert(int(by_panels < by_modes), made)
     for time_map in maps[:-1]:
         with suppress(Unsolved):
             return time_map()

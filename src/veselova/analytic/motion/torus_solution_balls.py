@@ -27,7 +27,7 @@ from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
 from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
-from veselova.analytic.motion.time_map_balls import choose_time_map
+from veselova.analytic.motion.time_map_balls import choose_time_map, estimate_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
@@ -36,7 +36,11 @@ from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
+from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
+from veselova.analytic.time_map.panels_balls import estimate_nodes
 from veselova.analytic.time_map.rate import TimeMap, TimeRate, time_rate
+from veselova.analytic.time_map.torus_series import NormalComponent
+from veselova.analytic.time_map.torus_series_balls import SeriesInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
@@ -47,6 +51,9 @@ _NARROWEST = 1e-20
 
 #: Derived: digits of a share in |q|² and |q̇|² that doubles see.
 _SMALL_SHARE = 200
+
+#: Tuning: by how much more the series of a path take than the time map of a rank-one problem.
+_SERIES_OF_PATH = 10.0
 
 #: Budget: the smallest movement along a direction that is followed, beside those along others.
 _LEAST_DIGITS = 500
@@ -177,7 +184,9 @@ class SolutionInBalls:
             self.body.to_axes(velocity),
             self.body.frames(attitude),
             points,
-            self._displacement(times, tau1) if "displacement" in problem.outputs else None,
+            self._displacement(times, tau1, self._takes_series(tau1, details["time_map"]))
+            if "displacement" in problem.outputs
+            else None,
         )
         return series_of(
             problem,
@@ -185,7 +194,7 @@ class SolutionInBalls:
             xp,
         ), details
 
-    def _displacement(self, times: Values, tau1: Values) -> Values:
+    def _displacement(self, times: Values, tau1: Values, by_series: bool) -> Values:
         """Return the displacement of a ball that neither slips nor twists, (N, n−1): uniform along
         the momentum, and the integrals of (q',n_k) across it.
         """
@@ -194,13 +203,46 @@ class SolutionInBalls:
         assert isinstance(problem, RollingVeselova)
         if self._drift is not None:
             raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
-        functions: list[Along] = [
-            lambda attitude, k=k: attitude.components[:, k]  # type: ignore[misc]
-            for k in range(self.frame.periods.genus - 1)
-        ]
-        across = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
+        count = self.frame.periods.genus - 1
+        if by_series:
+            across = xp.array(np.zeros((len(tau1), count)))
+            for k in range(count):
+                across[:, k] = self.normal_series(k).integral(self.orbit, tau1)
+        else:
+            functions: list[Along] = [
+                lambda attitude, k=k: attitude.components[:, k]  # type: ignore[misc]
+                for k in range(count)
+            ]
+            across = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
         along = xp.sqrt(xp.number(problem.exact_square_of_speed)) * times
         return np.asarray(np.concatenate([across, along[:, None]], axis=1) @ self.body.rotation)
+
+    def _takes_series(self, tau1: Values, time_map: str) -> bool:
+        """Return whether Fourier series of a path take less than panels."""
+        if "displacement" not in self.problem.outputs or time_map != FourierTimeMapInBalls.name:
+            return False
+        coarse = self._coarse
+        if coarse.near_separatrix or not coarse.is_even:
+            return False
+        modes = estimate_modes(coarse, self.arithmetic.digits, self._costs.genus)
+        nodes = max(coarse.rate.needed_nodes)
+        by_series = _SERIES_OF_PATH * self._costs.modes(modes, nodes, len(tau1))
+        by_panels = self._costs.state * estimate_nodes(self.orbit, tau1.astype(float))
+        if by_series < by_panels:
+            self._costs.require_affordable(by_series)
+        return by_series < by_panels
+
+    def normal_series(self, k: int) -> SeriesInBalls:
+        """Return the series of (q',n_{k+2})."""
+        xp = self.arithmetic
+        inversion = self.orbit.rate.inversion
+        place = self.frame.periods.curve.place["c", k + 1]
+        component = NormalComponent(inversion, 1.0, self.frame, place)
+        points = xp.pi * np.asarray(self.frame.half_periods)
+        products = np.prod(component.factors_at(points), axis=0)
+        best = int(np.argmax(np.abs(products.astype(float))))
+        scale = self.frame.at(points[best : best + 1]).components[0, k] / products[best]
+        return SeriesInBalls.of(component, scale, xp.epsilon)
 
     def _add_perturbation(self, states: States, drift: PerturbationBound, tau1: Values) -> States:
         """Return the states of the moved start, widened to hold those of the given one."""

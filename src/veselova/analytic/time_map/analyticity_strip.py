@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +54,10 @@ class Orbit:
     time_rate: Callable[[Values], Values] | None
     coarse_rates: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
-    #: Whether the Fourier series of the rate is that of ``rate``.
-    has_fourier_map: ClassVar[bool] = True
+    @property
+    def has_fourier_map(self) -> bool:
+        """Return whether the Fourier series of the rate is known: it is that of ``rate``."""
+        return True
 
     def phases(self, tau1: Values) -> Values:
         """Return z modulo 2 at Neumann times (N,), shape (N, g): however far they are, doubles tell
@@ -110,13 +112,18 @@ class GeneralOrbit(Orbit):
     """An orbit with another direction, or along which another function is integrated.
 
     - rates_at: dt/dτ₁, or the function, at phases (N, g)
+    - fourier_map: makes its Fourier time map from the expected number of modes; None for none
     - slower: by how much its τ₁ is longer than that of Neumann's flow on this torus, about
     """
 
     rates_at: Callable[[Values], Values]
     slower: float
+    fourier_map: Callable[[Orbit, float], Any] | None = None
 
-    has_fourier_map: ClassVar[bool] = False
+    @property
+    def has_fourier_map(self) -> bool:
+        """Return whether there is one."""
+        return self.fourier_map is not None
 
     def rates(self, tau1: Values) -> Values:
         """Return dt/dτ₁ at Neumann times (N,)."""

@@ -66,12 +66,12 @@ class CrossComponent(SeriesComponent):
         """Return the largest entry of each row at the nodes of the forms, (2,)."""
         count = max(self.needed_nodes)
         psi = self.inversion.arithmetic.nodes(count)
-        rows = [np.max(np.abs(self._rows(s, psi)), axis=1) for s in range(2)]
+        rows = [np.max(np.abs(self._rows(s, psi).astype(float)), axis=1) for s in range(2)]
         return np.asarray(np.max(rows, axis=0))
 
     def _weights(self, forms: Values) -> Values:
         # rows of different parity, which a⁻¹ would mix
-        return np.asarray(forms * (2 * np.pi / forms.shape[-1]))
+        return np.asarray(forms * (2 * self.inversion.arithmetic.pi / forms.shape[-1]))
 
     def _weight_forms(self, s: int, psi: Values) -> Values:
         return np.asarray(self._rows(s, psi) / self.row_sizes[:, None])

@@ -131,7 +131,11 @@ class NormalComponent(SeriesComponent):
 
     def at(self, psi: Values) -> Values:
         """Return (q',n_k) at angles of shape (N, g)."""
-        return np.asarray(self.scale * np.prod(self._factors(*self.frame.roots(psi)), axis=0))
+        return np.asarray(self.scale * np.prod(self.factors_at(psi), axis=0))
+
+    def factors_at(self, psi: Values) -> Values:
+        """Return φ_s at angles (N, g), shape (g, N)."""
+        return self._factors(*self.frame.roots(psi))
 
     def _factors(self, roots: Values, own: Values) -> Values:
         """Return φ_s from the roots at angles (N, g), shape (g, N)."""
