@@ -67,9 +67,8 @@ _LEAST_SLOPE = 0.05
 #: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
 _SLOW = 4.0
 
-#: Budget: times from which all have the error of the farthest; and halvings of that one's time.
-_MANY_TIMES = 1000
-_MOST_HALVINGS = 40
+#: Budget: by how much the times elapsed of which errors are told apart may differ.
+_MOST_ELAPSED = 1e12
 
 #: Budget: entries of one block of (times × modes): temporaries that stay in the cache.
 _BLOCK = 32_000
@@ -167,26 +166,32 @@ class FourierTimeMap(TimeMap):
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, Array]:
         """Return the error of the modes at increasing Neumann times, and what is to be multiplied
-        with |τ₁|, (N,) each, or one for all of many: each mode is off by about the smallest kept,
-        for 1/(π m·f) or for the time elapsed.
+        with |τ₁|, (N,) each: each mode is off by about the smallest kept, for 1/(π m·f) or for the
+        time elapsed.
 
         So are those next to them that are left out, and others are smaller. An error of phase k
         moves τ₁ by 2F_m 2πm_k/F_0 of it for as long. Errors of different modes add in squares. To
         these comes one rounding of δ.
         """
-        elapsed = np.abs(tau1)
-        most = max(elapsed.item(0), elapsed.item(-1))
-        if tau1.size == 1 or tau1.size > _MANY_TIMES or most == 0:
-            bounds = self._swayed if most > self._longest_of_all else self._bound_modes([most])
-            which: Any = slice(None)
-        else:
-            # the time elapsed of each, up to a factor of two
-            shortest = max(most * 2.0**-_MOST_HALVINGS, 0.5 / self._fastest)
-            halvings = np.floor(np.log2(most / np.minimum(np.maximum(elapsed, shortest), most)))
-            found, which = np.unique(halvings, return_inverse=True)
-            bounds = self._bound_modes(most * 0.5**found)
-        of_all, sway = bounds
-        return (of_all + of_start @ sway)[which], (of_rates @ sway)[which]
+        most = max(abs(tau1.item(0)), abs(tau1.item(-1)))
+        if tau1.size == 1 or most == 0:
+            of_all, sway = (
+                self._swayed if most > self._longest_of_all else self._bound_modes([most])
+            )
+            return of_all + of_start @ sway, of_rates @ sway
+        # the time elapsed of each, up to a factor of two
+        halvings = math.ceil(math.log2(max(1.0, min(most * 2 * self._fastest, _MOST_ELAPSED))))
+        halves = most * 0.5 ** np.arange(1, halvings + 1)
+        ends = np.searchsorted(tau1, np.concatenate([-halves, halves[::-1]]))
+        counts = np.diff(ends, prepend=0, append=tau1.size)
+        level = halvings - np.abs(np.arange(-halvings, halvings + 1))
+        levels, which = np.unique(level[counts > 0], return_inverse=True)
+        of_all, sway = self._bound_modes(most * 0.5**levels)
+        counts = counts[counts > 0]
+        return (
+            np.repeat((of_all + of_start @ sway)[which], counts),
+            np.repeat((of_rates @ sway)[which], counts),
+        )
 
     @cached_property
     def _swayed(self) -> tuple[Array, Array]:
