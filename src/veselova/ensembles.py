@@ -354,12 +354,16 @@ def fill(
     served = np.zeros(starts.count, dtype=bool)
     details = [""] * starts.count
     outcomes = np.full(starts.count, SOLVED, dtype="U32")
-    if grid.doubles.size <= MOST_TIMES_TOGETHER and starts.surely.any():
-        for rows, found in together(starts, np.flatnonzero(starts.surely), grid, names):
-            for name, values in found.items():
-                arrays[name][rows] = values[:, places]
-            served[rows] = True
-            checkpoint("problems", float(np.count_nonzero(served)), float(starts.count))
+    surely = np.flatnonzero(starts.surely)
+    if grid.doubles.size <= MOST_TIMES_TOGETHER and surely.size:
+        from veselova.analytic.compiled.compiler import serving
+
+        with serving(surely.size * grid.doubles.size):
+            for rows, found in together(starts, surely, grid, names):
+                for name, values in found.items():
+                    arrays[name][rows] = values[:, places]
+                served[rows] = True
+                checkpoint("problems", float(np.count_nonzero(served)), float(starts.count))
     alone = np.flatnonzero(~served)
     done = starts.count - alone.size
     for i in alone.tolist():

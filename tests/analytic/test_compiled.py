@@ -11,7 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_ensembles import BODY, TIMES, body_starts, require_truth, starts
+from test_ensembles import (
+    BODY,
+    TIMES,
+    body_starts,
+    require_independence,
+    require_truth,
+    starts,
+)
 
 import veselova as vs
 from draws import adversarial_start, near_unstable_circle, random_problem
@@ -153,14 +160,7 @@ def test_errors_of_compiled_states_bound_adversarial_truth(
 
 
 def test_no_compiled_number_depends_on_the_others(loops: None, rng: np.random.Generator) -> None:
-    given = starts(rng, 60, 3)
-    whole = vs.solve_many({**given, "normalize": True}, TIMES)
-    chosen = rng.permutation(60)[:17]
-    part = {name: values[chosen] for name, values in given.items()}
-    found = vs.solve_many({**part, "normalize": True}, TIMES)
-    for name in ("frame", "q_dot", "tau1"):
-        assert np.array_equal(getattr(found, name), getattr(whole, name)[chosen])
-    assert np.array_equal(found.error, whole.error[chosen])
+    require_independence(rng)
 
 
 def test_machine_code_is_kept_where_it_is_asked_for(
@@ -221,7 +221,7 @@ def test_few_starts_and_budgets_load_no_compiler() -> None:
     code = [
         "from veselova.analytic.compiled import compiler",
         "from veselova.mechanics.core import budget",
-        "with budget.limits(60.0): compiler.prepare(10**9)",
+        "with budget.limits(60.0), compiler.serving(10**9): assert not compiler.ready()",
     ]
     assert _modules_after("\n".join(code)) == "False"
 
@@ -232,7 +232,6 @@ def test_without_numba_arrays_serve(monkeypatch: pytest.MonkeyPatch) -> None:
         if name != compiler.__name__:
             monkeypatch.delitem(sys.modules, name)
     with compiler.forced(True):
-        compiler.prepare(10**9)
         assert not compiler.ready()
         found = vs.solve_many(
             {"A": [3, 2, 1], "q": [[0.6, 0.1, 0.8]], "q_dot": [[0, 1, 0.3]], "normalize": True},

@@ -10,6 +10,7 @@ import pytest
 import veselova as vs
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import tagged
+from veselova.analytic.compiled import compiler
 from veselova.mechanics.core.errors import InvalidInput, OverBudget
 
 Array = np.ndarray[Any, Any]
@@ -115,7 +116,8 @@ def test_starts_near_a_separatrix_fall_back_to_solve(rng: np.random.Generator) -
         assert np.all(off <= ensemble.error[i] + alone.error)
 
 
-def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> None:
+def require_independence(rng: np.random.Generator) -> None:
+    """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)
     whole = vs.solve_many({**given, "normalize": True}, TIMES)
     chosen = rng.permutation(60)[:17]
@@ -124,6 +126,22 @@ def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> No
     for name in ("frame", "q_dot", "tau1"):
         assert np.array_equal(getattr(found, name), getattr(whole, name)[chosen])
     assert np.array_equal(found.error, whole.error[chosen])
+
+
+def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> None:
+    require_independence(rng)
+
+
+def test_no_number_depends_on_what_was_computed_before(rng: np.random.Generator) -> None:
+    pytest.importorskip("numba")
+    given = {**starts(rng, 5, 3), "normalize": True}
+    with compiler.forced(True):
+        vs.solve_many(given, TIMES)
+    found = vs.solve_many(given, TIMES)
+    with compiler.forced(False):
+        reference = vs.solve_many(given, TIMES)
+    for name in ("frame", "q_dot", "tau1", "error"):
+        assert np.array_equal(getattr(found, name), getattr(reference, name))
 
 
 def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -21,7 +20,7 @@ from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.budget import has_budget
 
-__all__ = ["compiled", "forced", "is_kept", "prepare", "ready"]
+__all__ = ["compiled", "forced", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,15 +35,31 @@ _LOOPS = "veselova.analytic.compiled.states"
 #: What is asked for: True, False, or None for what pays.
 _wanted: ContextVar[bool | None] = ContextVar("veselova_compiled", default=None)
 
+_serving: ContextVar[bool] = ContextVar("veselova_serving", default=False)
 
-def prepare(states: int) -> None:
-    """Load the compiled loops where so many states are worth it, and no budget is in force."""
+
+@contextmanager
+def serving(states: int) -> Iterator[None]:
+    """Let compiled loops serve in the block where so many states are worth it, and no budget is in
+    force. What was loaded before does not count: equal work has equal results.
+    """
     wanted = _wanted.get()
     if wanted is None:
         worth = states >= _WORTH_COMPILING or (states >= _WORTH_LOADING and is_kept())
         wanted = worth and not has_budget()
-    if wanted and importlib.util.find_spec("numba") is not None:
-        importlib.import_module(_LOOPS)
+    before = _serving.set(wanted and _load())
+    try:
+        yield
+    finally:
+        _serving.reset(before)
+
+
+def _load() -> bool:
+    """Load the loops; return False without numba."""
+    if importlib.util.find_spec("numba") is None:
+        return False
+    importlib.import_module(_LOOPS)
+    return True
 
 
 def is_kept() -> bool:
@@ -54,8 +69,8 @@ def is_kept() -> bool:
 
 
 def ready() -> bool:
-    """Return whether compiled loops serve: once they have been loaded."""
-    return _LOOPS in sys.modules and _wanted.get() is not False
+    """Return whether compiled loops serve the work at hand."""
+    return _serving.get()
 
 
 @contextmanager
@@ -63,7 +78,8 @@ def forced(wanted: bool) -> Iterator[None]:
     """Ask for compiled loops, or for none, whatever pays."""
     before = _wanted.set(wanted)
     try:
-        yield
+        with serving(0):
+            yield
     finally:
         _wanted.reset(before)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import DoubleDouble, stack_double_doubles
-from veselova.analytic.compiled.compiler import prepare, ready
+from veselova.analytic.compiled.compiler import ready
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.angle_maps import AngleMaps
 from veselova.analytic.curve.hyperelliptic import Curve
@@ -208,7 +208,6 @@ class Atlas:
         """Yield the states of starts (N, 3), exact as they stand, at the times of a grid, for as
         many of the starts as lie on a panel.
         """
-        prepare(len(q) * grid.doubles.size)
         A = np.broadcast_to(self._A, q.shape)
         chosen = known_starts(A, q, q_dot)
         for first in range(0, chosen.size, _BLOCK):

@@ -306,15 +306,14 @@ def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
         off = 2 * np.finfo(float).eps * sizes[slow] * reaches
         return float(2 * np.abs(np.array(coefficients)[slow]) @ off) / mean
 
-    size = 1.0
     of_time = growth(parts["modes"], parts["coefficients"])
     if "area" in parts:
         of_time += growth(parts["area"]["odd"]["modes"], parts["area"]["odd"]["coefficients"])
     found = body * of_time / mean
-    if "path" in parts:
-        size = float(parts["path"]["radius"])
-        found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
-    return max(1.0, size) * found
+    if "path" not in parts:
+        return found
+    found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
+    return max(1.0, float(parts["path"]["radius"])) * found
 
 
 def _error_of_decimals(solution: Solution, accuracy: float, digits: int) -> dict[str, float]:

@@ -19,7 +19,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import STEP, Attitude
 from veselova.analytic.attitude.frame_batch import attitudes
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
-from veselova.analytic.compiled.compiler import prepare, ready
+from veselova.analytic.compiled.compiler import ready
 from veselova.analytic.motion.ensemble_compiled import Interpolation, compiled_states
 from veselova.analytic.motion.torus_stack import TorusStack, torus_stacks
 from veselova.analytic.time_map.mode_tables import ModeTables, TimeMaps
@@ -92,7 +92,6 @@ def states_of_starts(
     """
     if A.shape[1] - 1 not in _BOXES:
         return
-    prepare(len(A) * times.doubles.size)
     for stack in torus_stacks(A, q, q_dot, _NODE_COUNTS):
         _form_nodes(stack)
         for part, tables in _tables(stack):

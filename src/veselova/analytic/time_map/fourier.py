@@ -28,6 +28,7 @@ from veselova.analytic.time_map.fourier_modes import (
     Integers,
     TorusSeries,
     find_significant_modes,
+    with_slow_phases,
 )
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TimeMap, TorusRate
@@ -39,7 +40,6 @@ __all__ = [
     "ColumnsForModes",
     "FourierTimeMap",
     "find_modes",
-    "with_slow_phases",
 ]
 
 Array = NDArray[np.float64]
@@ -63,9 +63,6 @@ _FIRST_PART = 1 / 16
 
 #: Tuning: smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
 _LEAST_SLOPE = 0.05
-
-#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
-_SLOW = 4.0
 
 #: Budget: by how much the times elapsed of which errors are told apart may differ.
 _MOST_ELAPSED = 1e12
@@ -324,24 +321,6 @@ def _all_modes(
         off = max(off, odd.off / mean)
     order = np.argsort(-np.abs(coefficients))
     return modes[order], coefficients[order], turns[order], edge, off
-
-
-def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
-    """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
-
-    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
-    too much of that, the mode is a multiple of a slow combination.
-    """
-    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (
-        np.count_nonzero(modes, axis=1) > 1
-    )
-    if not slow.any():
-        return modes, modes[:0]
-    multiples = np.gcd.reduce(modes[slow], axis=1)
-    combinations, which = np.unique(modes[slow] // multiples[:, None], axis=0, return_inverse=True)
-    of_slow = np.zeros((len(modes), len(combinations)), dtype=np.int64)
-    of_slow[np.flatnonzero(slow), which.ravel()] = multiples
-    return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
 def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:

@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Integers", "TorusSeries", "find_significant_modes"]
+__all__ = ["Integers", "TorusSeries", "find_significant_modes", "with_slow_phases"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Budget: modes looked at before giving up.
 _MOST_MODES = 1_000_000
+
+#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
+_SLOW = 4.0
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,24 @@ class TorusSeries:
         """Return the function at phases (N, g)."""
         angles = 2 * np.pi * (z @ self.orders.T / 2 + self.turns)
         return np.asarray(np.cos(angles) @ (2 * self.coefficients))
+
+
+def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
+    """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
+
+    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
+    too much of that, the mode is a multiple of a slow combination.
+    """
+    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (
+        np.count_nonzero(modes, axis=1) > 1
+    )
+    if not slow.any():
+        return modes, modes[:0]
+    multiples = np.gcd.reduce(modes[slow], axis=1)
+    combinations, which = np.unique(modes[slow] // multiples[:, None], axis=0, return_inverse=True)
+    of_slow = np.zeros((len(modes), len(combinations)), dtype=np.int64)
+    of_slow[np.flatnonzero(slow), which.ravel()] = multiples
+    return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
 def find_significant_modes(

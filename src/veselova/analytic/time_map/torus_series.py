@@ -22,15 +22,12 @@ from veselova.analytic.arithmetic.trigonometric_sums import powers, turns, waves
 from veselova.analytic.attitude.frame import Frame
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.time_map.fourier import (
-    COLUMN_ROUNDING,
-    ColumnsForModes,
-    with_slow_phases,
-)
+from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, ColumnsForModes
 from veselova.analytic.time_map.fourier_modes import (
     Integers,
     TorusSeries,
     find_significant_modes,
+    with_slow_phases,
 )
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TorusRate

@@ -108,7 +108,6 @@ def columns_at_once(
 
 def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> dict[int, Answer]:
     """Return the columns of those motions that can be computed side by side, and what is kept."""
-    from veselova.analytic.compiled.compiler import forced
     from veselova.ensembles import MOST_TIMES_TOGETHER, Starts, side_by_side
 
     requests = {row: sweep.request_of(places) for row, places in values.items()}
@@ -126,11 +125,9 @@ def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> d
     names = sweep.outputs or list(problems[0].outputs)
     answers: dict[int, Answer] = {}
     began = time.perf_counter()
-    with forced(False):  # no bit of a row may depend on which worker has compiled loops
-        blocks = list(
-            side_by_side(starts, np.flatnonzero(starts.surely), grid, tuple(problems[0].stored))
-        )
-    for block, series in blocks:
+    for block, series in side_by_side(
+        starts, np.flatnonzero(starts.surely), grid, tuple(problems[0].stored)
+    ):
         shown = {name: array[:, places] for name, array in series.items()}
         error = shown.pop("error")
         for k, i in enumerate(block.tolist()):
