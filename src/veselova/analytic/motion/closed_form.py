@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 
 from veselova.analytic.motion.area_solution import AreaSolution, solution_of
 from veselova.analytic.motion.ball_n_motion import ball_fields
-from veselova.analytic.motion.closed_form_area import area_fields, error_of_body
+from veselova.analytic.motion.closed_form_area import (
+    area_fields,
+    error_of_body,
+    largest_modes,
+)
 from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
 from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
+from veselova.analytic.time_map.fourier_modes import largest_first
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
@@ -204,9 +209,7 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     pace = np.maximum(np.abs(modes @ rates), np.finfo(float).eps * (np.abs(modes) @ np.abs(rates)))
     reach = 2 / (np.pi * pace * solution.mean_rate) * solution.sensitivity.along_flow
     effects = np.abs(coefficients) * reach
-    order = np.argsort(-effects)
-    left_out = np.cumsum(effects[order][::-1])[::-1]
-    selected = order[left_out > accuracy / 2]
+    selected = largest_first(effects, accuracy / 2)
     if len(selected) > _MOST_MODES:
         raise Unsolved(
             "too-many-modes",
@@ -230,23 +233,15 @@ def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) 
     accuracy asks for, largest first.
     """
     assert isinstance(solution.problem, RollingVeselova)
-    transverse = []
-    unit = AlongMomentum(solution).side / solution.tau1_unit
-    for k in range(1, solution.curve.genus):
-        component = NormalComponent.of(solution.frame, solution.inversion, k)
-        series = find_series(component)
-        pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
-        effects = 2 * np.abs(series.coefficients) / (np.pi * np.maximum(pace, 1e-300))
-        order = np.argsort(-effects)
-        left_out = np.cumsum(effects[order][::-1])[::-1]
-        selected = order[left_out > accuracy / 4]
-        transverse.append(
-            {
-                "modes": series.orders[selected].tolist(),
-                "coefficients": (series.coefficients[selected] * unit).tolist(),
-                "turn": component.turn,
-            }
-        )
+    side = AlongMomentum(solution).side
+    components = (
+        NormalComponent.of(solution.frame, solution.inversion, k)
+        for k in range(1, solution.curve.genus)
+    )
+    transverse = [
+        largest_modes(find_series(component).scaled(side), solution, 1.0, accuracy)
+        for component in components
+    ]
     return {
         "radius": float(ball.ball.radius),
         "position": [float(x) for x in ball.ball.contact],

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.displacement import WithAreaConstant
-from veselova.analytic.time_map.fourier_modes import TorusSeries
+from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
@@ -28,16 +29,14 @@ _ROUNDINGS = 16.0
 
 
 def largest_modes(
-    series: TorusSeries, solution: AreaSolution, factor: float, accuracy: float
+    series: TorusSeries, solution: Solution, factor: float, accuracy: float
 ) -> dict[str, Any]:
     """Return the modes of a series whose integral over τ₁, times a factor, is wanted to an
     accuracy, largest first, and their coefficients per unit of the problem's τ₁.
     """
     pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
     effects = factor * 2 * np.abs(series.coefficients) / (np.pi * np.maximum(pace, 1e-300))
-    order = np.argsort(-effects)
-    left_out = np.cumsum(effects[order][::-1])[::-1]
-    selected = order[left_out > accuracy / 4]
+    selected = largest_first(effects, accuracy / 4)
     return {
         "modes": series.orders[selected].tolist(),
         "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),

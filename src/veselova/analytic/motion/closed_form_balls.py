@@ -17,6 +17,7 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
+from veselova.analytic.time_map.fourier_modes import largest_first
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 
@@ -181,9 +182,7 @@ class _Numbers:
         pace = np.abs(modes @ self._fine.orbit.frequencies).astype(float)
         reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity
         effects = np.abs(time_map.coefficients).astype(float) * reach
-        order = np.argsort(-effects, kind="stable")
-        left_out = np.cumsum(effects[order][::-1])[::-1]
-        selected = order[left_out > accuracy / 2]
+        selected = largest_first(effects, accuracy / 2)
         step = accuracy / (4 * max(1, len(selected)) * reach[selected]) / coarse.tau1_unit
         values, radii = self._xp.decimals(time_map.coefficients[selected] / unit, self._wanted)
         texts = []
