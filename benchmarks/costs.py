@@ -1,4 +1,4 @@
-"""Fit the costs that evaluation plans weigh: the tunings of ``analytic.time_map.tuned_costs``.
+"""Fit the costs that evaluation plans weigh: the tunings of ``veselova.tunings``.
 
     python benchmarks/costs.py [REPEATS]
 
@@ -25,9 +25,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import random_problem
+from veselova import tunings
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
-from veselova.analytic.time_map import tuned_costs
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 
@@ -107,14 +107,14 @@ def main() -> None:
             value = statistics.median(row[name] for row in rows)
             found.setdefault(name, {})[genus] = value
     for name in ("EVALUATION", "PANEL_CYCLE"):
-        show_fit(name, getattr(tuned_costs, name), found[name])
+        show_fit(name, getattr(tunings, name), found[name])
     for name in ("EVALUATION_IN_ANGLES", "PANEL_CYCLE_IN_ANGLES"):
         per_genus = statistics.median(x / genus for genus, x in list(found[name].items())[1:])
-        show(name, getattr(tuned_costs, name), per_genus)
+        show(name, getattr(tunings, name), per_genus)
     for name in ("MODE", "MODE_INVERTED", "PANEL_INVERSION"):
         # Where modes are few, what a time map begins with counts for more than they do.
-        show(name, getattr(tuned_costs, name), statistics.median(list(found[name].values())[1:]))
-    for name, stated in tuned_costs.BALL_THETA.items():
+        show(name, getattr(tunings, name), statistics.median(list(found[name].values())[1:]))
+    for name, stated in tunings.BALL_THETA.items():
         show_fit(f"BALL_THETA {name}", stated, found[name])
 
 

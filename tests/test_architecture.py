@@ -27,9 +27,17 @@ ALLOWED = {
         "flint",
         "veselova.mechanics",
         "veselova.analytic",
+        "veselova.tunings",
         "veselova.version",
     },
-    "numeric": {"numpy", "scipy", "veselova.mechanics", "veselova.numeric", "veselova.version"},
+    "numeric": {
+        "numpy",
+        "scipy",
+        "veselova.mechanics",
+        "veselova.numeric",
+        "veselova.tunings",
+        "veselova.version",
+    },
 }
 
 #: What may be imported inside a function, because the library is optional or slow to load.
@@ -388,7 +396,7 @@ def test_no_name_is_a_private_word() -> None:
 
 
 #: What the comment of a constant begins with; CONVENTIONS.md says what each means.
-KINDS = ("Derived: ", "Calibrated: ", "Budget: ", "Tuning: ")
+KINDS = ("Derived: ", "Calibrated: ", "Budget: ", "Method: ")
 
 
 def _is_number(node: ast.expr | None) -> bool:
@@ -399,18 +407,44 @@ def _is_number(node: ast.expr | None) -> bool:
     return isinstance(node, ast.Constant) and type(node.value) in (int, float)
 
 
+def _kind(lines: list[str], node: ast.stmt) -> str:
+    """Return the first line of the comment of a constant."""
+    place = node.lineno - 2
+    while not lines[place].startswith("#:"):  # constants with one comment stand together
+        assert lines[place].strip(), f"line {node.lineno} has no comment"
+        place -= 1
+    while lines[place - 1].startswith("#:"):
+        place -= 1
+    return lines[place].removeprefix("#: ")
+
+
 def test_constants_of_the_engines_say_of_what_kind_they_are() -> None:
     for path in FILES:
         if not {"analytic", "numeric"} & set(path.parts):
             continue
         lines = path.read_text().splitlines()
         for node in ast.parse(path.read_text()).body:
-            if not (isinstance(node, (ast.Assign, ast.AnnAssign)) and _is_number(node.value)):
-                continue
-            place = node.lineno - 2
-            while not lines[place].startswith("#:"):  # constants with one comment stand together
-                assert lines[place].strip(), f"{path.name}:{node.lineno} has no comment"
-                place -= 1
-            while lines[place - 1].startswith("#:"):
-                place -= 1
-            assert lines[place].removeprefix("#: ").startswith(KINDS), f"{path.name}:{node.lineno}"
+            if isinstance(node, (ast.Assign, ast.AnnAssign)) and _is_number(node.value):
+                assert _kind(lines, node).startswith(KINDS), f"{path.name}:{node.lineno}"
+
+
+def test_tunings_stand_in_one_file_beside_what_measures_them() -> None:
+    path = ROOT / "tunings.py"
+    lines = path.read_text().splitlines()
+    code = {other: other.read_text() for other in FILES if other != path}
+    assert not [other for other, text in code.items() if "#: Tuning" in text]
+    scripts: set[str] = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.Assign):
+            assert _kind(lines, node).startswith("Tuning: ")
+            name = ast.unparse(node.targets[0])
+            assert any(
+                f"    {name},\n" in text or f"import {name}" in text or f", {name}" in text
+                for text in code.values()
+            ), f"nothing reads {name}"
+            headings = [line for line in lines[: node.lineno] if line.startswith("# ---")]
+            script = next(word for word in headings[-1].split() if word.startswith("benchmarks/"))
+            scripts.add(script)
+            if script.endswith("/tunings.py"):
+                assert f'"{name}": ' in (REPOSITORY / script).read_text(), name
+    assert all((REPOSITORY / script).is_file() for script in scripts)

@@ -33,10 +33,10 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.tori import Tori
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
+from veselova.tunings import TIMES_SIDE_BY_SIDE
 
 __all__ = [
     "MOST_BYTES",
-    "MOST_TIMES_TOGETHER",
     "Starts",
     "fill",
     "series_of",
@@ -50,10 +50,6 @@ Array = NDArray[np.float64]
 
 #: Budget: bytes of the arrays of one answer.
 MOST_BYTES = 2**31
-
-#: Tuning (benchmarks/ensembles.py): times from which ``solve``, which interpolates, is as fast as
-#: states side by side.
-MOST_TIMES_TOGETHER = 200
 
 #: A start this near to the bound of the tolerance is left to the problem itself, which refuses or
 #: takes it.
@@ -355,7 +351,7 @@ def fill(
     details = [""] * starts.count
     outcomes = np.full(starts.count, SOLVED, dtype="U32")
     surely = np.flatnonzero(starts.surely)
-    if grid.doubles.size <= MOST_TIMES_TOGETHER and surely.size:
+    if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size:
         from veselova.analytic.compiled.compiler import serving
 
         with serving(surely.size * grid.doubles.size):

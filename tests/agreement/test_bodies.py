@@ -463,8 +463,8 @@ def test_more_digits_agree_by_fourier_series_and_panels(
     times = ["-7.5", "1/3", "30"]
     found = []
     for weight in (1e-9, 1e9):
-        monkeypatch.setattr(time_map_balls, "_GENERAL", weight)
-        monkeypatch.setattr(torus_solution_balls, "_SERIES_OF_PATH", weight)
+        monkeypatch.setattr(time_map_balls, "BALL_ODD_PART", weight)
+        monkeypatch.setattr(torus_solution_balls, "BALL_PATH", weight)
         found.append(vs.solve(problem, times, digits=28))
     by_series, by_panels = found
     assert by_series.provenance.details["time_map"] == "fourier"

@@ -15,20 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.systems.veselova import Veselova
+from veselova.tunings import COMPACT_EQUATIONS
 
 __all__ = ["HeyokaPeer"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: radians between two projections, the starting speed being one.
+#: Method: radians between two projections, the starting speed being one.
 _SEGMENT = 10.0
 
 #: Budget: states that turn into attitudes at once: their arrays stay in the processor's cache.
 _BLOCK = 4096
-
-#: Tuning: from this many equations on the compact mode, which compiles in a second where unrolled
-#: code takes minutes.
-_COMPACT_FROM = 20
 
 
 class HeyokaPeer:
@@ -143,5 +140,5 @@ def compile_integrator(n: int) -> Any:
     equations.append(hy.sqrt(hy.par[2 * n] / qAq))
     system = list(zip(x, equations, strict=True))
     return hy.taylor_adaptive(
-        system, np.ones(x.size), tol=2.0**-52, compact_mode=x.size >= _COMPACT_FROM
+        system, np.ones(x.size), tol=2.0**-52, compact_mode=x.size >= COMPACT_EQUATIONS
     )

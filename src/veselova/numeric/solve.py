@@ -33,8 +33,8 @@ METHODS: Mapping[str, tuple[str, str]] = {
     "taylor": ("veselova.numeric.taylor", "Taylor"),
 }
 
-#: Tuning: scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they cut
-#: the error from 1e-5 to 3.5e-10.
+#: Calibrated: scaled time (about radians of turning) between projections: at n = 3, t = 1e5 they
+#: cut the error from 1e-5 to 3.5e-10.
 _SEGMENT = 10.0
 
 #: Budget: scaled time that an integration is begun for: hours at n = 3, and by then one rounding of

@@ -14,16 +14,11 @@ from veselova.mechanics.core.budget import checkpoint, has_budget
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
 from veselova.mechanics.core.flow import Flow, Operations
 from veselova.numeric.integrator import Integrator
+from veselova.tunings import COMPACT_EQUATIONS, COMPACT_OPERATIONS
 
 __all__ = ["Taylor"]
 
 Array = NDArray[np.float64]
-
-#: Tuning: from this many equations, or operations in them (shared ones counted wherever they
-#: occur), on the compact mode: it compiles in a second where unrolled code takes minutes, and runs
-#: up to 2× slower.
-_COMPACT_FROM = 22
-_COMPACT_OPERATIONS = 4000
 
 #: Budget: compiled fields that are kept.
 _MOST_COMPILED = 64
@@ -149,8 +144,8 @@ def _compile(hy: Any, flow: Flow, lanes: int) -> Any:
         if len(_known) >= _MOST_COMPILED:
             _known.clear()
         compact = (
-            len(equations) >= _COMPACT_FROM
-            or sum(len(dx) for dx in equations) >= _COMPACT_OPERATIONS
+            len(equations) >= COMPACT_EQUATIONS
+            or sum(len(dx) for dx in equations) >= COMPACT_OPERATIONS
         )
         _known[key] = hy.taylor_adaptive_batch(
             list(zip(variables, equations, strict=True)),

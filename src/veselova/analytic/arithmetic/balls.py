@@ -21,6 +21,7 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
 from veselova.mechanics.core.budget import acquire, checkpoint, iterate
+from veselova.tunings import MANY_NODES
 
 __all__ = ["Balls", "balls"]
 
@@ -34,9 +35,6 @@ _EXTRA_TERMS = 6
 
 #: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000
-
-#: Tuning: nodes from which series are formed by products of polynomials.
-_MANY_NODES = 300
 
 #: Derived: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
@@ -254,7 +252,7 @@ class Balls(Arithmetic):
         w^{−(m−j)²}, w = e^{iπ/2N}.
         """
         count = values.shape[-1]
-        if count < _MANY_NODES:
+        if count < MANY_NODES:
             return super().cosine_series(values)
         order = np.arange(count)
         roots = self.turns(self.array(list(range(4 * count))) / (4 * count))

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.tunings import FEW_MODULI
+
 __all__ = ["carlson_rf", "quarter_period"]
 
 Array = NDArray[np.float64]
@@ -28,15 +30,12 @@ NEAR = 7e-3
 MOST_MEANS = 20
 MOST_DUPLICATIONS = 20
 
-#: Tuning: arrays with so few entries are done one by one: a call costs more than an entry.
-_FEW = 16
-
 
 def quarter_period(complement: Any) -> Any:
     """Return K(k) for k'² = ``complement`` > 0, entrywise, to 2 roundings; infinite for 0."""
     if not isinstance(complement, np.ndarray):
         return _quarter(float(complement))
-    if complement.size <= _FEW:
+    if complement.size <= FEW_MODULI:
         found = [_quarter(x) for x in complement.ravel().tolist()]
         return np.array(found).reshape(complement.shape)
     a = np.ones(complement.shape)

@@ -9,15 +9,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.tunings import FEW_SINES
+
 __all__ = ["cosine_sums", "exponentials", "powers", "sine_sums", "turns", "waves_at"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
-
-#: Tuning: waves of which each takes its own sine and cosine: the fewer calls are worth more than
-#: what they cost.
-_FEW = 600
 
 
 def powers(angles: Array, count: int) -> Complex:
@@ -58,7 +56,7 @@ def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = 
     shape (2, K, N).
     """
     result = np.empty((2, orders.shape[0], angles.shape[0])) if out is None else out
-    if angles.shape[0] * orders.shape[0] > _FEW:
+    if angles.shape[0] * orders.shape[0] > FEW_SINES:
         found = exponentials(turns(angles, largest), orders)
         result[0], result[1] = found.real, found.imag
     else:

@@ -19,15 +19,11 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.budget import has_budget
+from veselova.tunings import COMPILED_STATES, LOADED_STATES
 
 __all__ = ["compiled", "forced", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-#: Tuning: states (benchmarks/ensembles.py) from which loading numba and machine code that is kept
-#: pays for itself, half a second, and from which compiling does, half a minute.
-_WORTH_LOADING = 10_000
-_WORTH_COMPILING = 300_000
 
 #: The module of the loops that are called first.
 _LOOPS = "veselova.analytic.compiled.states"
@@ -45,7 +41,7 @@ def serving(states: int) -> Iterator[None]:
     """
     wanted = _wanted.get()
     if wanted is None:
-        worth = states >= _WORTH_COMPILING or (states >= _WORTH_LOADING and is_kept())
+        worth = states >= COMPILED_STATES or (states >= LOADED_STATES and is_kept())
         wanted = worth and not has_budget()
     before = _serving.set(wanted and _load())
     try:

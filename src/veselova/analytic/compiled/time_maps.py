@@ -16,6 +16,8 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.curve import angle_maps
 from veselova.analytic.time_map import mode_tables
+from veselova.analytic.time_map.fourier import LEAST_SLOPE
+from veselova.analytic.time_map.fourier_modes import SLOW
 
 __all__ = [
     "Modes",
@@ -38,9 +40,9 @@ Array = NDArray[np.float64]
 _EPSILON = float(DOUBLE.epsilon)
 _TURN = 2 * math.pi
 
-_COARSE, _LEAST_SLOPE = mode_tables.COARSE, mode_tables.LEAST_SLOPE
+_COARSE, _LEAST_SLOPE = mode_tables.COARSE, LEAST_SLOPE
 _MOST_STEPS, _CONVERGED = mode_tables.MOST_STEPS, mode_tables.CONVERGED
-_STANDING, _SLOW = mode_tables.STANDING, mode_tables.SLOW
+_STANDING, _SLOW = mode_tables.STANDING, SLOW
 _MOST_ANGLE_STEPS, _STALLED = angle_maps.MOST_STEPS, angle_maps.STALLED
 _SMALL, _LONGEST_STEP = angle_maps.CONVERGED * _EPSILON, angle_maps.LONGEST_STEP
 

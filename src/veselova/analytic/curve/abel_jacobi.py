@@ -38,7 +38,7 @@ _LOST_DIGITS = 2
 _CONVERGED = 8.0
 _STALLED = 1e4
 
-#: Tuning: part of the way that a continuation tries at once, first and at least, and Newton's steps
+#: Method: part of the way that a continuation tries at once, first and at least, and Newton's steps
 #: at each of its stations.
 _FIRST_STRETCH = 0.25
 _LEAST_STRETCH = 1e-9

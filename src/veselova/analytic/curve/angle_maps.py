@@ -27,7 +27,7 @@ MOST_STEPS = 24
 CONVERGED = 8.0
 STALLED = 1e3
 
-#: Tuning: radians by which one step may move an angle: far from the solution slopes say little.
+#: Method: radians by which one step may move an angle: far from the solution slopes say little.
 LONGEST_STEP = 1.5
 
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 #: From τ₁ (N,) and the phases there (N, g) to dt/dτ₁, (N,), and the series, each with first axis N.
 Evaluation = Callable[[Array, Array], tuple[Array, tuple[Array, ...]]]
 
-#: Tuning: Chebyshev points of a window.
+#: Method: Chebyshev points of a window.
 NODES = 48
 
 #: Budget: windows evaluated at once, and how often those that are not resolved are halved.

@@ -26,15 +26,13 @@ from veselova.analytic.dense_output.chebyshev_window import (
 )
 from veselova.analytic.dense_output.output_array import AT_ONCE, OutputArray, Samples
 from veselova.analytic.time_map.rate import TimeMap
+from veselova.tunings import INTERPOLATED_TIMES
 
-__all__ = ["FEW_TIMES", "Windows"]
+__all__ = ["Windows"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: times below which windows are not worth their overhead.
-FEW_TIMES = 500
-
-#: Tuning: cycles of the fastest phase in a window at first; lengths that are tried, and how many
+#: Method: cycles of the fastest phase in a window at first; lengths that are tried, and how many
 #: before they are halved.
 _CYCLES = 2.0
 _MOST_LENGTHS = 16
@@ -47,7 +45,7 @@ _PARTS = (6, 8, 16, 32)
 #: one.
 _FARTHEST = 2.0**32
 
-#: Tuning: windows tried before all of the same length.
+#: Method: windows tried before all of the same length.
 _FIRST_WINDOWS = 8
 
 
@@ -88,7 +86,7 @@ class Windows:
 
     @cached_property
     def _stretches(self) -> _Stretches:
-        if self._times.size < FEW_TIMES:
+        if self._times.size < INTERPOLATED_TIMES:
             return _NONE
         times = self._times
         length = self._length

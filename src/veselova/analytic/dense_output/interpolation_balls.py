@@ -21,19 +21,14 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
 from veselova.analytic.numerics.chebyshev_decay import MORE, SAMPLE, are_resolved, estimate_terms
 from veselova.mechanics.core.budget import checkpoint
+from veselova.tunings import BALL_INTERPOLANT_NODE, BALL_INTERPOLANT_TERM, BALL_INTERPOLATED_TIMES
 
 __all__ = ["WindowsInBalls"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: windows looked at for that, and times below which none is.
+#: Method: windows looked at for that.
 _SAMPLED = 40
-_FEW_TIMES = 300
-
-#: Tuning: what a motion at a node costs, and a term of the series at a time, in motions at a time:
-#: from n = 3 to 6, 30 to 100 digits.
-_NODE = 1.2
-_TERM = 1 / 600
 
 #: Calibrated: nodes taken over those expected, at so many working digits: series fall more slowly
 #: than they begin, so it grows with the logarithm of the digits, and is below one at fewer than 32.
@@ -65,7 +60,7 @@ class WindowsInBalls:
 
         ``sampled``: the motion in double precision at increasing times, columns (N, K) of size one.
         """
-        if len(times) < _FEW_TIMES:
+        if len(times) < BALL_INTERPOLATED_TIMES:
             return None
         xp = arithmetic
         first, last = (float(x) for x in (times[0], times[-1]))
@@ -76,7 +71,8 @@ class WindowsInBalls:
             nodes = math.ceil(
                 spare * estimate_terms(_samples(first, last, count, sampled), xp.digits)
             )
-            choices[len(times) * nodes * _TERM + count * nodes * _NODE] = count, nodes
+            at_times = len(times) * nodes * BALL_INTERPOLANT_TERM
+            choices[at_times + count * nodes * BALL_INTERPOLANT_NODE] = count, nodes
         cost = min(choices)
         if not cost < len(times):
             return None
@@ -85,7 +81,7 @@ class WindowsInBalls:
 
     def cost_at(self, times: int) -> float:
         """Return what so many times take once the nodes are known, in motions at a time."""
-        return times * self.nodes * _TERM
+        return times * self.nodes * BALL_INTERPOLANT_TERM
 
     def finer(self) -> WindowsInBalls:
         """Return the windows with more nodes."""

@@ -24,14 +24,14 @@ __all__ = ["ORDER", "PiecewisePolynomial"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: coefficients of a piece in time.
+#: Method: coefficients of a piece in time.
 ORDER = 20
 
 #: Derived: a Newton step of this size, in half pieces, leaves an error of a quarter of its square
 #: at most.
 _CONVERGED = 2e-8
 
-#: Tuning: times that are placed in their pieces at once, and of which powers are formed at once:
+#: Budget: times that are placed in their pieces at once, and of which powers are formed at once:
 #: they stay in the cache. No power of two: rows so far apart take turns in the same places of a
 #: cache.
 _PLACED = 64000

@@ -44,7 +44,7 @@ __all__ = ["Atlas"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: degree of the interpolants, and points at which each is compared with the tori
+#: Method: degree of the interpolants, and points at which each is compared with the tori
 #: themselves.
 _DEGREE = 18
 _TESTS = 7
@@ -54,7 +54,7 @@ _TESTS = 7
 _HALVINGS = 11
 _BOXES = (12, 18, 28, 42)
 
-#: Tuning: part of the other end, where a cut closes, that panels leave out.
+#: Method: part of the other end, where a cut closes, that panels leave out.
 _CLOSED = 2.0**-20
 
 #: Budget: interpolation errors of a panel that is kept: of series and modes, and relative ones of

@@ -31,7 +31,7 @@ FAR_DIGITS = 15
 _SPARE = 15
 _ATTEMPTS = 4
 
-#: Tuning: by how much the least coefficient is below the accuracy, at first: slow modes, and many
+#: Method: by how much the least coefficient is below the accuracy, at first: slow modes, and many
 #: of them, move τ₁ by more than their coefficients.
 _FEWER_MODES = 200.0
 

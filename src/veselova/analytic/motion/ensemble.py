@@ -32,11 +32,11 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Largest |m_k| of the boxes of modes that are tried, by genus; who needs more is left out.
+#: Method: largest |m_k| of the boxes of modes that are tried, by genus; who needs more is left out.
 _BOXES = {1: (12, 18, 28, 42), 2: (12, 18, 28, 42)}
 
-#: Numbers of nodes of an interval, and the radians that e^{2πim·z} with all |m_k| ≤ 1 then turns by
-#: one of ψ, but for few tori: tunings, of which the fewest make the fewest stacks.
+#: Method: numbers of nodes of an interval, and the radians that e^{2πim·z} with all |m_k| ≤ 1 then
+#: turns by one of ψ, but for few tori; the fewest choices make the fewest stacks.
 _NODE_COUNTS = (16, 24, 36, 64)
 _PACES = (1.6, 2.6, 4.0, 7.0)
 

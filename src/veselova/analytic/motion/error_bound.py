@@ -53,9 +53,10 @@ _RATE = 2.0
 #: double.
 _GUARDED_RATE = 1e-30
 
-#: Tuning: by how much dt/dτ₁ may vary before it is looked at, and times beyond which it is at so
-#: many of them.
+#: Calibrated: by how much dt/dτ₁ may vary before it is looked at.
 _WIDE = 10.0
+
+#: Budget: times at which it is looked at.
 _MANY = 10_000
 
 #: Derived: rounding of the principal axes and of a given frame along them, in ε, besides one for

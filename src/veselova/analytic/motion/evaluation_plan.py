@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.dense_output.chebyshev_window import NODES
-from veselova.analytic.dense_output.interpolation import FEW_TIMES, Windows
+from veselova.analytic.dense_output.interpolation import Windows
 from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
 from veselova.analytic.time_map.cost_model import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap, UniformTimeMap
 from veselova.mechanics.core.errors import Unsolved
+from veselova.tunings import INTERPOLATED_TIMES
 
 __all__ = ["EvaluationPlan"]
 
@@ -69,7 +70,7 @@ class EvaluationPlan:
         costs = Costs(solution.curve.genus, solution.modes, cycles, in_angles)
 
         def intervals(name: str) -> Windows:
-            few = times.size < FEW_TIMES
+            few = times.size < INTERPOLATED_TIMES
             fewest = times.size + 1 if few else costs.fewest_in_window(NODES, name)
             return Windows(times, solution.fastest, fewest, remainders)
 
@@ -80,7 +81,7 @@ class EvaluationPlan:
             chosen = "uniform"
         else:
             # The Fourier map is inverted at every time, or at the starts of intervals.
-            inversions = times.size if times.size < FEW_TIMES else by_fourier.inversions
+            inversions = times.size if times.size < INTERPOLATED_TIMES else by_fourier.inversions
             estimates = costs.estimates(inversions)
             chosen = _choose(solution, costs, inversions, time_map)
         return cls(

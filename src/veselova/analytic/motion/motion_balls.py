@@ -31,6 +31,7 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.tunings import BALL_THETA_SIZE
 from veselova.version import __version__
 
 __all__ = ["MotionInBalls"]
@@ -39,12 +40,9 @@ __all__ = ["MotionInBalls"]
 #: generic motion lose.
 _SPARE = 8
 
-#: Tuning: digits added beyond those that were missing, and attempts.
+#: Method: digits added beyond those that were missing, and attempts.
 _MORE = 4
 _ATTEMPTS = 6
-
-#: Tuning: moving directions up to which theta sums are shorter than inversions.
-_THETA_SIZE = 3
 
 #: Derived: significant digits of the numbers given out, beyond those asked for: the radius of a
 #: component of size one is not rounding.
@@ -121,7 +119,9 @@ class MotionInBalls:
         """
         # beside a direction that doubles do not see sums cancel
         size = moving_part(self.problem).size
-        harmless = size == coarse.moving.size <= _THETA_SIZE and coarse.default_method() == "theta"
+        harmless = (
+            size == coarse.moving.size <= BALL_THETA_SIZE and coarse.default_method() == "theta"
+        )
         short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
         return "theta" if short and not self.certified else "angles"
 

@@ -21,9 +21,7 @@ from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
-
-#: Tuning: by how much more a Fourier map with an odd part takes, whose modes are doubled.
-_GENERAL = 20.0
+from veselova.tunings import BALL_ODD_PART
 
 __all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes", "require_few_modes"]
 
@@ -99,7 +97,7 @@ def choose_time_map(
     known = known and orbit.has_fourier_map
     if known and modes <= MOST_MODES and not xp.certified:
         by_modes = costs.modes(modes, max(coarse.rate.needed_nodes), approximate.size)
-        by_modes *= _GENERAL if isinstance(orbit, GeneralOrbit) else 1
+        by_modes *= BALL_ODD_PART if isinstance(orbit, GeneralOrbit) else 1
     has_modes = costs.is_affordable(by_modes + further)
 
     def require_nodes(count: float) -> None:

@@ -28,7 +28,7 @@ from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
-from veselova.analytic.time_map.cost_model import RATE_GENUS, THETA_GENUS, estimate_modes
+from veselova.analytic.time_map.cost_model import estimate_modes
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -36,15 +36,11 @@ from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate, time_rat
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.tunings import RATE_CYCLES, RATE_GENUS, RATE_TERMS, THETA_GENUS
 
 __all__ = ["WIDEST_RATE", "Solution"]
 
 Array = NDArray[np.float64]
-
-#: Tuning: cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude
-#: has no use for it; and the terms of a sum that cost as much as an inversion.
-_RATE_CYCLES = {5: 10.0, 6: 40.0}
-_RATE_TERMS = 6e4
 
 #: Calibrated: entries of T from which angles are the more accurate route: a cut of relative width
 #: 1e-10 has 8.
@@ -129,9 +125,7 @@ class Solution:
         genus = self.curve.genus
         if method is not None or genus <= THETA_GENUS:
             return method == "angles"
-        return (
-            genus > RATE_GENUS or cycles < _RATE_CYCLES[genus] or self.quotients.cost > _RATE_TERMS
-        )
+        return genus > RATE_GENUS or cycles < RATE_CYCLES[genus] or self.quotients.cost > RATE_TERMS
 
     @cached_property
     def rate_constant(self) -> float:

@@ -43,6 +43,7 @@ from veselova.analytic.time_map.torus_series import NormalComponent
 from veselova.analytic.time_map.torus_series_balls import SeriesInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.tunings import BALL_PATH
 
 __all__ = ["SolutionInBalls"]
 
@@ -51,9 +52,6 @@ _NARROWEST = 1e-20
 
 #: Derived: digits of a share in |q|² and |q̇|² that doubles see.
 _SMALL_SHARE = 200
-
-#: Tuning: by how much more the series of a path take than the time map of a rank-one problem.
-_SERIES_OF_PATH = 10.0
 
 #: Budget: the smallest movement along a direction that is followed, beside those along others.
 _LEAST_DIGITS = 500
@@ -226,7 +224,7 @@ class SolutionInBalls:
             return False
         modes = estimate_modes(coarse, self.arithmetic.digits, self._costs.genus)
         nodes = max(coarse.rate.needed_nodes)
-        by_series = _SERIES_OF_PATH * self._costs.modes(modes, nodes, len(tau1))
+        by_series = BALL_PATH * self._costs.modes(modes, nodes, len(tau1))
         by_panels = self._costs.state * estimate_nodes(self.orbit, tau1.astype(float))
         if by_series < by_panels:
             self._costs.require_affordable(by_series)

@@ -25,6 +25,7 @@ from veselova.analytic.spectrum.branch_points_batch import Spectra
 from veselova.analytic.time_map.mode_tables import ModeTables, form_tables
 from veselova.analytic.time_map.rate import TimeRate, rate_factor
 from veselova.mechanics.core.budget import checkpoint
+from veselova.tunings import STACKED_DIMENSIONS
 
 __all__ = [
     "NODE_COUNTS",
@@ -50,9 +51,6 @@ NODE_COUNTS = (12, 16, 20, 24, 32, 40, 52, 64)
 #: Derived: largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i:
 #: products of them, and what these round, stay floats.
 _MOST_BINARY_DIGITS = 150
-
-#: Tuning: largest dimension: the orders of branch points are 2^(n−2), and few problems share one.
-_MOST_DIMENSIONS = 9
 
 
 #: Calibrated: relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
@@ -249,7 +247,7 @@ def torus_stacks(
     ``node_counts``: fewer stacks, or fewer nodes. A's have to be apart, no q_i may be zero and
     no direction at rest, and n is at most nine.
     """
-    if A.shape[1] > _MOST_DIMENSIONS:
+    if A.shape[1] > STACKED_DIMENSIONS:
         return
     chosen = known_starts(A, q, q_dot)
     if not chosen.size:

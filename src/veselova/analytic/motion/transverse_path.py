@@ -18,7 +18,7 @@ __all__ = ["FourierPath", "PanelPath", "TransversePath"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: by how much farther panels go than they are asked for.
+#: Method: by how much farther panels go than they are asked for.
 _FARTHER = 1.25
 
 

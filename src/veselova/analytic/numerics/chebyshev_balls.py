@@ -15,7 +15,7 @@ from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ChebyshevSeriesInBalls"]
 
-#: Tuning: points at once: their polynomials stay in the cache.
+#: Budget: points at once: their polynomials stay in the cache.
 _POINTS = 1000
 
 #: Derived: digits that recurrence loses in T_m: half a bit for every doubling of m, twice.

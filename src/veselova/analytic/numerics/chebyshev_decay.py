@@ -16,7 +16,7 @@ __all__ = ["MORE", "SAMPLE", "are_resolved", "estimate_terms"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: nodes of a series in double precision that shows how fast one falls, and the digits down
+#: Method: nodes of a series in double precision that shows how fast one falls, and the digits down
 #: to which it does.
 SAMPLE = 64
 _SAMPLE_DIGITS = 11

@@ -22,7 +22,7 @@ __all__ = ["Arrival", "CollisionOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: cycles of a swing of the phases from which the angles are led along the orbit.
+#: Method: cycles of a swing of the phases from which the angles are led along the orbit.
 _WIDE_SWING = 100.0
 
 #: Budget: points among which the first is looked for that is beyond a plane, and how often.

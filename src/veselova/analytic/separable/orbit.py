@@ -22,15 +22,13 @@ from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.errors import Unsolved
+from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
 __all__ = ["PHASES_LOST", "SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: cycles from which the Fourier time map is cheaper, to genus three; and those that panels
-#: are willing to cover.
-_FOURIER_FROM = 10.0
-_FOURIER_GENUS = 3
+#: Budget: cycles that panels cover.
 _MOST_CYCLES = 5e4
 
 #: Why an error leaves no digit.
@@ -76,7 +74,10 @@ class SeparableOrbit:
         """Return a time map for the given times, by cost; raises Unsolved (``too-far``) where it
         takes too many panels.
         """
-        if self._cycles(grid) > _FOURIER_FROM and self.motion.periods.genus <= _FOURIER_GENUS:
+        if (
+            self._cycles(grid) > SEPARABLE_FOURIER_CYCLES
+            and self.motion.periods.genus <= SEPARABLE_FOURIER_GENUS
+        ):
             return FourierTimeMap(self.rate, self.in_tau, self.in_time, self.rate.mean)
         self.require_panels(grid)
         return ChebyshevTimeMap(

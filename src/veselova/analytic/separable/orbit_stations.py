@@ -20,13 +20,13 @@ __all__ = ["OrbitStations"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: radians that the angles turn by between two stations, at first and at most, and the
+#: Method: radians that the angles turn by between two stations, at first and at most, and the
 #: shortest step, in parts of the first.
 _FIRST_TURN = 0.02
 _MOST_TURN = 0.5
 _LEAST_TURN = 1e-9
 
-#: Tuning: how far from its extrapolation a station may be, in radians.
+#: Method: how far from its extrapolation a station may be, in radians.
 _NEAR = 0.05
 
 #: Budget: stations before giving up: where intervals are as different as that, the narrowest is

@@ -33,7 +33,7 @@ _ROOM = 16
 #: Derived: Newton's steps from the zeros found to those digits.
 _STEPS = 2
 
-#: Tuning: a zero is looked for within this many times what its value leaves open, then within so
+#: Method: a zero is looked for within this many times what its value leaves open, then within so
 #: many times that, so often.
 _FIRST_REACH = 4
 _WIDER = 1000

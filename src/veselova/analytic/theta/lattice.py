@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.theta.characteristic import Characteristic
+from veselova.tunings import GAUSSIAN_TERMS, WAVE_TERMS
 
 __all__ = [
     "RADIUS",
@@ -56,11 +57,6 @@ RADIUS = math.sqrt(39.0 / math.pi)
 #: Derived: least eigenvalue of S for waves: there θ(z)/θ(0) stays above
 #: ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| = 0.42^|F|.
 _WAVE_FLOOR = 0.5
-
-#: Tuning: a Gaussian, and a wave with its cosine and sine, cost this many terms; functions with the
-#: same shifts share them.
-_BELL = 8.0
-_WAVE = 25.0
 
 #: Derived: a vector is shortened where the multiple of another that does it differs from ½ by more
 #: than rounding.
@@ -216,8 +212,8 @@ class _Factors:
         harmonics = _points(RADIUS / x for x in of_waves)
         return (
             gaussian_factors * harmonics
-            + _BELL * gaussian_factors
-            + (_WAVE * harmonics if of_waves else 0.0)
+            + GAUSSIAN_TERMS * gaussian_factors
+            + (WAVE_TERMS * harmonics if of_waves else 0.0)
         )
 
 

@@ -37,6 +37,7 @@ from veselova.analytic.theta.lattice import (
 )
 from veselova.analytic.theta.theta_tables import SIGNS, Family, Group
 from veselova.mechanics.core.budget import checkpoint
+from veselova.tunings import FEW_CLASSES
 
 __all__ = ["Theta"]
 
@@ -51,9 +52,6 @@ _QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
 #: Budget: entries of one block of (points × lattice): temporaries that stay in the cache.
 _BLOCK = 100_000
-
-#: Tuning: classes ε_F that are few enough for all of them to be found when the first is asked for.
-_FEW_CLASSES = 8
 
 
 @dataclass(frozen=True)
@@ -274,7 +272,7 @@ class Theta:
         one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all
         small.
         """
-        if (classes := 2 ** len(self._split[0])) <= _FEW_CLASSES:
+        if (classes := 2 ** len(self._split[0])) <= FEW_CLASSES:
             wanted = frozenset(range(classes))
         known = list(self._crossed)  # a copy: another thread may add to them
         if (

@@ -1,6 +1,6 @@
 """What an orbit costs, and which time map is the cheaper for given times: seconds on one core.
 
-Their units are the tunings of analytic.time_map.tuned_costs.
+The seconds of their parts are in ``veselova.tunings``.
 
 The Fourier time map costs its modes once, and all of them again at every inversion; panels cost
 evaluations all along the orbit, and their inversions nothing to speak of. A window of many times
@@ -13,25 +13,28 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from veselova.analytic.time_map.tuned_costs import (
+from veselova.tunings import (
     EVALUATION,
     EVALUATION_IN_ANGLES,
+    FIRST_MODES,
+    LONGER_PANELS,
     MODE,
     MODE_INVERTED,
     PANEL_CYCLE,
     PANEL_CYCLE_IN_ANGLES,
     PANEL_INVERSION,
-    grow,
+    PROBED_CYCLES,
+    RATE_GENUS,
+    THETA_GENUS,
 )
 
 __all__ = [
     "GUARDED_FROM",
     "GUARD_DIGITS",
     "PANEL_CYCLES",
-    "RATE_GENUS",
-    "THETA_GENUS",
     "Costs",
     "estimate_modes",
+    "grow",
 ]
 
 #: Derived: cycles of the fastest phase from which frequencies are computed with guard digits;
@@ -45,7 +48,7 @@ GUARD_DIGITS = 30
 PANEL_CYCLES = 5e4
 _MOST_MODES = 2e5
 
-#: Tuning: largest genus at which guard digits decide for the Fourier time map, which keeps them,
+#: Budget: largest genus at which guard digits decide for the Fourier time map, which keeps them,
 #: whatever it costs; and at which it is the last resort where panels do not reach.
 _GUARDED_GENUS = 3
 _LAST_RESORT_GENUS = 5
@@ -58,19 +61,12 @@ _COUNTED_GENUS = 5
 #: Derived: modes of a time map that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
 
-#: Tuning: modes that take as long as what a Fourier time map begins with, at its set-up and at
-#: every inversion.
-_FIRST_MODES = 60
 
-#: Tuning: largest genus at which theta quotients cost less than inversion in angles, 4 µs a point
-#: and 10 (24 and 8 at the next); and at which dt/dτ₁, of two functions, comes from them.
-THETA_GENUS = 4
-RATE_GENUS = 6
-
-#: Tuning: beyond 80 cycles, where panels are longer, what finding their length takes in cycles, and
-#: the part of the evaluations that is left.
-_PROBES = 48.0
-_LONGER_PANELS = 0.4
+def grow(cost: tuple[float, float], genus: int) -> float:
+    """Return a cost at a genus, from that at genus 1 and its growth."""
+    first, growth = cost
+    seconds: float = first * growth ** (genus - 1)
+    return seconds
 
 
 def estimate_modes(genus: int, log_determinant: float) -> float:
@@ -102,7 +98,7 @@ class Costs:
         evaluation = grow(EVALUATION, self.genus) if by_theta else EVALUATION_IN_ANGLES * self.genus
         inversion = PANEL_INVERSION
         if time_map == "fourier":
-            inversion = (_FIRST_MODES + self.modes) * MODE_INVERTED
+            inversion = (FIRST_MODES + self.modes) * MODE_INVERTED
         return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
 
     def seconds(self, time_map: str, inversions: int) -> float:
@@ -112,10 +108,10 @@ class Costs:
         if time_map == "fourier":
             if self.modes > _MOST_MODES:
                 return math.inf
-            return (_FIRST_MODES + self.modes) * (MODE + inversions * MODE_INVERTED)
+            return (FIRST_MODES + self.modes) * (MODE + inversions * MODE_INVERTED)
         if self.cycles > PANEL_CYCLES:
             return math.inf
-        cycles = min(self.cycles, _PROBES + _LONGER_PANELS * self.cycles) + 1
+        cycles = min(self.cycles, PROBED_CYCLES + LONGER_PANELS * self.cycles) + 1
         by_theta = self.genus <= RATE_GENUS and not self.in_angles
         cycle = grow(PANEL_CYCLE, self.genus) if by_theta else PANEL_CYCLE_IN_ANGLES * self.genus
         return cycles * cycle + inversions * PANEL_INVERSION

@@ -8,15 +8,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from veselova.analytic.time_map.tuned_costs import (
-    BALL_ENTRY,
-    BALL_INVERSION,
-    BALL_MODE,
-    BALL_THETA,
-    grow,
-)
+from veselova.analytic.time_map.cost_model import grow
 from veselova.mechanics.core.budget import checkpoint, has_budget, stated_s
 from veselova.mechanics.core.errors import OverBudget, Unsolved, two_digits
+from veselova.tunings import (
+    BALL_DIGITS,
+    BALL_ENTRY,
+    BALL_FIRST_TERMS,
+    BALL_GENUS,
+    BALL_INVERSION,
+    BALL_MODE,
+    BALL_MODE_AT_TIME,
+    BALL_MODE_FIXED,
+    BALL_MODE_GENUS_GROWTH,
+    BALL_MODE_GENUS_ONE,
+    BALL_MODE_GROWTH,
+    BALL_NODES,
+    BALL_SET_UP,
+    BALL_TERM_DIGITS,
+    BALL_THETA,
+    BALL_THETA_GROWTH,
+    BALL_TIME,
+)
 
 __all__ = ["CostsInBalls"]
 
@@ -24,32 +37,6 @@ __all__ = ["CostsInBalls"]
 #: budget, as it may be twice too large.
 _LONGEST_S = 30.0
 _SLACK = 2.0
-
-#: Tuning: terms of an angle series that take as long as what a series begins with; the digits at
-#: which a term takes twice what it takes at few; and what a set-up takes in inversions.
-_FIRST_TERMS = 30
-_TERM_DIGITS = 35.0
-_SET_UP = 30.0
-
-#: Tuning: the digits and nodes of the costs measured, and by what powers of the digits they grow.
-_DIGITS = 60
-_NODES = 24
-_THETA_GROWTH = 1.3
-_MODE_GROWTH = 2.0
-
-#: Tuning: how the cost of a mode grows with the genus, and the part of it that no digits enter; a
-#: mode at a time against a mode; at genus 1, where sums are formed in balls, all take so many times
-#: as long.
-_MODE_GENUS_GROWTH = 1.9
-_FIXED = 0.5
-_MODE_AT_TIME = 2e-3
-_IN_BALLS = 10.0
-
-#: Tuning: seconds of a time, whatever the modes.
-_TIME = 1e-4
-
-#: Tuning: largest genus of the formulas: higher ones cost as much.
-_HIGHEST_GENUS = 4
 
 
 @dataclass(frozen=True)
@@ -71,17 +58,17 @@ class CostsInBalls:
 
     @property
     def _kind(self) -> int:
-        return min(self.genus, _HIGHEST_GENUS)
+        return min(self.genus, BALL_GENUS)
 
     @property
     def _inversion(self) -> float:
-        of_term = BALL_INVERSION * (_TERM_DIGITS + self.digits) / (_TERM_DIGITS + _DIGITS)
-        return (1 + self.genus**2) * (_FIRST_TERMS + self.terms) * of_term
+        growth = (BALL_TERM_DIGITS + self.digits) / (BALL_TERM_DIGITS + BALL_DIGITS)
+        return (1 + self.genus**2) * (BALL_FIRST_TERMS + self.terms) * BALL_INVERSION * growth
 
     @property
     def set_up(self) -> float:
         """Return the seconds of everything that does not depend on times."""
-        return _SET_UP * self._inversion
+        return BALL_SET_UP * self._inversion
 
     @property
     def rate(self) -> float:
@@ -100,7 +87,7 @@ class CostsInBalls:
         return BALL_ENTRY * n * n
 
     def _by_theta(self, part: str) -> float:
-        growth: float = (self.digits / _DIGITS) ** _THETA_GROWTH
+        growth: float = (self.digits / BALL_DIGITS) ** BALL_THETA_GROWTH
         return grow(BALL_THETA[part], self._kind) * growth
 
     def modes(self, count: float, nodes: int, times: int) -> float:
@@ -108,11 +95,11 @@ class CostsInBalls:
 
         ``nodes``: the most that a cut takes in doubles.
         """
-        mode = BALL_MODE * _MODE_GENUS_GROWTH ** (self._kind - 3)
-        mode *= _IN_BALLS if self.genus == 1 else 1.0
-        growth = (self.digits / _DIGITS) ** _MODE_GROWTH * (nodes / _NODES) ** 2
-        at_times = times * (count * _MODE_AT_TIME * mode + _TIME)
-        return float(count * mode * (_FIXED + growth) + at_times)
+        mode = BALL_MODE * BALL_MODE_GENUS_GROWTH ** (self._kind - 3)
+        mode *= BALL_MODE_GENUS_ONE if self.genus == 1 else 1.0
+        growth = (self.digits / BALL_DIGITS) ** BALL_MODE_GROWTH * (nodes / BALL_NODES) ** 2
+        at_times = times * (count * BALL_MODE_AT_TIME * mode + BALL_TIME)
+        return float(count * mode * (BALL_MODE_FIXED + growth) + at_times)
 
     def is_affordable(self, seconds: float) -> bool:
         """Return whether work of so many seconds is begun: within the budget, or a default."""

@@ -36,6 +36,7 @@ from veselova.mechanics.core.budget import checkpoint
 
 __all__ = [
     "COLUMN_ROUNDING",
+    "LEAST_SLOPE",
     "SMALLEST_MODE",
     "ColumnsForModes",
     "FourierTimeMap",
@@ -53,16 +54,16 @@ SMALLEST_MODE = 4e-16
 #: hardly ever exceeded.
 COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: Tuning: radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
+#: Method: radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
 _SPARE_PACE = 16
 
-#: Tuning: modes that bring the inverse time map near its answer before all of them are summed: the
+#: Method: modes that bring the inverse time map near its answer before all of them are summed: the
 #: fewest, and their part.
 _FIRST_MODES = 64
 _FIRST_PART = 1 / 16
 
-#: Tuning: smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
-_LEAST_SLOPE = 0.05
+#: Method: smallest dt/dτ₁, as a part of its mean, that a step of the inverse time map divides by.
+LEAST_SLOPE = 0.05
 
 #: Budget: by how much the times elapsed of which errors are told apart may differ.
 _MOST_ELAPSED = 1e12
@@ -212,7 +213,7 @@ class FourierTimeMap(TimeMap):
         t(τ₁) ∝ x + ax² + bx³ + cx⁴ …
         """
         least = self._mean - 2 * float(np.sum(np.abs(coefficients)))
-        if least < _LEAST_SLOPE * self._mean:
+        if least < LEAST_SLOPE * self._mean:
             return _CONVERGED / self._fastest
         a, b, c = (
             float(np.sum(np.abs(coefficients * pace**k))) / (least * d)
@@ -240,7 +241,7 @@ class FourierTimeMap(TimeMap):
             value, *rise = self._first.at(uniform)
             delta = np.maximum(
                 np.minimum(
-                    -value / np.maximum(fourth_order_divisor(value, *rise), _LEAST_SLOPE * mean),
+                    -value / np.maximum(fourth_order_divisor(value, *rise), LEAST_SLOPE * mean),
                     reach,
                 ),
                 -reach,

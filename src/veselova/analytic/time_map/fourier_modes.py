@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Integers", "TorusSeries", "find_significant_modes", "largest_first", "with_slow_phases"]
+__all__ = [
+    "SLOW",
+    "Integers",
+    "TorusSeries",
+    "find_significant_modes",
+    "largest_first",
+    "with_slow_phases",
+]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -22,8 +29,9 @@ Integers = NDArray[np.int64]
 #: Budget: modes looked at before giving up.
 _MOST_MODES = 1_000_000
 
-#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start.
-_SLOW = 4.0
+#: Method: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start:
+#: beyond, m·z has to be a phase of its own.
+SLOW = 4.0
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Intege
     ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
     too much of that, the mode is a multiple of a slow combination.
     """
-    slow = (pull * np.max(np.abs(rates)) > _SLOW * np.pi * np.abs(modes @ rates)) & (
+    slow = (pull * np.max(np.abs(rates)) > SLOW * np.pi * np.abs(modes @ rates)) & (
         np.count_nonzero(modes, axis=1) > 1
     )
     if not slow.any():

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.double_double import exact_product
-from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, SMALLEST_MODE
+from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, LEAST_SLOPE, SMALLEST_MODE
+from veselova.analytic.time_map.fourier_modes import SLOW
 from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ModeTables", "TimeMaps", "form_tables", "fourier_coefficients", "orders_of"]
@@ -25,7 +26,7 @@ __all__ = ["ModeTables", "TimeMaps", "form_tables", "fourier_coefficients", "ord
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Tuning: largest |m_k| of the first steps towards τ₁.
+#: Method: largest |m_k| of the first steps towards τ₁.
 COARSE = 3
 
 #: Derived: cycles of the fastest phase of which a last step of Newton's method leaves its square.
@@ -36,13 +37,6 @@ STANDING = 1e-300
 
 #: Budget: steps before a torus is left to others: four to six are usual.
 MOST_STEPS = 30
-
-#: Tuning: smallest dt/dτ₁, as a part of its mean, that the first step divides by.
-LEAST_SLOPE = 0.05
-
-#: Tuning: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start:
-#: beyond, m·z has to be a phase of its own, as analytic.time_map.fourier has it.
-SLOW = 4.0
 
 
 @dataclass(frozen=True)

@@ -15,23 +15,22 @@ from veselova.analytic.time_map.chebyshev_panels import TAIL, Panels, are_settle
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
+from veselova.tunings import MANY_PANELS
 
 __all__ = ["integrate_between", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: points per panel, of a short stretch and of a long one.
+#: Method: points per panel, of a short stretch and of a long one.
 _FEW_NODES = 24
 _NODES = 48
 
-#: Tuning: panels beyond an end, as ends come from means; none beyond one so near that going on,
+#: Method: panels beyond an end, as ends come from means; none beyond one so near that going on,
 #: where it is short, costs little.
 _MARGIN = 2
 _NEAR = 4
 
-#: Tuning: panels of few nodes from which it pays to look for longer ones; lengths of these in
-#: those, and how many are looked at.
-_MANY_PANELS = 200
+#: Method: lengths of longer panels in those of few nodes, and how many are looked at.
 _LONGER = (7, 6, 5, 4, 3.5, 3, 2.5)
 _PROBED = 8
 
@@ -92,7 +91,7 @@ def integrate_together(
         _FEW_NODES,
         2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates)))),
     )
-    if (high - low) / panels.length >= _MANY_PANELS:
+    if (high - low) / panels.length >= MANY_PANELS:
         panels = panels.longer(low, high)
     lefts = panels.lefts(low, high)
     lengths = np.full(lefts.size, panels.length)

@@ -26,7 +26,7 @@ _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 #: matter.
 _TURN = 3 * np.pi
 
-#: Tuning: cycles over which all other parts average out, and the highest order at which some are
+#: Method: cycles over which all other parts average out, and the highest order at which some are
 #: looked for.
 _AVERAGED = 16.0
 _HIGHEST = 8

@@ -30,16 +30,16 @@ from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["ChebyshevTimeMapInBalls", "estimate_nodes"]
 
-#: Tuning: half length of a panel in half widths of the strip: longer ones take hardly fewer nodes
+#: Method: half length of a panel in half widths of the strip: longer ones take hardly fewer nodes
 #: for a length.
 _PANEL_IN_STRIPS = 3.0
 
-#: Tuning: half length of a panel in cycles of the fastest phase, where truncation is judged by the
+#: Method: half length of a panel in cycles of the fastest phase, where truncation is judged by the
 #: coefficients themselves; at most so many half widths of the strip.
 _PANEL_IN_CYCLES = 1.0
 _LONGEST_IN_STRIPS = 8.0
 
-#: Tuning: nodes per cycle and digit.
+#: Method: nodes per cycle and digit.
 _NODES_PER_DIGIT = 2.6
 
 #: Budget: nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the
@@ -58,7 +58,7 @@ _EXTRA_TERMS = 6
 _BEYOND = 1 + 1e-9
 _CYCLES_BEYOND = 1e-12
 
-#: Tuning: by how much panels are made longer where they end before the last time, at the least.
+#: Method: by how much panels are made longer where they end before the last time, at the least.
 _LONGER = 1.25
 
 #: Derived: a root in double precision is taken where its residual is below this, in half lengths of

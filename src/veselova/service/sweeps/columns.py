@@ -18,6 +18,7 @@ from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.request_models import TrajectoryRequest
 from veselova.service.api.sweep_parameters import Path, components, is_double, replace_values
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.tunings import TIMES_SIDE_BY_SIDE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -108,7 +109,7 @@ def columns_at_once(
 
 def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> dict[int, Answer]:
     """Return the columns of those motions that can be computed side by side, and what is kept."""
-    from veselova.ensembles import MOST_TIMES_TOGETHER, Starts, side_by_side
+    from veselova.ensembles import Starts, side_by_side
 
     requests = {row: sweep.request_of(places) for row, places in values.items()}
     if not requests:
@@ -118,7 +119,7 @@ def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> d
     first = requests[rows[0]]
     assert isinstance(first, TrajectoryRequest)
     grid = first.time_grid()
-    if grid.doubles.size > MOST_TIMES_TOGETHER:
+    if grid.doubles.size > TIMES_SIDE_BY_SIDE:
         return {}
     starts = Starts.of(problems)
     places = slice(None) if grid.places is None else grid.places

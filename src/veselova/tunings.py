@@ -1,0 +1,153 @@
+"""Tunings: which of two ways is the faster, measured; the answer is as good by either.
+
+They stand here, beside the command that measures them, because machines differ and formulas do not.
+A tuning that is twice off costs some time. No bound on an error depends on one, and no value but
+in its rounding. ``python benchmarks/tunings.py NAME`` times the work that a tuning decides about,
+with half of it, with itself and with twice as much.
+"""
+
+from __future__ import annotations
+
+# ---------- Seconds on one core: python benchmarks/costs.py fits them ----------
+
+#: Tuning: seconds of a state by theta functions at genus 1, and its growth from one genus to the
+#: next; of a state in angles, per genus.
+EVALUATION = (0.3e-6, 2.7)
+EVALUATION_IN_ANGLES = 2e-6
+
+#: Tuning: seconds of a cycle of the fastest phase on panels of dt/dτ₁, in the same way.
+PANEL_CYCLE = (2.5e-5, 1.45)
+PANEL_CYCLE_IN_ANGLES = 1.3e-4
+
+#: Tuning: seconds of a Fourier mode, and of one at every time that is inverted.
+MODE = 11e-6
+MODE_INVERTED = 0.015e-6
+
+#: Tuning: seconds of a time inverted on panels that are there.
+PANEL_INVERSION = 2e-6
+
+#: Tuning: modes that take as long as what a Fourier time map begins with, at its set-up and at
+#: every inversion.
+FIRST_MODES = 60
+
+#: Tuning: beyond 80 cycles, where panels are longer, what finding their length takes in cycles, and
+#: the part of the evaluations that is left.
+PROBED_CYCLES = 48.0
+LONGER_PANELS = 0.4
+
+# ---------- Seconds in balls: python benchmarks/costs_in_balls.py compares estimates ----------
+
+#: Tuning: digits and nodes at which the costs in balls are measured.
+BALL_DIGITS = 60
+BALL_NODES = 24
+
+#: Tuning: seconds of a term of an angle series of one point; of dt/dτ₁ by theta functions at genus
+#: 1, and its growth from one genus to the next; the same of a state; of a Fourier mode at genus 3.
+BALL_INVERSION = 0.7e-6
+BALL_THETA = {"rate": (8e-5, 2.6), "state": (9e-5, 5.0)}
+BALL_MODE = 1.2e-4
+
+#: Tuning: seconds of an entry of the frame with the other series; and of a time, whatever the
+#: modes.
+BALL_ENTRY = 6e-6
+BALL_TIME = 1e-4
+
+#: Tuning: terms of an angle series that take as long as what a series begins with; the digits at
+#: which a term takes twice what it takes at few; and what a set-up takes in inversions.
+BALL_FIRST_TERMS = 30
+BALL_TERM_DIGITS = 35.0
+BALL_SET_UP = 30.0
+
+#: Tuning: by what powers of the digits the costs of theta functions and of modes grow.
+BALL_THETA_GROWTH = 1.3
+BALL_MODE_GROWTH = 2.0
+
+#: Tuning: how the cost of a mode grows with the genus, and the part of it that no digits enter; a
+#: mode at a time against a mode; at genus 1, where sums are formed in balls, all take so many times
+#: as long.
+BALL_MODE_GENUS_GROWTH = 1.9
+BALL_MODE_FIXED = 0.5
+BALL_MODE_AT_TIME = 2e-3
+BALL_MODE_GENUS_ONE = 10.0
+
+#: Tuning: largest genus of the formulas: higher ones cost as much.
+BALL_GENUS = 4
+
+#: Tuning: by how much more a Fourier time map with an odd part takes, whose modes are doubled; and
+#: the series of a path.
+BALL_ODD_PART = 20.0
+BALL_PATH = 10.0
+
+#: Tuning: what a motion at a node of an interpolant takes, and a term of the series at a time, in
+#: motions at a time: from n = 3 to 6, 30 to 100 digits.
+BALL_INTERPOLANT_NODE = 1.2
+BALL_INTERPOLANT_TERM = 1 / 600
+
+# ---------- Which way: python benchmarks/tunings.py NAME ----------
+
+#: Tuning: largest genus at which theta quotients cost less than inversion in angles, 4 µs a point
+#: and 10 (24 and 8 at the next); and at which dt/dτ₁, of two functions, comes from them.
+THETA_GENUS = 4
+RATE_GENUS = 6
+
+#: Tuning: cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude
+#: has no use for it, by genus; and the terms of a sum that cost as much as an inversion.
+RATE_CYCLES = {5: 10.0, 6: 40.0}
+RATE_TERMS = 6e4
+
+#: Tuning: moving directions up to which theta sums in balls are shorter than inversions.
+BALL_THETA_SIZE = 3
+
+#: Tuning: times from which interpolants are worth their overhead, in doubles and in balls.
+INTERPOLATED_TIMES = 500
+BALL_INTERPOLATED_TIMES = 300
+
+#: Tuning: panels of few nodes from which it pays to look for longer ones.
+MANY_PANELS = 200
+
+#: Tuning: cycles from which a motion in a separable potential takes the Fourier time map, and the
+#: largest genus at which it does.
+SEPARABLE_FOURIER_CYCLES = 10.0
+SEPARABLE_FOURIER_GENUS = 3
+
+#: Tuning: a Gaussian, and a wave with its cosine and sine, cost so many terms of a theta sum;
+#: functions with the same shifts share them.
+GAUSSIAN_TERMS = 8.0
+WAVE_TERMS = 25.0
+
+#: Tuning: classes of a split lattice that are few enough for all of them to be found when the first
+#: is asked for.
+FEW_CLASSES = 8
+
+#: Tuning: moduli of elliptic integrals that are done one by one: a call costs more than an entry.
+FEW_MODULI = 16
+
+#: Tuning: angles times orders of which each takes its own sine and cosine: the fewer calls are
+#: worth more than what they cost.
+FEW_SINES = 600
+
+#: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
+MANY_NODES = 300
+
+# ---------- Many starts: python benchmarks/ensembles.py ----------
+
+#: Tuning: states from which loading numba and machine code that is kept pays for itself, half a
+#: second, and from which compiling does, half a minute.
+LOADED_STATES = 10_000
+COMPILED_STATES = 300_000
+
+#: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
+#: interpolates, is as fast.
+TIMES_SIDE_BY_SIDE = 200
+
+#: Tuning: largest dimension of tori computed side by side: the orders of branch points are 2^(n−2),
+#: and few problems share one.
+STACKED_DIMENSIONS = 9
+
+# ---------- Integration: python benchmarks/integrators.py ----------
+
+#: Tuning: from this many equations, or operations in them (shared ones counted wherever they
+#: occur), heyoka compiles in its compact mode: it compiles in a second where unrolled code takes
+#: minutes, and runs up to 2× slower.
+COMPACT_EQUATIONS = 22
+COMPACT_OPERATIONS = 4000
