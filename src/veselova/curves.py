@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.curve.abel_images import Halves, image_of
 from veselova.analytic.curve.nodal_forms import difference_product
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.analytic.curve.riemann_matrices import riemann_matrices
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
@@ -45,20 +46,23 @@ from veselova.mechanics.results.curve import (
     QUASI_PERIODS,
     CurveData,
     QuasiPeriods,
+    RiemannMatrices,
     ThomaeConstant,
 )
 
 if TYPE_CHECKING:
     from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
 
-__all__ = ["CurvePeriods", "RealHyperelliptic", "ThomaeConstant"]
+__all__ = [
+    "CurvePeriods",
+    "RealHyperelliptic",
+    "RiemannMatrices",
+    "ThomaeConstant",
+    "riemann_matrices",
+]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-#: Rounding of an entry of T in ε, for each unit by which its periods cancel; largest seen over
-#: random curves: 6.
-_ENTRY_ROUNDING = 16 * float(np.finfo(float).eps)
 
 #: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
 _MOST_SUBSETS = 400_000
@@ -228,10 +232,7 @@ class RealHyperelliptic:
     @cached_property
     def riemann_matrix_error(self) -> float:
         """Return a bound on the error of every entry of the Riemann matrix."""
-        periods = self._curve.periods
-        largest = float(np.max(np.abs(periods.riemann_matrix)))
-        cancelling = max(1.0, float(np.max(periods.cancellation)))
-        return largest * max(_ENTRY_ROUNDING * cancelling, 2 * periods.riemann_matrix_residual)
+        return float(self._curve.periods.riemann_matrix_error)
 
     @cached_property
     def decimals(self) -> Decimals | None:

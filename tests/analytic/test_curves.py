@@ -76,6 +76,71 @@ def test_near_coincident_branch_points_keep_their_digits(gap: str) -> None:
     assert np.max(np.abs(other.riemann_matrix - other.riemann_matrix.T)) == 0
 
 
+def test_riemann_matrices_of_many_curves_are_those_of_each() -> None:
+    """Points in any order, gaps to 1e-12 of the span anywhere and to 1e-90 about zero, any unit."""
+    random = np.random.default_rng(9)
+    for count in range(3, 18):
+        for narrow in (0, 3, 12):
+            rows = np.cumsum(10 ** -random.uniform(0, narrow, (4, count)), axis=1)
+            if narrow == 12:
+                rows[1] = random.choice([-1, 1], count) * 10 ** -random.uniform(0, 45, count)
+                rows[2] = (rows[1] * random.uniform(1, 2, count)) * 1e200
+            sign = int(random.choice([-1, 1]))
+            found = curves.riemann_matrices(random.permuted(rows, axis=1), sign)
+            for row, tau, error in zip(rows.tolist(), *found, strict=True):
+                alone = curves.RealHyperelliptic(row, sign)
+                off = np.max(np.abs(tau - alone.riemann_matrix))
+                assert off <= error + alone.riemann_matrix_error
+
+
+@pytest.mark.parametrize("digits", [1, 8, 12, 15])
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("count", [3, 4, 7, 8])
+def test_errors_of_riemann_matrices_bound_the_true_ones(count: int, sign: int, digits: int) -> None:
+    random = np.random.default_rng([10, count, sign + 1, digits])
+    rows = np.sort(random.uniform(-1, 1, (5, count)), axis=1)
+    near = np.arange(5) % (count - 1)
+    rows[np.arange(5), near + 1] = rows[np.arange(5), near] + 10.0**-digits
+    found = curves.riemann_matrices(rows, sign)
+    for row, tau, error in zip(rows.tolist(), *found, strict=True):
+        decimals = curves.RealHyperelliptic(row, sign, digits=30).decimals
+        assert decimals is not None
+        exact = decimals.midpoints["riemann_matrix"]
+        off = np.vectorize(Decimal, otypes=[object])(tau.imag) - exact
+        assert np.max(np.abs(off)) <= Decimal(float(error))
+        assert error < 1e-13 * max(1, np.max(np.abs(tau)))
+
+
+def test_no_riemann_matrix_depends_on_other_curves() -> None:
+    rows = np.cumsum(np.random.default_rng(11).uniform(0.01, 2, (300, 6)), axis=1)
+    together = curves.riemann_matrices(rows)
+    for part in (slice(7, 8), slice(100, 160)):
+        some = curves.riemann_matrices(rows[part])
+        assert np.array_equal(some.tau, together.tau[part])
+        assert np.array_equal(some.error, together.error[part])
+    assert curves.riemann_matrices(np.empty((0, 5))).tau.shape == (0, 2, 2)
+
+
+def test_bad_rows_of_branch_points_are_named() -> None:
+    """Every one of them, and one by its exact differences."""
+    for rows, fields in (
+        ([[0, 1, 2], [3, 1, 3], [0, float("nan"), 1j]], ["[1][2]", "[2][1]", "[2][2]"]),
+        ([[0, 1, 2], [0, 1e-200, 1], [0, 5e-324, 1]], ["[1]", "[2]"]),
+        ([[-1, -1e-190, 0, 1e-300]], ["[0]"]),
+        ([["0", "1", "2"]], [""]),
+        ([[0, 1, 2], [0, 1]], [""]),
+        ([0, 1, 2], [""]),
+        ([[0, 1]], [""]),
+        (None, [""]),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            curves.riemann_matrices(rows, 3 if fields == [""] else 1)  # type: ignore[arg-type]
+        expected = [f"branch_points{field}" for field in fields]
+        assert [fault.field for fault in caught.value.faults] == expected + ["sign"] * (
+            fields == [""]
+        )
+
+
 @pytest.mark.parametrize(("count", "sign"), CASES)
 def test_the_divisor_of_a_function_maps_to_zero(count: int, sign: int) -> None:
     """Abel's theorem for w − p(λ): real and complex points, on every interval and sheet."""

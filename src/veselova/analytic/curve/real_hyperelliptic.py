@@ -31,7 +31,7 @@ from veselova.analytic.curve.periods import Periods
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import over_common_denominator
 
-__all__ = ["RealCurve"]
+__all__ = ["SMALLEST_GAP", "RealCurve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -44,24 +44,25 @@ _QUADRATURE = 1e-13
 
 #: The nearest two β's over the span of all: below it products of elliptic integrals leave the range
 #: of a double.
-_SMALLEST_GAP = Fraction(1, 10**100)
+SMALLEST_GAP = Fraction(1, 10**100)
 
 
 @dataclass(frozen=True)
 class RealCurve:
     """The curve w² = sign·Π(λ−b_j) of distinct rationals b_j, increasing, and its data in the
-    coordinate μ.
+    coordinate μ; ``path`` is where messages find the b_j.
     """
 
     points: tuple[Fraction, ...]
     sign: int
+    path: tuple[str | int, ...] = ("branch_points",)
 
     def __post_init__(self) -> None:
         gap = min(after - before for before, after in pairwise(self.betas))
-        if gap < _SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
+        if gap < SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
             moved = ", the largest moved to infinity," if self.is_even else ""
             raise InvalidInput(
-                ("branch_points",),
+                self.path,
                 f"differences of neighbours{moved} of at least 1e-100 of their span",
                 "a smaller one",
             )

@@ -20,6 +20,7 @@ __all__ = [
     "LARGEST_GENUS",
     "curve_arguments",
     "curve_outputs",
+    "curve_rows",
     "exact_points",
     "points_with_sheets",
     "torus_points",
@@ -52,15 +53,55 @@ def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...]
     """
     faults = Faults()
     points = faults.attempt(_branch_points, branch_points)
-    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
-        faults.add(("sign",), "1 or −1", show(sign))
+    faults.attempt(_require_sign, sign)
     faults.require_none()
     assert points is not None
     return points, int(sign)
 
 
-def _branch_points(given: Any) -> tuple[Fraction, ...]:
+def curve_rows(branch_points: Any, sign: Any) -> tuple[NDArray[np.float64], int]:
+    """Return the branch points of many curves, (N, 2g+1) or (N, 2g+2) doubles, each row increasing,
+    and the sign of w² = sign·Π(λ−b_j).
+
+    Raises InvalidInput, with all faults.
+    """
+    faults = Faults()
+    rows = faults.attempt(_rows, branch_points)
+    faults.attempt(_require_sign, sign)
+    faults.require_none()
+    assert rows is not None
+    return rows, int(sign)
+
+
+def _rows(given: Any) -> NDArray[np.float64]:
     path = ("branch_points",)
+    most = 2 * LARGEST_GENUS + 2
+    required = f"rows of 3 to {most} doubles, as many in each (RealHyperelliptic takes text)"
+    try:
+        numbers = np.asarray(given)
+    except ValueError:  # rows of different lengths
+        raise InvalidInput(path, required, show(given)) from None
+    if numbers.dtype.kind not in "iufc" or np.ma.is_masked(given):
+        raise InvalidInput(path, required, show(given))
+    if numbers.ndim != 2 or not 3 <= numbers.shape[1] <= most:
+        raise InvalidInput(path, required, f"shape {numbers.shape}")
+    real = np.sort(numbers.real.astype(np.float64), axis=1)
+    proper = np.all(np.isfinite(real), axis=1) & np.all(np.diff(real, axis=1) > 0, axis=1)
+    faults = Faults()
+    for i in np.flatnonzero(~(proper & np.all(numbers.imag == 0, axis=1))).tolist():
+        faults.attempt(_branch_points, numbers[i].tolist(), (*path, i))
+    faults.require_none()
+    return real
+
+
+def _require_sign(sign: Any) -> None:
+    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
+        raise InvalidInput(("sign",), "1 or −1", show(sign))
+
+
+def _branch_points(
+    given: Any, path: tuple[str | int, ...] = ("branch_points",)
+) -> tuple[Fraction, ...]:
     required = f"3 to {2 * LARGEST_GENUS + 2} real numbers"
     items = _items(given, path, required)
     if not 3 <= len(items) <= 2 * LARGEST_GENUS + 2:

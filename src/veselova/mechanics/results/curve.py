@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
 
-__all__ = ["CURVE_MATRICES", "QUASI_PERIODS", "CurveData", "QuasiPeriods", "ThomaeConstant"]
+__all__ = [
+    "CURVE_MATRICES",
+    "QUASI_PERIODS",
+    "CurveData",
+    "QuasiPeriods",
+    "RiemannMatrices",
+    "ThomaeConstant",
+]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,6 +31,15 @@ QUASI_PERIODS = ("omega", "omega_prime", "eta", "eta_prime")
 
 #: Real arrays of a document, as they are.
 _PLAIN = ("branch_points", "cuts", "gaps", "characteristics")
+
+
+class RiemannMatrices(NamedTuple):
+    """Riemann matrices ``tau`` = iT (N, g, g), and bounds ``error`` of the errors of their entries,
+    (N,).
+    """
+
+    tau: Complex
+    error: Array
 
 
 @dataclass(frozen=True)
