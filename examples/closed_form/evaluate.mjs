@@ -23,7 +23,7 @@ function leastEigenvalue(T) { // by power iteration on trace·1 − T
   for (let k = 0; k < 500; k++) {
     x = times(T, x).map((y, i) => trace * x[i] - y);
     size = sqrt(dot(x, x));
-    x = x.map((y) => y / size);
+    x = x.map((y) => y / (size || 1)); // all zero where T is a number
   }
   return trace - size;
 }

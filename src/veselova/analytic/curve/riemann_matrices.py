@@ -26,12 +26,12 @@ __all__ = ["riemann_matrices"]
 
 Array = NDArray[np.float64]
 
-#: Tuning: numbers of nodes are rounded up to a multiple of this, so that few groups have many
+#: Method: numbers of nodes are rounded up to a multiple of this, so that few groups have many
 #: curves.
 _NODE_STEP = 8
 
 #: Budget: entries of the forms of one interval that are formed at once: they stay in the cache.
-_BLOCK = 1000000
+_BLOCK = 100_000
 
 
 def riemann_matrices(branch_points: ArrayLike, sign: int = -1) -> RiemannMatrices:
