@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.compiled.compiler import forced
+from veselova.analytic.compiled.compiler import compiled_loops
 
 A = np.linspace(1.6, 0.5, 3)
 RUNS, SINGLE, BATCH = 7, 10, 4
@@ -107,7 +107,7 @@ def solve_each(problems: list[vs.Veselova], times: Any) -> None:
 
 def by_arrays(work: Callable[[], object]) -> None:
     """Do something without compiled loops."""
-    with forced(False):
+    with compiled_loops(False):
         work()
 
 
@@ -119,7 +119,7 @@ def main(count: int) -> None:
     flow = vs.FlowMap(A)
     flow.solve(q[:10], v[:10], [1.0], normalize=True)
     taken = time.process_time() - began
-    with forced(True):  # compile, or load what is compiled
+    with compiled_loops(True):  # compile, or load what is compiled
         flow.solve(q[:10], v[:10], [1.0], normalize=True)
     print(f"{count} starts; the tables of FlowMap take {taken:.2f} s\n")
     names = ["times", "FlowMap", "by NumPy", "solve_many", "by NumPy", "solve", "heyoka"]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from veselova.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from veselova.analytic.compiled.compiler import compiled_loops as compiled_loops
     from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
     from veselova.engines import from_torus as from_torus
@@ -94,6 +95,7 @@ _HOMES = {
     "VeselovaSO3": "veselova.mechanics.systems.veselova_so3",
     "closed_form": "veselova.engines",
     "compare": "veselova.engines",
+    "compiled_loops": "veselova.analytic.compiled.compiler",
     "from_torus": "veselova.engines",
     "solve": "veselova.engines",
     "solve_many": "veselova.ensembles",

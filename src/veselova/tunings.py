@@ -129,6 +129,11 @@ FEW_SINES = 600
 #: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
 MANY_NODES = 300
 
+# ---------- Times of a motion: python benchmarks/orbit.py 2000 100 compares ways ----------
+
+#: Tuning: times of one motion up to which compiled loops serve; interpolation serves more.
+COMPILED_TIMES = 2000
+
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: states from which loading numba and machine code that is kept pays for itself, half a

@@ -135,10 +135,10 @@ def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> No
 def test_no_number_depends_on_what_was_computed_before(rng: np.random.Generator) -> None:
     pytest.importorskip("numba")
     given = {**starts(rng, 5, 3), "normalize": True}
-    with compiler.forced(True):
+    with compiler.compiled_loops(True):
         vs.solve_many(given, TIMES)
     found = vs.solve_many(given, TIMES)
-    with compiler.forced(False):
+    with compiler.compiled_loops(False):
         reference = vs.solve_many(given, TIMES)
     for name in ("frame", "q_dot", "tau1", "error"):
         assert np.array_equal(getattr(found, name), getattr(reference, name))

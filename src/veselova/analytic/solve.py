@@ -16,6 +16,7 @@ from veselova.analytic.motion.area_motion import AreaBody, largest_component, mo
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
 from veselova.analytic.motion.base import Motion
+from veselova.analytic.motion.compiled_motion import compiled_motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
 from veselova.analytic.motion.rank_one_so3 import motion_of_body
 from veselova.analytic.motion.separatrix import DepartureBound
@@ -241,6 +242,20 @@ class _TorusMotion(Motion[TorusProblem]):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "known": None}
+
+    def evaluate(self, grid: TimeGrid) -> Trajectory:
+        """Return the trajectory at validated times: by compiled loops, where these were asked for
+        and serve.
+        """
+        began = time.perf_counter()
+        named = self.method in (None, "angles") and self.time_map in (None, "fourier")
+        found = compiled_motion(self.problem, grid) if named else None
+        if found is None:
+            return super().evaluate(grid)
+        series = {"tau1": found.tau1[0], "q_dot": found.q_dot[0], "frame": found.frame[0]}
+        details = {"regime": "generic", "time_map": "fourier", "compiled": True}
+        provenance = Provenance.since(began, "analytic", "angles", details)
+        return Trajectory.on_grid(self.problem, grid, found.error[0], series, provenance, self)
 
     @cached_property
     def _solution(self) -> Solution:

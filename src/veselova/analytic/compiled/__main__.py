@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from veselova.analytic.compiled.compiler import forced
+from veselova.analytic.compiled.compiler import compiled_loops
 
 
 def main() -> None:
@@ -17,7 +17,7 @@ def main() -> None:
 
     A, q, q_dot = np.array([[3.0, 2, 1], [0.6, 0.1, 0.8], [0.1, 1, -0.2]])[:, None]
     times = TimeGrid.of([1.0])
-    with forced(True):
+    with compiled_loops(True):
         for _ in Atlas(A[0]).states(q, q_dot, times):
             pass
         for _ in states_of_starts(A, q, q_dot, times):

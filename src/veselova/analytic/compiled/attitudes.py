@@ -22,7 +22,18 @@ from veselova.analytic.arithmetic.elliptic_integrals import (
 from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.numerics.jacobi_elliptic import LARGEST_WAVE
 
-__all__ = ["Places", "Torus", "angle", "attitude", "cut_roots", "new_torus", "set_cut", "set_torus"]
+__all__ = [
+    "ASPECT",
+    "QUARTER",
+    "Places",
+    "Torus",
+    "angle",
+    "attitude",
+    "cut_roots",
+    "new_torus",
+    "set_cut",
+    "set_torus",
+]
 
 Array = NDArray[np.float64]
 
@@ -30,7 +41,7 @@ Array = NDArray[np.float64]
 _TERMS = max(1, math.ceil(math.sqrt(0.25 + DOUBLE.nats / math.pi) - 0.5))
 
 #: Where the constants of a cut stand in their row: of FourPoints, of Jacobi, then four series.
-_BEFORE, _WIDTH, _MODULUS, _COMPLEMENT, _QUARTER, _TILT, _SN, _CN, _DN, _SERIES = range(10)
+_BEFORE, _WIDTH, _MODULUS, _COMPLEMENT, QUARTER, _TILT, _SN, _CN, _DN, ASPECT, _SERIES = range(11)
 
 #: Derived: numbers of such a row.
 _ROW = _SERIES + 4 * (_TERMS + 1)
@@ -134,8 +145,9 @@ def set_cut(differences: Array, s: int, row: Array) -> None:
     quarter, conjugate = _quarter(complement), _quarter(modulus)
     is_direct = conjugate >= quarter
     nome = math.exp(-math.pi * max(conjugate / quarter, quarter / conjugate))
-    row[_BEFORE], row[_WIDTH], row[_QUARTER] = before, width, quarter
+    row[_BEFORE], row[_WIDTH], row[QUARTER] = before, width, quarter
     row[_MODULUS], row[_COMPLEMENT] = modulus, complement
+    row[ASPECT] = conjugate / quarter
     row[_TILT] = 0.0 if is_direct else quarter / conjugate
     terms = row[_SERIES:].reshape(4, _TERMS + 1)
     t2, t3, t4, sign, partial = 0.0, -1.0, -1.0, 1.0 - 2 * (_TERMS % 2), 0.0
@@ -217,8 +229,8 @@ def angle(below: float, above: float, increasing: bool, row: Array) -> float:
         v = math.sqrt(sn) * _carlson(cn, dn, 1.0)
     else:
         reflected = row[_COMPLEMENT] / dn
-        v = row[_QUARTER] - math.sqrt(cn / dn) * _carlson(reflected * sn, reflected, 1.0)
-    psi = float(math.pi * v / row[_QUARTER])
+        v = row[QUARTER] - math.sqrt(cn / dn) * _carlson(reflected * sn, reflected, 1.0)
+    psi = float(math.pi * v / row[QUARTER])
     return psi if increasing else -psi
 
 

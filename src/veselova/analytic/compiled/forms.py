@@ -1,5 +1,5 @@
-"""The nodal differentials on the cuts of many curves, curve by curve, compiled: what
-analytic.curve.interval does with arrays.
+"""The nodal differentials on the cuts of one curve, compiled: what analytic.curve.interval does
+with arrays.
 
 Each function repeats formulas of the one that it names; tests hold both together.
 """
@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.compiled.attitudes import Torus, cut_roots, new_torus, set_cut
+from veselova.analytic.compiled.attitudes import QUARTER, cut_roots
 from veselova.analytic.compiled.compiler import compiled
 
-__all__ = ["forms_on_cuts"]
+__all__ = ["set_forms"]
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def _density(differences: Array, s: int, quarter: float) -> float:
 
 
 @compiled()
-def _set_forms(
+def _set_node(
     differences: Array, s: int, density: float, below: float, above: float, forms: Array, j: int
 ) -> None:
     """Interval.forms, and measure and to_midpoints, at one node: forms (g, J)."""
@@ -65,25 +65,14 @@ def _set_forms(
 
 
 @compiled()
-def _forms(
-    differences: Array, s: int, psi: Array, below: Array, forms: Array, torus: Torus
+def set_forms(
+    differences: Array, s: int, row: Array, psi: Array, below: Array, forms: Array
 ) -> None:
-    row = torus.cuts[0]
-    for i in range(differences.shape[0]):
-        set_cut(differences[i], s, row)
-        density = _density(differences[i], s, row[4])
-        for j in range(psi.size):
-            lower, upper = cut_roots(psi[j], row)
-            below[i, j] = lower * lower
-            _set_forms(differences[i], s, density, lower * lower, upper * upper, forms[i], j)
-
-
-def forms_on_cuts(differences: Array, s: int, psi: Array) -> tuple[Array, Array]:
-    """Return λ−b_1, (N, J), and the forms, (N, g, J), on cut s of N curves at angles (J,), as
-    Interval.distances and forms do.
+    """Fill λ−b_1, (J,), and the forms, (g, J), on cut s of a curve at angles (J,), from the
+    constants of the cut: Interval.distances and forms.
     """
-    count, genus = len(differences), (differences.shape[1] - 1) // 2
-    below, forms = np.empty((count, psi.size)), np.empty((count, genus, psi.size))
-    given = np.ascontiguousarray(differences), s, np.ascontiguousarray(psi)
-    _forms(*given, below, forms, new_torus(genus))
-    return below, forms
+    density = _density(differences, s, row[QUARTER])
+    for j in range(psi.size):
+        lower, upper = cut_roots(psi[j], row)
+        below[j] = lower * lower
+        _set_node(differences, s, density, lower * lower, upper * upper, forms, j)

@@ -1,4 +1,4 @@
-"""The Fourier coefficients of dt/dτ₁ on tori of genus two, torus by torus, compiled: what
+"""The Fourier coefficients of dt/dτ₁ on a torus of genus one or two, compiled: what
 analytic.time_map.mode_tables does with arrays.
 
 Each function repeats formulas of the one that it names; tests hold both together.
@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, SMALLEST_MODE
-from veselova.analytic.time_map.mode_tables import ModeTables
 
-__all__ = ["form_tables"]
+__all__ = ["set_coefficients"]
 
 Array = NDArray[np.float64]
 
@@ -96,41 +95,57 @@ def _combine(columns: Array, sizes: Array, widest: Array, scale: float, values: 
 
 
 @compiled()
-def _coefficients(
+def _set_modes_of_one(
+    weights: Array, G: Array, scale: float, values: Array, powers: Array
+) -> float:
+    """Fill the coefficients of genus one, and return the largest of what they are off by:
+    mode_tables.fourier_coefficients.
+    """
+    rows, nodes = values.shape[0], weights.size
+    widest = _set_powers(G, powers[0, 0], powers[0, 1])
+    size, largest = 0.0, 0.0
+    for j in range(nodes):
+        size += weights[j] * weights[j]
+    for m in range(rows):
+        total = 0.0
+        for j in range(nodes):
+            total += weights[j] * powers[0, 0, m, j]
+        off = COLUMN_ROUNDING * abs(scale) * math.sqrt(size) * (1 + widest * m)
+        counts = abs(total * scale) > max(SMALLEST_MODE, off) and m > 0
+        values[m, 0] = total * scale if counts else 0.0
+        if counts:
+            largest = max(largest, off)
+    return largest
+
+
+@compiled()
+def set_coefficients(
     weights: Array,
     G: Array,
-    scale: Array,
+    scale: float,
     values: Array,
-    off: Array,
     powers: Array,
     rows: Array,
     columns: Array,
     sizes: Array,
     widest: Array,
-) -> None:
-    for i in range(scale.size):
+) -> float:
+    """Fill F_m/F_0 of a box, and return by how much each is off: mode_tables.form_tables.
+
+    - weights, G: (g, g, J); scale: of dt/dτ₁ over its mean
+    - values: (M+1, 2M+1), of genus one (M+1, 1)
+    - powers, rows, columns, sizes, widest: room, (2, 2, M+1, J), (2, J), (2, 2, M+1, 2M+1), (2,)
+      and (2, 2)
+    """
+    if weights.shape[0] == 1:
+        off = _set_modes_of_one(weights[0, 0], G[0, 0], scale, values, powers)
+    else:
         for s in range(2):
             sizes[s] = 0.0
             for k in range(2):
-                widest[s, k] = _set_powers(G[i, s, k], powers[k, 0], powers[k, 1])
+                widest[s, k] = _set_powers(G[s, k], powers[k, 0], powers[k, 1])
             for k in range(2):
-                sizes[s] += _set_column(weights[i, s, k], powers, rows, columns[s, k])
+                sizes[s] += _set_column(weights[s, k], powers, rows, columns[s, k])
             sizes[s] = math.sqrt(sizes[s])
-        off[i] = _combine(columns, sizes, widest, scale[i], values[i])
-
-
-def form_tables(weights: Array, G: Array, scale: Array, mean: Array, highest: int) -> ModeTables:
-    """Return what mode_tables.form_tables returns, for genus two."""
-    count, nodes = len(scale), G.shape[3]
-    rows = highest + 1
-    values, off = np.empty((count, rows, 2 * rows - 1)), np.empty(count)
-    room = (
-        np.empty((2, 2, rows, nodes)),
-        np.empty((2, nodes)),
-        np.empty((2, 2, rows, 2 * rows - 1)),
-        np.empty(2),
-        np.empty((2, 2)),
-    )
-    weights, G = np.ascontiguousarray(weights), np.ascontiguousarray(G)
-    _coefficients(weights, G, scale / mean, values, off, *room)
-    return ModeTables(values, np.maximum(4 * SMALLEST_MODE, off / 2))
+        off = _combine(columns, sizes, widest, scale, values)
+    return max(4 * SMALLEST_MODE, off / 2)

@@ -18,7 +18,7 @@ from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.spectrum import secular_equation
 from veselova.analytic.spectrum.branch_points_batch import CONTRADICTION, Spectra
 
-__all__ = ["rounded_product", "spectra_of"]
+__all__ = ["Found", "difference", "new_found", "rounded_product", "set_spectrum", "spectra_of"]
 
 Array = NDArray[np.float64]
 Pair: TypeAlias = tuple[float, float]
@@ -30,7 +30,7 @@ _FINE_SETTLED = secular_equation.FINE_SETTLED
 _ROUNDINGS = secular_equation.ROUNDINGS * float(DOUBLE.epsilon)
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """The arrays of ``Spectra``, high and low parts along a first axis, and room for one start:
     position, velocity, scaled A, weights, a row along m_s, and the squares of q' along these.
     """
@@ -120,6 +120,12 @@ def _root(a: Pair) -> Pair:
 @compiled()
 def _at(values: Array, i: int) -> Pair:
     return values[0, i], values[1, i]
+
+
+@compiled()
+def difference(a: Array, i: int, b: Array, j: int) -> float:
+    """Return a_i − b_j of numbers of thirty digits, rounded."""
+    return _subtract(_at(a, i), _at(b, j))[0]
 
 
 @compiled()
@@ -246,12 +252,15 @@ def _zero(poles: Array, weights: Array, zero: int, constant: float) -> tuple[Pai
 
 
 @compiled()
-def _spectrum(A: Array, found: _Found, i: int) -> None:
-    """Fill the numbers of one start: Spectra._of_sorted."""
+def set_spectrum(A: Array, q: Array, q_dot: Array, found: Found, i: int) -> None:
+    """Fill the numbers of one start, along sorted axes: Spectra._of_sorted."""
     n = A.shape[1]
     unit = (A[i, n - 1], 0.0)
     position, velocity, scaled, row = found.position, found.velocity, found.scaled, found.row
     inverse, spheroconic = found.inverse[i], found.spheroconic[i]
+    for k in range(n):
+        _set(position, k, (q[i, k], 0.0))
+        _set(velocity, k, (q_dot[i, k], 0.0))
     size = _dot(position, position)
     _project(velocity, position, _divide(_dot(position, velocity), size))
     for k in range(n):
@@ -301,20 +310,14 @@ def _spectrum(A: Array, found: _Found, i: int) -> None:
 
 
 @compiled()
-def _spectra(A: Array, q: Array, q_dot: Array, found: _Found) -> None:
+def _spectra(A: Array, q: Array, q_dot: Array, found: Found) -> None:
     for i in range(A.shape[0]):
-        for k in range(A.shape[1]):
-            _set(found.position, k, (q[i, k], 0.0))
-            _set(found.velocity, k, (q_dot[i, k], 0.0))
-        _spectrum(A, found, i)
+        set_spectrum(A, q, q_dot, found, i)
 
 
-def spectra_of(A: Array, q: Array, q_dot: Array) -> Spectra:
-    """Return what ``Spectra.of`` returns."""
-    axes = np.argsort(-A, axis=1, kind="stable")
-    A, q, q_dot = (np.ascontiguousarray(np.take_along_axis(x, axes, axis=1)) for x in (A, q, q_dot))
-    count, n = A.shape
-    found = _Found(
+def new_found(count: int, n: int) -> Found:
+    """Return room for the spectra of so many starts."""
+    return Found(
         np.empty(count),
         np.empty((count, 2, n)),
         np.empty((count, 2, n - 1)),
@@ -330,6 +333,14 @@ def spectra_of(A: Array, q: Array, q_dot: Array) -> Spectra:
         np.empty((2, n)),
         np.empty((2, n - 1)),
     )
+
+
+def spectra_of(A: Array, q: Array, q_dot: Array) -> Spectra:
+    """Return what ``Spectra.of`` returns."""
+    axes = np.argsort(-A, axis=1, kind="stable")
+    A, q, q_dot = (np.ascontiguousarray(np.take_along_axis(x, axes, axis=1)) for x in (A, q, q_dot))
+    count, n = A.shape
+    found = new_found(count, n)
     _spectra(A, q, q_dot, found)
 
     def pairs(values: Array) -> DoubleDouble:

@@ -40,7 +40,18 @@ from veselova.analytic.compiled.time_maps import (
     solve,
 )
 
-__all__ = ["Limits", "Motions", "Panel", "Places", "Results", "Times", "states"]
+__all__ = [
+    "Limits",
+    "Motions",
+    "Panel",
+    "Places",
+    "Results",
+    "Room",
+    "Times",
+    "new_room",
+    "set_motion",
+    "states",
+]
 
 Array = NDArray[np.float64]
 
@@ -50,6 +61,7 @@ _EPSILON = float(DOUBLE.epsilon)
 
 class Motions(NamedTuple):
     """N motions on tori of one order; names as in ``TorusStack``, ``ModeTables`` and ``TimeMaps``.
+    The tables of one of them at a time: series, values, frequencies, mean.
 
     - of_I, of_c: the layouts of the curve
     - below, above, increasing: (N, g) where the λ_s of the starts are on their cuts
@@ -57,8 +69,8 @@ class Motions(NamedTuple):
     - A: (N, n) sorted, in any unit
     - places: (N, n) of each body axis among sorted ones
     - frames: (N, n, n) at the start, sorted, NaN for the natural one
-    - values: (N, M+1, 2M+1), of genus one (N, M+1, 1)
-    - panel: of which all but ``off`` and the errors are interpolated
+    - series: (g, g, M); values: (M+1, 2M+1), of genus one (M+1, 1)
+    - panel: of which these are interpolated
     """
 
     of_I: Places
@@ -85,10 +97,10 @@ class Motions(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """The tables of N motions by interpolation, as in analytic.motion.atlas: those of ``Motions``
-    are then room for one.
+    """The tables of N motions by interpolation, as in analytic.motion.atlas; empty where each has
+    its own.
 
-    - coefficients: (D+1, L), none where there are tables
+    - coefficients: (D+1, L)
     - x: (N,) where each motion lies in the panel, from −1 to 1
     - scale: (N,) of F_0
     - modes: (K,) which of the box are interpolated
@@ -132,7 +144,7 @@ class Results(NamedTuple):
     served: Any
 
 
-class _Room(NamedTuple):
+class Room(NamedTuple):
     """Numbers of one motion: attitudes at ``ends``, z and slopes, of the start; the rotation."""
 
     torus: Torus
@@ -160,9 +172,10 @@ class _Room(NamedTuple):
     numbers: Any
 
 
-def _new_room(genus: int, terms: int, rows: int, columns: int, table: tuple[int, int]) -> _Room:
+def new_room(genus: int, terms: int, rows: int, columns: int, table: tuple[int, int]) -> Room:
+    """Return room for the numbers of a motion."""
     n = genus + 1
-    return _Room(
+    return Room(
         new_torus(genus),
         new_modes(rows, columns),
         np.empty((genus, genus, terms)),
@@ -190,7 +203,7 @@ def _new_room(genus: int, terms: int, rows: int, columns: int, table: tuple[int,
 
 
 @compiled()
-def _interpolate(given: Motions, i: int, room: _Room) -> None:
+def _interpolate(given: Motions, i: int, room: Room) -> None:
     """Fill the tables of one motion: atlas._Panel.at, _stack."""
     panel = given.panel
     count, length = panel.coefficients.shape
@@ -203,17 +216,17 @@ def _interpolate(given: Motions, i: int, room: _Room) -> None:
         factor = room.chebyshev[0, k]
         for j in range(length):
             room.numbers[j] += factor * panel.coefficients[k, j]
-    given.frequencies[0, 0], given.frequencies[0, 1] = room.numbers[0], room.numbers[1]
+    given.frequencies[0], given.frequencies[1] = room.numbers[0], room.numbers[1]
     given.mean[0] = room.numbers[2] * panel.scale[i]
-    terms, columns = given.series.shape[3], given.values.shape[2]
+    terms, columns = given.series.shape[2], given.values.shape[1]
     place = 3
     for k in range(2):
         for s in range(2):
             for m in range(terms):
-                given.series[0, k, s, m] = room.numbers[place]
+                given.series[k, s, m] = room.numbers[place]
                 place += 1
     for mode in panel.modes:
-        given.values[0, mode // columns, mode % columns] = room.numbers[place]
+        given.values[mode // columns, mode % columns] = room.numbers[place]
         place += 1
 
 
@@ -230,7 +243,7 @@ def _determinant(matrix: Array) -> float:
 
 
 @compiled()
-def _set_rotation(given: Motions, i: int, room: _Room, certain: float) -> bool:
+def _set_rotation(given: Motions, i: int, room: Room, certain: float) -> bool:
     """Fill ℜ of (orth); return whether its signs are certain: _Motions._rotation, is_certain."""
     genus = room.components.size
     frame = given.frames[i]
@@ -258,7 +271,7 @@ def _set_rotation(given: Motions, i: int, room: _Room, certain: float) -> bool:
 
 
 @compiled()
-def _set_start(given: Motions, i: int, row: int, room: _Room, limits: Limits) -> bool:
+def _set_start(given: Motions, i: int, room: Room, limits: Limits) -> bool:
     """Fill the angles, phases and attitude at the start; return whether its signs are certain."""
     torus, genus = room.torus, room.angles.size
     for a in range(2 * genus + 1):
@@ -267,7 +280,7 @@ def _set_start(given: Motions, i: int, row: int, room: _Room, limits: Limits) ->
     for a in range(genus + 1):
         torus.signs[a] = given.signs[i, a]
     set_torus(torus, given.of_I, given.of_c)
-    series = given.series[row]
+    series = given.series
     for s in range(genus):
         room.angles[s] = angle(
             given.below[i, s], given.above[i, s], given.increasing[i, s], torus.cuts[s]
@@ -281,13 +294,13 @@ def _set_start(given: Motions, i: int, row: int, room: _Room, limits: Limits) ->
         for s in range(genus):
             rounding += abs(room.slopes[k, s]) * abs(room.angles[s]) * _EPSILON
         room.of_start[k] = limits.start_phase * _EPSILON + rounding
-        room.of_rates[k] = given.rate_rounding[i] * abs(given.frequencies[row, k])
+        room.of_rates[k] = given.rate_rounding[i] * abs(given.frequencies[k])
     attitude(torus, given.of_I, given.of_c, room.angles, room.first, room.components)
     return _set_rotation(given, i, room, limits.certain)
 
 
 @compiled()
-def _set_ends(given: Motions, room: _Room) -> None:
+def _set_ends(given: Motions, room: Room) -> None:
     """Fill the attitudes at angles ψ, and at the ends of steps along each phase: _Motions.at."""
     torus, genus = room.torus, room.psi.size
     attitude(torus, given.of_I, given.of_c, room.psi, room.frames[0], room.along[0])
@@ -302,7 +315,7 @@ def _set_ends(given: Motions, room: _Room) -> None:
 
 
 @compiled()
-def _slopes(room: _Room, frequencies: Array) -> tuple[float, float, float]:
+def _slopes(room: Room, frequencies: Array) -> tuple[float, float, float]:
     """Return how fast the frame moves along the motion, with the rates, and with the phases:
     _Motions._error.
     """
@@ -323,7 +336,7 @@ def _slopes(room: _Room, frequencies: Array) -> tuple[float, float, float]:
 
 
 @compiled()
-def _set_state(given: Motions, i: int, room: _Room, q_dot: Array, frame: Array) -> None:
+def _set_state(given: Motions, i: int, room: Room, q_dot: Array, frame: Array) -> None:
     """Fill q̇ and the frame along body axes from the attitude: _Motions.at and _time_rate."""
     n = room.torus.q.size
     at_start, here = 0.0, 0.0
@@ -345,25 +358,19 @@ def _set_state(given: Motions, i: int, room: _Room, q_dot: Array, frame: Array) 
 
 
 @compiled()
-def _motion(
-    given: Motions, i: int, times: Times, limits: Limits, room: _Room, results: Results
+def set_motion(
+    given: Motions, i: int, times: Times, limits: Limits, room: Room, results: Results
 ) -> bool:
     """Fill the states of one motion; return whether they are right."""
-    row = i
-    if given.panel.coefficients.shape[0]:
-        row = 0
-        _interpolate(given, i, room)
-    else:
-        set_ranges(room.modes, given.values[i])
-    frequencies, mean, genus = given.frequencies[row], given.mean[row], room.psi.size
+    frequencies, mean, genus = given.frequencies, given.mean[0], room.psi.size
     last = largest(times.doubles)
     if not largest(frequencies) / mean * last < limits.most_cycles:
         return False
-    reach, steady = set_modes(room.modes, given.values[row], frequencies)
-    if not steady or not _set_start(given, i, row, room, limits):
+    reach, steady = set_modes(room.modes, given.values, frequencies)
+    if not steady or not _set_start(given, i, room, limits):
         return False
-    at_start = excess(room.modes, room.start, given.values.shape[1])[0]
-    series, rounding = given.series[row], given.rate_rounding[i]
+    at_start = excess(room.modes, room.start, given.values.shape[0])[0]
+    series, rounding = given.series, given.rate_rounding[i]
     evaluation = max(limits.evaluation, 3.0 * genus + 3.0) * _EPSILON
     elapsed = 0.0
     for j in range(times.doubles.size):
@@ -403,21 +410,21 @@ def _motion(
 
 
 @compiled()
-def _states(given: Motions, times: Times, limits: Limits, room: _Room, results: Results) -> None:
+def _states(given: Motions, times: Times, limits: Limits, room: Room, results: Results) -> None:
     for i in range(given.unit.size):
-        results.served[i] = _motion(given, i, times, limits, room, results)
+        _interpolate(given, i, room)
+        results.served[i] = set_motion(given, i, times, limits, room, results)
 
 
 def states(given: Motions, times: Times, limits: Limits, results: Results) -> None:
-    """Fill the states of N motions at the times."""
-    genus, terms = given.series.shape[2], given.series.shape[3]
-    rows, columns = given.values.shape[1:]
+    """Fill the states of N motions on one panel at the times."""
+    genus, terms = given.series.shape[1:]
+    rows, columns = given.values.shape
     panel = given.panel
-    room = _new_room(genus, terms, rows, columns, panel.coefficients.shape)
-    if panel.modes.size:
-        which = np.zeros((rows, columns))
-        which.ravel()[panel.modes] = 1.0
-        set_ranges(room.modes, which)
-        room.modes.counted[:] = which != 0
-        room.modes.counted[0, columns // 2] = False
+    room = new_room(genus, terms, rows, columns, panel.coefficients.shape)
+    which = np.zeros((rows, columns))
+    which.ravel()[panel.modes] = 1.0
+    set_ranges(room.modes, which)
+    room.modes.counted[:] = which != 0
+    room.modes.counted[0, columns // 2] = False
     _states(given, times, limits, room, results)

@@ -29,10 +29,10 @@ from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Periods", "resolve_periods"]
+__all__ = ["EXTRA_NODES", "Periods", "resolve_periods"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
-_EXTRA_NODES = 4
+EXTRA_NODES = 4
 
 #: Budget: entries at one node of the forms of intervals that are evaluated side by side: with all
 #: nodes they stay in the cache.
@@ -161,7 +161,7 @@ class Periods(AngleSeries):
     def count_nodes(self, interval: Interval) -> Any:
         """Return that number; of many curves, or intervals, a column of them."""
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return np.ceil(self.arithmetic.nats / rate) + _EXTRA_NODES
+        return np.ceil(self.arithmetic.nats / rate) + EXTRA_NODES
 
     def require_few_nodes(self, interval: Interval) -> int:
         """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""

@@ -22,8 +22,8 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.angle_maps import AngleMaps
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion.ensemble import States, states_compiled, states_of_stack
-from veselova.analytic.motion.ensemble_compiled import Interpolation
+from veselova.analytic.motion.ensemble import LIMITS, States, states_of_stack
+from veselova.analytic.motion.ensemble_compiled import Interpolation, states_by_interpolation
 from veselova.analytic.motion.torus_stack import (
     TorusStack,
     branch_points,
@@ -222,7 +222,9 @@ class Atlas:
                     stack = _stack(panel, rows, spectra, members)
                     if ready():
                         numbers = _interpolation(panel, stack, distances[members])
-                        yield from states_compiled(stack, numbers, grid, None)
+                        for places, found in states_by_interpolation(stack, numbers, grid, LIMITS):
+                            arrays = found.tau1, found.q_dot, found.frame, found.error
+                            yield States(stack.rows[places], *arrays)
                     else:
                         tables = _tables(panel, stack, distances[members])
                         yield from states_of_stack(stack, tables, grid, None)

@@ -20,13 +20,21 @@ from veselova.analytic.attitude.frame import STEP, Attitude
 from veselova.analytic.attitude.frame_batch import attitudes
 from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
 from veselova.analytic.compiled.compiler import ready
-from veselova.analytic.motion.ensemble_compiled import Interpolation, compiled_states
-from veselova.analytic.motion.torus_stack import TorusStack, torus_stacks
+from veselova.analytic.motion.ensemble_compiled import states_compiled
+from veselova.analytic.motion.torus_stack import (
+    MOST_BINARY_DIGITS,
+    NARROWEST,
+    NODES_PER_WAVE,
+    RATE_ROUNDING,
+    SPARE_NODES,
+    TorusStack,
+    torus_stacks,
+)
 from veselova.analytic.time_map.mode_tables import ModeTables, TimeMaps
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["States", "states_compiled", "states_of_stack", "states_of_starts"]
+__all__ = ["LIMITS", "States", "states_of_stack", "states_of_starts"]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +73,20 @@ _LARGEST_ERROR = 1e-6
 _MOST_CYCLES = 1e9
 
 
+#: What compiled loops take of these constants, in the order of their ``Limits`` and ``Reach``.
+LIMITS = (_CERTAIN, _PHASE, _START_PHASE, _EVALUATION, _SAFETY, _LARGEST_ERROR, _MOST_CYCLES)
+_REACH = (
+    MOST_BINARY_DIGITS,
+    NARROWEST,
+    _NARROWEST_CUT,
+    _NARROWEST_GAP,
+    _MOST_CANCELLATION,
+    RATE_ROUNDING * DOUBLE.epsilon,
+    NODES_PER_WAVE,
+    SPARE_NODES,
+)
+
+
 @dataclass(frozen=True)
 class States:
     """The states of N problems at T times, along the body axes; names as in ``Trajectory``.
@@ -92,25 +114,14 @@ def states_of_starts(
     """
     if A.shape[1] - 1 not in _BOXES:
         return
+    if ready():
+        for places, found in states_compiled(A, q, q_dot, frames, times, _REACH, LIMITS):
+            yield States(places, found.tau1, found.q_dot, found.frame, found.error)
+        return
     for stack in torus_stacks(A, q, q_dot, _NODE_COUNTS):
-        _form_nodes(stack)
+        vars(stack)["mean"] = stack.mean  # parts of a stack would form it anew
         for part, tables in _tables(stack):
             yield from states_of_stack(part, tables, times, frames)
-
-
-def _form_nodes(stack: TorusStack) -> None:
-    """Fill the forms at nodes of many curves, by compiled loops where they serve, and the means
-    that need them: parts of a stack would form them anew.
-    """
-    periods = stack.periods
-    if ready() and periods.genus > 1:
-        from veselova.analytic.compiled.forms import forms_on_cuts
-
-        psi = DOUBLE.nodes(int(periods.nodes or 0))
-        vars(periods)["forms_at_nodes"] = tuple(
-            forms_on_cuts(stack.curve.differences, s, psi) for s in range(periods.genus)
-        )
-    vars(stack)["mean"] = stack.mean
 
 
 def _tables(stack: TorusStack) -> Iterator[tuple[TorusStack, ModeTables]]:
@@ -156,9 +167,6 @@ def states_of_stack(
     stack: TorusStack, tables: ModeTables, times: TimeGrid, frames: Array | None
 ) -> Iterator[States]:
     """Yield the states at the times of a grid of those problems of a stack that can be served."""
-    if ready():
-        yield from states_compiled(stack, tables, times, frames)
-        return
     maps = TimeMaps(tables, stack.phases, stack.frequencies, stack.mean)
     cycles = maps.fastest / maps.mean * np.max(np.abs(times.doubles))
     rows = np.flatnonzero(~maps.has_slow_modes & (cycles < _MOST_CYCLES))
@@ -172,15 +180,6 @@ def states_of_stack(
             yield found
         elif served.any():
             yield States(*(getattr(found, name)[served] for name in States.__annotations__))
-
-
-def states_compiled(
-    stack: TorusStack, tables: ModeTables | Interpolation, times: TimeGrid, frames: Array | None
-) -> Iterator[States]:
-    """Yield the same by compiled loops."""
-    limits = (_CERTAIN, _PHASE, _START_PHASE, _EVALUATION, _SAFETY, _LARGEST_ERROR, _MOST_CYCLES)
-    for places, found in compiled_states(stack, tables, times, frames, limits):
-        yield States(stack.rows[places], found.tau1, found.q_dot, found.frame, found.error)
 
 
 @dataclass(frozen=True)

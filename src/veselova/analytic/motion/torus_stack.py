@@ -28,7 +28,12 @@ from veselova.mechanics.core.budget import checkpoint
 from veselova.tunings import STACKED_DIMENSIONS
 
 __all__ = [
+    "MOST_BINARY_DIGITS",
+    "NARROWEST",
+    "NODES_PER_WAVE",
     "NODE_COUNTS",
+    "RATE_ROUNDING",
+    "SPARE_NODES",
     "TorusStack",
     "branch_points",
     "columns_at_nodes",
@@ -42,7 +47,7 @@ Array = NDArray[np.float64]
 
 #: Derived: neighbouring branch points nearer than this part of the largest are left to
 #: analytic.torus. Down to here, their differences have twenty digits.
-_NARROWEST = 1e-12
+NARROWEST = 1e-12
 
 #: Numbers of nodes are rounded up to one of these; who needs more has a gap that is worth a call of
 #: its own.
@@ -50,11 +55,11 @@ NODE_COUNTS = (12, 16, 20, 24, 32, 40, 52, 64)
 
 #: Derived: largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i:
 #: products of them, and what these round, stay floats.
-_MOST_BINARY_DIGITS = 150
+MOST_BINARY_DIGITS = 150
 
 
 #: Calibrated: relative rounding of f and F_0 in ε, as analytic.motion.error_bound has it.
-_RATE_ROUNDING = 2.0
+RATE_ROUNDING = 2.0
 
 #: What a stack knows of each of its tori, once it is asked for.
 _BY_ROWS = (
@@ -71,8 +76,8 @@ _BY_ROWS = (
 
 #: Derived: N nodes of half a period have the mean of what has less than 2N waves in it, those of
 #: the forms and of a mode together. A tenth more, and some, leaves nothing above 1e-15.
-_NODES_PER_WAVE = 0.6
-_SPARE_NODES = 6
+NODES_PER_WAVE = 0.6
+SPARE_NODES = 6
 
 
 @dataclass(frozen=True)
@@ -166,15 +171,12 @@ class TorusStack:
         turn by ``pace`` radians at most by one of ψ.
         """
         columns = columns_at_nodes(self.periods, self.rate, pace)
-        form = form_tables
-        if self.periods.genus == 2 and ready():
-            from veselova.analytic.compiled.mode_coefficients import form_tables as form
-        return form(*columns, np.asarray(self.rate.scale), self.mean, highest)
+        return form_tables(*columns, np.asarray(self.rate.scale), self.mean, highest)
 
     @cached_property
     def rate_rounding(self) -> Array:
         """Return the relative error of f and F_0, (N,)."""
-        return np.full(self.rows.size, _RATE_ROUNDING * DOUBLE.epsilon)
+        return np.full(self.rows.size, RATE_ROUNDING * DOUBLE.epsilon)
 
     @cached_property
     def phase_error(self) -> Array:
@@ -216,7 +218,7 @@ def columns_at_nodes(periods: Periods, rate: TimeRate, pace: float) -> tuple[Arr
     """Return the weights of dt/dτ₁ and G_s, (N, s, k, J) each, at J nodes, enough for modes that
     turn by ``pace`` radians at most by one of ψ.
     """
-    nodes = math.ceil(_NODES_PER_WAVE * (periods.longest + pace)) + _SPARE_NODES
+    nodes = math.ceil(NODES_PER_WAVE * (periods.longest + pace)) + SPARE_NODES
     psi = DOUBLE.nodes(nodes)
     series = periods.angle_series  # (N, k, s, M)
     orders = np.arange(1, series.shape[3])
@@ -224,17 +226,8 @@ def columns_at_nodes(periods: Periods, rate: TimeRate, pace: float) -> tuple[Arr
     G = np.ascontiguousarray(np.swapaxes(series[..., 1:], 1, 2)) @ powers
     cuts = np.arange(periods.genus)
     G[:, cuts, cuts] += psi / (2 * np.pi)
-    weights = np.stack([_weights(periods, rate, s, psi) for s in cuts.tolist()], axis=1)
+    weights = np.stack([rate.weights(s, psi) for s in cuts.tolist()], axis=1)
     return weights, G
-
-
-def _weights(periods: Periods, rate: TimeRate, s: int, psi: Array) -> Array:
-    """Return the weights of dt/dτ₁ on cut s at nodes, (N, g, J)."""
-    if not ready():
-        return np.asarray(rate.weights(s, psi))
-    from veselova.analytic.compiled.forms import forms_on_cuts
-
-    return np.asarray(rate.weights_of(s, *forms_on_cuts(periods.curve.differences, s, psi)))
 
 
 def torus_stacks(
@@ -258,7 +251,7 @@ def torus_stacks(
     for code in np.unique(order[spectra.known]):
         members = np.flatnonzero(spectra.known & (order == code))
         points, origins = branch_points(spectra, members, lower[members[0]])
-        wide = np.min((points[:, 1:] - points[:, :-1]).high, axis=1) > _NARROWEST
+        wide = np.min((points[:, 1:] - points[:, :-1]).high, axis=1) > NARROWEST
         members = members[wide]
         points = points[wide]
         curves = Curve(DOUBLE, points.high, (points[:, None, :] - points[:, :, None]).high, origins)
@@ -293,7 +286,7 @@ def known_starts(A: Array, q: Array, q_dot: Array) -> NDArray[np.intp]:
         largest = np.abs(np.log2(np.max(np.abs(q_dot), axis=1)))
     ordered = np.sort(A, axis=1)
     apart = np.all(np.diff(ordered, axis=1) > 0, axis=1)
-    moderate = np.all(sizes < _MOST_BINARY_DIGITS, axis=0) & (largest < _MOST_BINARY_DIGITS)
+    moderate = np.all(sizes < MOST_BINARY_DIGITS, axis=0) & (largest < MOST_BINARY_DIGITS)
     return np.flatnonzero(moderate & apart)
 
 
