@@ -115,10 +115,6 @@ SEPARABLE_FOURIER_GENUS = 3
 GAUSSIAN_TERMS = 8.0
 WAVE_TERMS = 25.0
 
-#: Tuning: classes of a split lattice that are few enough for all of them to be found when the first
-#: is asked for.
-FEW_CLASSES = 8
-
 #: Tuning: moduli of elliptic integrals that are done one by one: a call costs more than an entry.
 FEW_MODULI = 16
 

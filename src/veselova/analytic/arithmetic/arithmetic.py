@@ -66,7 +66,6 @@ class Arithmetic(ABC):
     exp: Callable[[Any], Any]
     sinh: Callable[[Any], Any]
     cosh: Callable[[Any], Any]
-    log: Callable[[Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
     floor: Callable[[Any], Any]
@@ -197,7 +196,6 @@ class Double(Arithmetic):
     exp = staticmethod(np.exp)
     sinh = staticmethod(np.sinh)
     cosh = staticmethod(np.cosh)
-    log = staticmethod(np.log)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     floor = staticmethod(np.floor)
@@ -294,7 +292,7 @@ class Extended(Arithmetic):
         self.digits = digits
         self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
-        for name in ("sqrt", "exp", "sinh", "cosh", "log", "sin", "cos", "floor"):
+        for name in ("sqrt", "exp", "sinh", "cosh", "sin", "cos", "floor"):
             setattr(self, name, self._entrywise(getattr(self._context, name), 1))
         self._rf = self._entrywise(self._context.elliprf, 3)
 

@@ -83,7 +83,6 @@ class Balls(Arithmetic):
     exp = staticmethod(_method("exp"))
     sinh = staticmethod(_method("sinh"))
     cosh = staticmethod(_method("cosh"))
-    log = staticmethod(_method("log"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
     #: Radicands are known to be nonnegative; their balls may reach below zero.

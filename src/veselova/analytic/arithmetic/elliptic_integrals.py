@@ -9,13 +9,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.tunings import FEW_MODULI
 
 __all__ = ["carlson_rf", "quarter_period"]
 
-Array = NDArray[np.float64]
 
 #: Derived: relative distance of both means from which one more step leaves its square, below a
 #: rounding.

@@ -18,7 +18,6 @@ analytic in the angles and keep their relative accuracy where a coordinate turns
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Literal, Protocol
@@ -29,7 +28,7 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 
-__all__ = ["Attitude", "Differences", "Frame", "PointRoots", "orthogonal", "slopes"]
+__all__ = ["Attitude", "Differences", "Frame", "PointRoots", "orthogonal"]
 
 #: Derived: step of the difference quotients: truncation and rounding both near 1e-8.
 STEP = 1e-8
@@ -117,12 +116,6 @@ class Frame:
             np.arange(2**genus)[:, None] >> np.arange(genus)[::-1] & 1
         )
 
-    def slopes(self, psi: Values, directions: Values) -> Values:
-        """Return the derivatives of all frame entries along directions (N, g, d) of the angles,
-        shape (N, n², d).
-        """
-        return slopes(self.at, psi, directions)
-
 
 @dataclass(frozen=True)
 class Differences:
@@ -160,17 +153,6 @@ class Differences:
         count, _, number = self.directions.shape
         entries = values.reshape(1 + number, count, -1)
         return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
-
-
-def slopes(attitude: Callable[[Values], Attitude], points: Values, directions: Values) -> Values:
-    """Return the derivatives of all frame entries along directions (N, g, d) at points (N, g),
-    shape (N, n², d).
-
-    To about 1e-7 of the largest; next to a separatrix, where frames turn within little, to less
-    (1e-5 beside a gap of 1e-6).
-    """
-    differences = Differences(points, directions)
-    return differences.slopes(attitude(differences.ends))
 
 
 class PointRoots(Protocol):

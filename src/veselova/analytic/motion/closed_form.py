@@ -48,7 +48,6 @@ from veselova.version import __version__
 
 __all__ = ["closed_form"]
 
-Array = NDArray[np.float64]
 
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000

@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
 from veselova.analytic.motion.area_solution import AreaSolution
@@ -19,7 +18,6 @@ from veselova.mechanics.systems.rolling_ball import RollingBall
 
 __all__ = ["area_fields", "error_of_body", "largest_modes"]
 
-Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 

@@ -8,7 +8,6 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.guard_digits import extended_precision_flows
@@ -18,7 +17,6 @@ from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 
 __all__ = ["CommutingSolution", "DirectedSolution"]
 
-Array = NDArray[np.float64]
 
 #: Calibrated: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, are those of
 #: extended precision.

@@ -37,7 +37,6 @@ from veselova.analytic.theta.lattice import (
 )
 from veselova.analytic.theta.theta_tables import SIGNS, Family, Group
 from veselova.mechanics.core.budget import checkpoint
-from veselova.tunings import FEW_CLASSES
 
 __all__ = ["Theta"]
 
@@ -272,8 +271,6 @@ class Theta:
         one of each pair ±x with a term above e^−39 of the largest: where T is large ε = ½ makes all
         small.
         """
-        if (classes := 2 ** len(self._split[0])) <= FEW_CLASSES:
-            wanted = frozenset(range(classes))
         known = list(self._crossed)  # a copy: another thread may add to them
         if (
             found := next((selected for selected in known if wanted <= selected), None)

@@ -32,7 +32,6 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Wide = NDArray[np.clongdouble]
 WideReal = NDArray[np.longdouble]
-Integers = NDArray[np.int64]
 
 _PI = np.longdouble("3.14159265358979323846264338327950288")
 

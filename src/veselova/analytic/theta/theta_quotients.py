@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.attitude.frame import Attitude, Frame, slopes
+from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.curve.hyperelliptic import BranchPoint, places_of
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
@@ -177,13 +177,6 @@ class ThetaQuotients:
         """
         values = self.theta.values(z, self._of_stretch)
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
-
-    def slopes(self, z: Array) -> Array:
-        """Return the derivatives of all frame entries in z, shape (N, n², g), to about 1e-7."""
-        genus = self.theta.genus
-        return np.asarray(
-            slopes(self.at, z, np.broadcast_to(np.eye(genus), (z.shape[0], genus, genus)))
-        )
 
     def at(self, z: Array) -> Attitude:
         """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
-    "Number",
     "entry_count",
     "exact_matrix",
     "exact_number",
@@ -38,7 +37,6 @@ __all__ = [
     "whole_number",
 ]
 
-Number = int | float | str | Fraction | Decimal
 
 Path = tuple[str | int, ...]
 

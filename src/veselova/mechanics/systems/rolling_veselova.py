@@ -9,15 +9,12 @@ from operator import mul
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["RollingVeselova"]
-
-Array = NDArray[np.float64]
 
 
 class RollingVeselova(Veselova):
