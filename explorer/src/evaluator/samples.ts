@@ -3,13 +3,13 @@ import type { Motion } from "./motion.ts";
 
 export interface Samples {
   times: Float64Array;
-  frame: Float32Array;
-  q: Float32Array;
-  velocity: Float32Array;
-  z: Float32Array;
-  lambda: Float32Array;
-  position: Float32Array;
-  Omega: Float32Array;
+  frame: Float64Array;
+  q: Float64Array;
+  velocity: Float64Array;
+  z: Float64Array;
+  lambda: Float64Array;
+  position: Float64Array;
+  Omega: Float64Array;
 }
 
 const COLUMNS = ["frame", "q", "velocity", "z", "lambda", "position", "Omega"] as const;
@@ -21,11 +21,11 @@ export function samplesOf(motion: Motion, times: Float64Array): Samples {
     const sample = motion.at(times[k]);
     for (const name of COLUMNS) {
       const values = sample[name] ?? [];
-      samples[name] ??= new Float32Array(times.length * values.length);
+      samples[name] ??= new Float64Array(times.length * values.length);
       samples[name].set(values, k * values.length);
     }
   }
-  for (const name of COLUMNS) samples[name] ??= new Float32Array(0);
+  for (const name of COLUMNS) samples[name] ??= new Float64Array(0);
   return samples;
 }
 

@@ -28,7 +28,11 @@ export class SeriesMotion implements Motion {
   readonly meanVelocity = null;
   readonly moments: number[];
   readonly #order: number[];
+  /** How many stretches have come. */
+  revision = 0;
   readonly #stretches = new Map<number, Stretch>();
+  /** Why a stretch does not come, in a sentence. */
+  readonly #refused = new Map<number, string>();
   readonly #ask: (index: number) => void;
   /** The times of a stretch: its first, less index·length, its length and its samples. */
   readonly #first: number;
@@ -53,6 +57,7 @@ export class SeriesMotion implements Motion {
   /** Take the stretch that begins index lengths after the first. */
   add(index: number, stretch: Stretch): void {
     this.#stretches.set(index, stretch);
+    this.revision++;
     while (this.#stretches.size > MOST_STRETCHES) {
       const farthest = [...this.#stretches.keys()].reduce((a, b) =>
         Math.abs(a - index) > Math.abs(b - index) ? a : b,
@@ -61,19 +66,54 @@ export class SeriesMotion implements Motion {
     }
   }
 
+  /** Note why a stretch does not come: it is not asked for again. */
+  refuse(index: number, sentence: string): void {
+    this.#refused.set(index, sentence);
+  }
+
+  /** Return why a time is not the one shown, and which is; empty where it is. */
+  lack(t: number): string {
+    const index = this.#indexOf(t);
+    if (this.#stretches.has(index)) return "";
+    const reason = this.#refused.get(index);
+    const nearest = this.#nearest(index);
+    const shown = this.#first + (nearest + (nearest < index ? 1 : 0)) * this.#length;
+    return reason ? `${reason.replace(/\.?$/, ".")} The picture stays at ${shown}.` : "The series of this time are on their way.";
+  }
+
+  /** Return the time up to which series are known without a gap, from a time on. */
+  knownTo(t: number): number {
+    let index = this.#indexOf(t);
+    while (this.#stretches.has(index)) index++;
+    return Math.max(t, this.#first + index * this.#length);
+  }
+
+  #want(index: number): void {
+    if (!this.#refused.has(index)) this.#ask(index);
+  }
+
+  #indexOf(t: number): number {
+    return Math.floor((t - this.#first) / this.#length);
+  }
+
+  /** Return the known stretch that is nearest. */
+  #nearest(index: number): number {
+    return [...this.#stretches.keys()].reduce((a, b) =>
+      Math.abs(a - index) < Math.abs(b - index) ? a : b,
+    );
+  }
+
   at(time: DoubleDouble | number): Sample {
     const t = typeof time === "number" ? time : time[0];
-    let index = Math.floor((t - this.#first) / this.#length);
+    let index = this.#indexOf(t);
     let place = (t - this.#first - index * this.#length) / this.#step;
     if (!this.#stretches.has(index)) {
-      this.#ask(index);
-      const nearest = [...this.#stretches.keys()].reduce((a, b) =>
-        Math.abs(a - index) < Math.abs(b - index) ? a : b,
-      );
+      this.#want(index);
+      const nearest = this.#nearest(index);
       place = nearest < index ? this.#count - 1 : 0;
       index = nearest;
     } else if (place > 0.6 * this.#count && !this.#stretches.has(index + 1)) {
-      this.#ask(index + 1);
+      this.#want(index + 1);
     }
     return this.#sample(this.#stretches.get(index)!, place, t);
   }

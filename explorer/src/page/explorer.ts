@@ -1,4 +1,5 @@
 /** The page: its state, the motion that is loaded, and what happens at every picture. */
+import { SeriesMotion } from "../evaluator/series_motion.ts";
 import type { Choice } from "../views/constants_view.ts";
 import { startOf } from "../views/constants_view.ts";
 import { element } from "../views/view.ts";
@@ -13,6 +14,7 @@ import { BUSY, FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
+import { SCENE_S } from "./recorder.ts";
 import type { Film } from "./scene_file.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
@@ -57,6 +59,9 @@ export class Explorer {
   #compareTimer = 0;
   #addressTimer = 0;
   #asksPrecise = false;
+  /** Where the motion comes from, and why its time is not shown. */
+  #origin = "";
+  #lack = "";
   #written = "";
   #formulas = "";
   #rest = 0;
@@ -209,9 +214,16 @@ export class Explorer {
 
   #film(): Film | null {
     if (!this.#loaded) return null;
-    const { motion, range } = this.#loaded;
-    const { time, speed } = this.#player;
-    return { motion, range, from: time[0], speed };
+    const { motion, range, time } = this.#loaded;
+    const { speed } = this.#player;
+    const from = this.#player.time[0];
+    if (range || !(motion instanceof SeriesMotion)) return { motion, range, from, speed };
+    // Series that are not loaded are in no film.
+    const last = motion.knownTo(from);
+    if (last < from + SCENE_S * speed) {
+      elements.message.textContent = `The file ends at ${time} = ${last}, where the series that are loaded end.`;
+    }
+    return { motion, range: [from, last], from, speed };
   }
 
   /** What is shown at the moment. */
@@ -334,7 +346,9 @@ export class Explorer {
     elements.message.textContent = rests ? RESTS : "";
     this.#controls.mark([]);
     this.#show(loaded);
-    elements.status.textContent = originOf(loaded, milliseconds);
+    this.#origin = originOf(loaded, milliseconds);
+    this.#lack = "";
+    elements.status.textContent = this.#origin;
     clearTimeout(this.#compareTimer);
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
@@ -386,8 +400,13 @@ export class Explorer {
     this.#facts.build(loaded);
     this.#showFormulas(loaded);
     this.#sampler = new Sampler(loaded.motion);
-    this.#trail = new Trail(this.#sampler, loaded.reach, loaded.motion.genus, (samples, anew) =>
-      this.#gallery.extend(samples, anew),
+    const { motion, reach } = loaded;
+    this.#trail = new Trail(
+      this.#sampler,
+      reach,
+      motion.genus,
+      (samples, anew) => this.#gallery.extend(samples, anew),
+      () => (motion instanceof SeriesMotion ? motion.revision : 0),
     );
   }
 
@@ -403,13 +422,14 @@ export class Explorer {
 
   /** Ask for more digits where the phases of the time need them. */
   async #needDigits(loaded: Loaded): Promise<void> {
-    if (this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
+    if (!(Number(loaded.document?.digits) <= 15) || this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
     this.#asksPrecise = true;
     try {
       const precise = await this.#source.loadPrecise(loaded, this.#abort.signal);
       if (loaded !== this.#loaded) return;
       if (!precise) {
-        elements.status.textContent = "Far time: the table has the error of this document.";
+        elements.status.textContent =
+          "Far time: the document of this motion has 15 digits; the table has their error.";
         return;
       }
       this.#show(precise);
@@ -418,6 +438,15 @@ export class Explorer {
     } catch {
       elements.status.textContent = "No document of more digits came for this far time.";
     }
+  }
+
+  /** Say where series do not reach the time. */
+  #showLack({ motion }: Loaded): void {
+    if (!(motion instanceof SeriesMotion)) return;
+    const lack = motion.lack(this.#player.time[0]);
+    if (lack === this.#lack) return;
+    this.#lack = lack;
+    elements.status.textContent = lack || this.#origin;
   }
 
   #picture(instant: number): void {
@@ -431,6 +460,7 @@ export class Explorer {
     this.#facts.show(sample, loaded);
     void this.#trail?.follow(this.#player.time[0]);
     void this.#needDigits(loaded);
+    this.#showLack(loaded);
     const text = this.#player.text();
     if (document.activeElement !== elements.time) elements.time.value = text;
     if (this.#player.playing !== (elements.play.textContent === "Pause")) this.#showPlaying();

@@ -154,6 +154,23 @@ export class Gallery {
     }
     if (!name) for (const view of this.#views) this.#host.append(view.card);
     this.#host.append(this.#absent);
+    this.#fillRows();
+  }
+
+  /** Make some cards broader, so that no row of three or two columns ends with a hole. */
+  #fillRows(): void {
+    const small = this.#shown.filter(
+      ({ card, name }) => name !== "engines" && !card.classList.contains("large"),
+    );
+    // The body first, then the ball, which has much to show on a broad picture.
+    const first = ["body", "ball", "sphere"].flatMap((name) => small.filter((view) => view.name === name));
+    for (const columns of [2, 3]) {
+      const holes = (columns - (small.length % columns)) % columns;
+      this.#views.forEach((view) => {
+        const place = first.indexOf(view);
+        view.card.classList.toggle(`broad-of-${columns}`, place >= 0 && place < holes);
+      });
+    }
   }
 
   /** Begin with another motion; views that cannot show it are named with the reason. */
@@ -171,6 +188,7 @@ export class Gallery {
       reasons.unshift("This browser has no WebGL: scenes in space are left out, plots work.");
     }
     this.#absent.textContent = reasons.join(" ");
+    this.#fillRows();
     for (const view of this.#shown) view.build(loaded);
     this.refresh();
   }

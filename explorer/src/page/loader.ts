@@ -111,7 +111,11 @@ async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> 
     waiting.add(index);
     stretchOf(problem, index, signal)
       .then((stretch) => motion.add(index, stretch))
-      .catch(() => undefined)
+      .catch((error: unknown) => {
+        // A server that is busy or gone is asked again; what it cannot do it will not do later.
+        if (!(error instanceof Refusal) || error.status === 503) return;
+        motion.refuse(index, error.message);
+      })
       .finally(() => setTimeout(() => waiting.delete(index), 2000));
   });
   return ofMotion(problem, motion, 2 * STRETCH_LENGTH);

@@ -4,6 +4,9 @@
 const PICTURES = 30;
 const LONGEST_S = 60;
 
+/** Seconds of the motion in the file of a scene. */
+export const SCENE_S = 10;
+
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 export interface Recording {

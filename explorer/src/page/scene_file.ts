@@ -17,9 +17,9 @@ import type { Motion } from "../evaluator/motion.ts";
 import { line } from "../views/shapes.ts";
 import type { Point } from "../views/shapes.ts";
 import type { View3D } from "../views/stage.ts";
+import { SCENE_S } from "./recorder.ts";
 
-/** Seconds of a film, and its pictures a second. */
-const SECONDS = 10;
+/** Pictures a second. */
 const PICTURES = 30;
 
 /** What is filmed: from a time on, at a speed, between the times that are known. */
@@ -61,7 +61,7 @@ export async function sceneFile(view: View3D, film: Film): Promise<Blob> {
 
 /** Return the seconds of the pictures, fewer where the motion is not known so long. */
 function secondsOf({ from, speed, range }: Film): number[] {
-  const last = range ? Math.min(SECONDS, (range[1] - from) / speed) : SECONDS;
+  const last = range ? Math.min(SCENE_S, (range[1] - from) / speed) : SCENE_S;
   const count = Math.max(2, Math.round(last * PICTURES) + 1);
   return Array.from({ length: count }, (_, k) => (last * k) / (count - 1));
 }

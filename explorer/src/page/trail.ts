@@ -1,6 +1,6 @@
 /**
  * The trail behind the present: samples at multiples of one step, of which only new ones are
- * computed. A jump of time makes it anew.
+ * computed. A jump of time makes it anew, and so do series that come late.
  */
 import type { Samples } from "../evaluator/samples.ts";
 import type { Sampler } from "./sampler.ts";
@@ -17,7 +17,9 @@ export class Trail {
   readonly #points: number;
   readonly #series: boolean;
   readonly #take: (samples: Samples, anew: boolean) => void;
+  readonly #revision: () => number;
   #last: number | null = null;
+  #seen = 0;
   #waiting = false;
   #closed = false;
 
@@ -26,7 +28,9 @@ export class Trail {
     reach: number,
     genus: number,
     take: (samples: Samples, anew: boolean) => void,
+    revision = () => 0,
   ) {
+    this.#revision = revision;
     this.#sampler = sampler;
     this.#points = genus >= 3 ? FEWER_POINTS : genus === 0 ? 1200 : POINTS;
     this.#series = genus === 0;
@@ -39,13 +43,17 @@ export class Trail {
     if (this.#waiting || this.#closed) return;
     const now = Math.floor(t / this.#step);
     const before = this.#last;
-    const anew = before === null || now < before || now - before > this.#points;
+    // Series that have come in the meantime were not in the trail.
+    const revision = this.#revision();
+    const come = revision !== this.#seen;
+    const anew = before === null || come || now < before || now - before > this.#points;
     if (!anew && now === before) return;
     // Series of the service begin at 0: nothing before it is asked for unseen.
     const earliest = this.#series && now >= 0 ? 0 : -Infinity;
     const first = anew ? Math.max(earliest, now - this.#points + 1) : before + 1;
     const times = Float64Array.from({ length: now - first + 1 }, (_, k) => (first + k) * this.#step);
     this.#waiting = true;
+    this.#seen = revision;
     try {
       const samples = await this.#sampler.samples(times);
       if (this.#closed) return;

@@ -42,7 +42,7 @@ export class BallView extends View3D {
       "ball",
       "Rolling ball",
       CAPTION,
-      [4.4, -7.6, 5.0],
+      [6.0, -10.4, 6.8],
     );
   }
 

@@ -83,22 +83,24 @@ export class BodyView extends View3D {
     this.world.add(this.#tip.object);
     // The largest ω of some times is as long as OMEGA_LENGTH.
     let largest = 1e-30;
+    // Series begin at the start.
+    const step = motion.genus ? -reach / 400 : reach / 80;
     for (let k = 0; k < 40; k++) {
-      largest = Math.max(largest, Math.hypot(...motion.at((-reach * k) / 400).Omega));
+      largest = Math.max(largest, Math.hypot(...motion.at(step * k).Omega));
     }
     this.#scale = OMEGA_LENGTH / largest;
   }
 
   #addSolid(dark: boolean): void {
     const axes = this.#axes;
-    const body = surface((u, v) => onEllipsoid(u, v, axes), dark ? "#9fb4cc" : "#7d93ad", {
+    const body = surface((u, v) => onEllipsoid(u, v, axes), dark ? "#9fb4cc" : "#a9c0d8", {
       opacity: 0.42,
     });
     body.renderOrder = 1;
     // A box in the ellipsoid, with edges in the ratio of its half axes.
     const edges = axes.map((axis) => (1.98 * axis) / Math.sqrt(3));
     const box = new BoxGeometry(edges[0], edges[1], edges[2]);
-    const material = new MeshStandardMaterial({ color: "#3d78ad", roughness: 0.5 });
+    const material = new MeshStandardMaterial({ color: dark ? "#3d78ad" : "#5b97cc", roughness: 0.5 });
     const rim = new LineBasicMaterial({ color: dark ? "#d6e6f5" : "#12385c" });
     this.#solid.add(new Mesh(box, material), new LineSegments(new EdgesGeometry(box), rim), body);
     axes.forEach((axis, k) => {

@@ -51,7 +51,7 @@ export function confocalQuadric(A: number[], mu: number, scale: number, colour: 
   };
   if (positive.length === 2 && negative.length === 1) {
     const one = surface((u, v) => {
-      const h = 1.25 * (2 * v - 1);
+      const h = 1.1 * (2 * v - 1);
       const angle = 2 * Math.PI * u;
       return put([
         [positive[0], Math.cosh(h) * Math.cos(angle)],
@@ -64,7 +64,7 @@ export function confocalQuadric(A: number[], mu: number, scale: number, colour: 
   if (positive.length === 1 && negative.length === 2) {
     for (const sign of [1, -1]) {
       const sheet = surface((u, v) => {
-        const h = 1.35 * v;
+        const h = 1.1 * v;
         const angle = 2 * Math.PI * u;
         return put([
           [positive[0], sign * Math.cosh(h)],

@@ -4,6 +4,7 @@
  */
 import type { Sample } from "../evaluator/motion.ts";
 import { disc, stroke, subscript } from "./curve_view.ts";
+import { Names } from "./names.ts";
 import { FONT, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { list, short, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
@@ -18,6 +19,9 @@ export interface Choice {
 const [LEFT, RIGHT, TOP, BOTTOM] = [0.11, 0.04, 0.05, 0.13];
 
 type Place = [number, number];
+
+/** A part of the map: its colour, its corners and its name. */
+type Cell = [string, Place[], string];
 
 export class ConstantsView extends View {
   #torus: Torus | null = null;
@@ -40,7 +44,9 @@ export class ConstantsView extends View {
 
   refusal({ torus, motion }: Loaded): string | null {
     if (!torus || !motion.genus) return "The page knows no constants c of this motion.";
-    if (motion.body) return "With an area constant I changes with the start, so there is no map.";
+    if (motion.body) {
+      return "Where (Ω,γ) or (K,γ) is not zero the I change with the start: no map holds for all starts.";
+    }
     if (motion.n < 3) return "In two dimensions the energy is the only constant.";
     return motion.n <= 4 && motion.genus === motion.n - 1
       ? null
@@ -94,27 +100,40 @@ export class ConstantsView extends View {
     context.fillStyle = colours.background;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
     context.font = `${12 * ratio}px ${FONT}`;
-    if (this.#flat) this.#drawZones(context);
-    else this.#drawCells(context);
+    const names = new Names(context, ratio, 12);
+    for (const [x, y] of this.#marks(torus)) names.keepFree(x, y, 8 * ratio);
+    const cells = this.#flat ? this.#zones() : this.#cells();
+    for (const [colour, corners] of cells) this.#fill(context, colour, corners);
     this.#drawAxes(context, ratio);
     context.lineWidth = 1.5 * ratio;
     if (this.#flat) {
       context.strokeStyle = ORANGE;
       const x = this.#x(torus.constants[0]);
       stroke(context, [[x, TOP * this.canvas.height], [x, (1 - BOTTOM) * this.canvas.height]]);
-      this.#lambda.forEach((value, s) => {
-        this.#mark(context, x, this.#y(value), s ? PINK : GREEN, ratio);
-      });
-    } else {
-      const [c2, c3] = torus.constants;
-      this.#mark(context, this.#x(c2), this.#y(c3), VERMILION, ratio);
     }
+    for (const [, corners, name] of cells) {
+      const middle = centroid(corners.map(([x, y]) => [this.#x(x), this.#y(y)]));
+      if (!middle) continue;
+      // Beside the line of the motion.
+      const off = this.#flat ? middle[0] - this.#x(torus.constants[0]) : Infinity;
+      const aside = Math.abs(off) < 14 * ratio ? Math.sign(off || 1) * 18 * ratio - off : 0;
+      names.write(name, middle[0] + aside, middle[1]);
+    }
+    this.#marks(torus).forEach(([x, y], s) => {
+      this.#mark(context, x, y, this.#flat ? (s ? PINK : GREEN) : VERMILION, ratio);
+    });
     if (this.#cursor && document.activeElement === this.canvas) {
       const [x, y] = [this.#cursor[0] * this.canvas.width, this.#cursor[1] * this.canvas.height];
       context.strokeStyle = colours.text;
       stroke(context, [[x - 9 * ratio, y], [x + 9 * ratio, y]]);
       stroke(context, [[x, y - 9 * ratio], [x, y + 9 * ratio]]);
     }
+  }
+
+  /** Return where the marks of the motion are, in pixels. */
+  #marks({ constants: [c2, c3] }: Torus): Place[] {
+    if (!this.#flat) return [[this.#x(c2), this.#y(c3)]];
+    return this.#lambda.map((value) => [this.#x(c2), this.#y(value)]);
   }
 
   #mark(context: CanvasRenderingContext2D, x: number, y: number, fill: string, ratio: number) {
@@ -124,8 +143,8 @@ export class ConstantsView extends View {
     disc(context, x, y, 4.5 * ratio);
   }
 
-  /** Shade a polygon of places of the map, and write a name into its middle. */
-  #fill(context: CanvasRenderingContext2D, colour: string, places: Place[], name: string): void {
+  /** Shade a polygon of places of the map. */
+  #fill(context: CanvasRenderingContext2D, colour: string, places: Place[]): void {
     const corners = places.map(([x, y]): Place => [this.#x(x), this.#y(y)]);
     context.globalAlpha = 0.38;
     context.fillStyle = colour;
@@ -133,30 +152,27 @@ export class ConstantsView extends View {
     for (const corner of corners) context.lineTo(...corner);
     context.fill();
     context.globalAlpha = 1;
-    context.fillStyle = theme().text;
-    context.textAlign = "center";
-    const middle = (axis: 0 | 1) => corners.reduce((sum, one) => sum + one[axis], 0) / corners.length;
-    context.fillText(name, middle(0), middle(1));
   }
 
-  /** Shade where λ_1 and λ_2 move, for each c_2. */
-  #drawZones(context: CanvasRenderingContext2D): void {
+  /** Return where λ_1 and λ_2 move, for each c_2. */
+  #zones(): Cell[] {
     const [low, middle, high] = this.#I;
     // λ_1 ∈ [I_1, min(c_2, I_2)], λ_2 ∈ [max(c_2, I_2), I_3].
-    this.#fill(context, GREEN, [[low, low], [middle, middle], [high, middle], [high, low]], "λ₁");
-    this.#fill(context, PINK, [[low, middle], [middle, middle], [high, high], [low, high]], "λ₂");
+    return [
+      [GREEN, [[low, low], [middle, middle], [high, middle], [high, low]], "λ₁"],
+      [PINK, [[low, middle], [middle, middle], [high, high], [low, high]], "λ₂"],
+    ];
   }
 
-  /** Shade the four regimes of c_2 < c_3. */
-  #drawCells(context: CanvasRenderingContext2D): void {
+  /** Return the four regimes of c_2 < c_3. */
+  #cells(): Cell[] {
     const [low, I2, I3, I4] = this.#I;
-    const cells: [string, Place[], string][] = [
+    return [
       [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]], "c₂ < I₂ < c₃ < I₃"],
       [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]], "c₂ < I₂, I₃ < c₃"],
       [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]], "I₂ < c₂ < I₃ < c₃"],
       [VERMILION, [[I2, I2], [I3, I3], [I2, I3]], "I₂ < c₂, c₃ < I₃"],
     ];
-    for (const cell of cells) this.#fill(context, ...cell);
   }
 
   #drawAxes(context: CanvasRenderingContext2D, ratio: number): void {
@@ -166,8 +182,9 @@ export class ConstantsView extends View {
     context.fillStyle = colours.text;
     context.lineWidth = ratio;
     const [, right] = this.#ranges()[0];
-    const inX = this.#I.filter((value) => value <= right);
-    const inY = this.#flat ? this.#I : this.#I.filter((value) => value >= this.#I[1]);
+    const I = [...new Set(this.#I)];
+    const inX = I.filter((value) => value <= right);
+    const inY = this.#flat ? I : I.filter((value) => value >= this.#I[1]);
     context.setLineDash([4 * ratio, 4 * ratio]);
     for (const x of inX.map((value) => this.#x(value))) {
       stroke(context, [[x, TOP * height], [x, (1 - BOTTOM) * height]]);
@@ -178,18 +195,21 @@ export class ConstantsView extends View {
     context.setLineDash([]);
     context.textAlign = "center";
     for (const value of inX) {
-      const name = `I${subscript(this.#I.indexOf(value) + 1)}`;
-      context.fillText(name, this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
+      context.fillText(this.#nameOf(value), this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
     }
     const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
     const under = (1 - BOTTOM) * height + 15 * ratio;
     context.fillText(names[0], this.#besideMarks(inX, 0), under);
     context.textAlign = "right";
     for (const value of inY) {
-      const name = `I${subscript(this.#I.indexOf(value) + 1)}`;
-      context.fillText(name, LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
+      context.fillText(this.#nameOf(value), LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
     }
     context.fillText(names[1], LEFT * width - 6 * ratio, this.#besideMarks(inY, 1) + 4 * ratio);
+  }
+
+  /** Return the name of a moment; those that are equal share a place. */
+  #nameOf(value: number): string {
+    return this.#I.flatMap((other, k) => (other === value ? [`I${subscript(k + 1)}`] : [])).join();
   }
 
   /** Return the middle of the widest gap between the marks of an axis. */
@@ -230,6 +250,19 @@ export class ConstantsView extends View {
     const names = constants.map((value, k) => `c${subscript(k + 2)} = ${short(value, 6)}`);
     return `${names.join(", ")}; the regime is ${regime}. I is ${list(this.#I)}.`;
   }
+}
+
+/** Return the middle of a polygon; null of one without an area. */
+function centroid(corners: Place[]): Place | null {
+  let [area, x, y] = [0, 0, 0];
+  corners.forEach(([a, b], k) => {
+    const [c, d] = corners[(k + 1) % corners.length];
+    const part = a * d - b * c;
+    area += part;
+    x += (a + c) * part;
+    y += (b + d) * part;
+  });
+  return Math.abs(area) < 400 ? null : [x / (3 * area), y / (3 * area)];
 }
 
 /** Return c_2 and λ of a place in the map of n = 3; null outside of what moves. */

@@ -1,5 +1,6 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
+import { Names } from "./names.ts";
 import { FONT, SERIES, theme } from "./theme.ts";
 import { list, View } from "./view.ts";
 import type { Curves, Loaded, Torus } from "./view.ts";
@@ -75,6 +76,7 @@ export class CurveView extends View {
     for (let s = 0; 2 * s + 1 < b.length; s++) {
       stroke(context, [[x(b[2 * s]), middle], [x(b[2 * s + 1]), middle]]);
     }
+    const names = new Names(context, ratio, 12);
     for (let s = 1; 2 * s < b.length; s++) {
       const [left, right, most] = this.#cut(s);
       const colour = SERIES[(s - 1) % SERIES.length];
@@ -92,10 +94,10 @@ export class CurveView extends View {
       disc(context, x(value), y, 6.5 * ratio);
       context.fillStyle = colour;
       disc(context, x(value), y, 4.5 * ratio);
-      context.fillStyle = colours.text;
-      context.font = `${12 * ratio}px ${FONT}`;
-      context.textAlign = "center";
-      context.fillText(`λ${subscript(s)}`, x((left + right) / 2), middle + 4 * ratio);
+      names.keepFree(x(value), y, 7 * ratio);
+      // A closed cut has its name beside it.
+      const closed = x(right) - x(left) < 8 * ratio;
+      names.write(`λ${subscript(s)}`, x((left + right) / 2), middle - (closed ? 18 * ratio : 0));
     }
     this.#label(context, ratio, x, height, origins);
   }
@@ -111,17 +113,23 @@ export class CurveView extends View {
     const colours = theme();
     context.font = `${12.5 * ratio}px ${FONT}`;
     context.textAlign = "center";
+    const { branch_points: b } = this.#torus!;
+    const name = (k: number) => `${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`;
     let [last, row] = [-Infinity, 0];
-    this.#torus!.branch_points.forEach((value, k) => {
+    b.forEach((value, k) => {
+      // Branch points that coincide share a name.
+      if (k && value === b[k - 1]) return;
+      const same = b.flatMap((other, j) => (other === value ? [name(j)] : []));
+      const text = [...new Set(same)].join(" = ");
       const at = x(value);
       row = at - last < 26 * ratio ? (row + 1) % 3 : 0;
-      last = at;
+      last = at + context.measureText(text).width / 2 - 7 * ratio;
       context.strokeStyle = colours.dim;
       context.lineWidth = ratio;
-      const y = height - (30 - 11 * row) * ratio;
+      const y = height - (34 - 14 * row) * ratio;
       stroke(context, [[at, 0.46 * height - 6 * ratio], [at, y - 12 * ratio]]);
       context.fillStyle = colours.text;
-      context.fillText(`${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`, at, y);
+      context.fillText(text, at, y);
     });
   }
 

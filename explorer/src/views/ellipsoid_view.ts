@@ -17,7 +17,9 @@ import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
-const CAPTION =
+const CAPTION = "The same motion as a geodesic, and its tangent.";
+
+const QUADRIC =
   "The same motion as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
 
 const WITH_AREA =
@@ -62,6 +64,7 @@ export class EllipsoidView extends View3D {
         : motion.body
           ? WITH_AREA
           : CAPTION;
+    const umbilic = umbilics(A);
     this.#scale = Math.sqrt(Math.max(...A));
     const half = A.map((entry) => Math.sqrt(entry) / this.#scale);
     const globe = surface((u, v) => onEllipsoid(u, v, half), colours.dark ? "#243042" : "#dfe6ee", {
@@ -72,10 +75,13 @@ export class EllipsoidView extends View3D {
     if (this.#mu !== null) {
       const quadric = confocalQuadric(A, this.#mu, this.#scale, ORANGE);
       this.world.add(quadric);
+      // In a plane of symmetry the quadric is flat, and nothing is drawn of it.
+      if (quadric.children.length && !motion.body) this.caption.textContent = QUADRIC;
     }
-    for (const umbilic of umbilics(A)) {
+    if (umbilic.length) this.caption.append(" Pink: umbilics.");
+    for (const place of umbilic) {
       const one = ball(PINK, 0.022);
-      one.position.set(...(umbilic.map((x) => x / this.#scale) as Point));
+      one.position.set(...(place.map((x) => x / this.#scale) as Point));
       this.world.add(one);
     }
     this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");

@@ -14,7 +14,18 @@ import type { Curves, Loaded } from "./view.ts";
 const WINDOW = 1200;
 
 /** The height of a plot, in pixels. */
-const HEIGHT = 210;
+const HEIGHT = 220;
+
+const FONT_OF_AXES = "11px 'DejaVu Sans', system-ui, sans-serif";
+
+/** Times beyond this part of what a plot shows are written as their difference from the newest. */
+const FAR = 1e4;
+
+const CAPTION =
+  "λ(t); how integrals hold at far times; how far browser, closed form and integration differ.";
+
+const WITHOUT =
+  "The coordinates λ of q. Without a closed form there is nothing to compare with integration.";
 
 /** What is zero is drawn here on a logarithmic axis. */
 const FLOOR = 1e-17;
@@ -46,6 +57,8 @@ export class EnginesView extends View {
   readonly #host = element("div", { class: "plots" });
   #plots: Plot[] = [];
   #loaded: Loaded | null = null;
+  /** The plot of the coordinates, which goes on as the motion does. */
+  #motion: Plot | null = null;
   #times: number[] = [];
   #lambda: number[][] = [];
   #largest: string[] = [];
@@ -55,7 +68,7 @@ export class EnginesView extends View {
     super(
       "engines",
       "Engines",
-      "λ(t); how integrals hold at far times; how far browser, closed form and integration differ.",
+      CAPTION,
     );
     this.canvas.replaceWith(this.#host);
     this.#host.setAttribute("role", "img");
@@ -70,8 +83,11 @@ export class EnginesView extends View {
 
   build(loaded: Loaded): void {
     this.#loaded = loaded;
+    this.caption.textContent = loaded.document ? CAPTION : WITHOUT;
+    this.#host.classList.toggle("alone", !loaded.document);
     for (const { chart } of this.#plots) chart?.destroy();
     this.#plots = [];
+    this.#motion = null;
     this.#times = [];
     this.#lambda = [];
     this.#largest = [];
@@ -82,7 +98,7 @@ export class EnginesView extends View {
         name: `λ${"₁₂₃₄₅₆₇₈₉"[s] ?? ""}`,
         colour: SERIES[s % SERIES.length],
       }));
-      this.#add("λ(t)", loaded.time, lines, false, false);
+      this.#motion = this.#add(`λ(${loaded.time})`, loaded.time, lines, false, false);
     }
     if (loaded.document) {
       const { times, columns, names } = integralErrors(loaded);
@@ -160,7 +176,7 @@ export class EnginesView extends View {
       this.#times.splice(0, extra);
       for (const column of this.#lambda) column.splice(0, extra);
     }
-    const plot = this.#plots.find(({ title }) => title === "λ(t)");
+    const plot = this.#motion;
     if (!plot) return;
     plot.data = [this.#times, ...this.#lambda];
     plot.chart?.setData(plot.data);
@@ -217,7 +233,11 @@ function makeChart(plot: Plot, width: number): uPlot {
     grid: { stroke: colours.line, width: 1 },
     ticks: { stroke: colours.line, width: 1, size: 4 },
     size: side === 2 ? 26 : 46,
-    font: "11px 'DejaVu Sans', system-ui, sans-serif",
+    font: FONT_OF_AXES,
+    ...(side === 2
+      ? { label: (chart) => labelOf(chart, plot.x), labelFont: FONT_OF_AXES, labelSize: 16, labelGap: 0 }
+      : {}),
+    ...(side === 2 && !logarithmic ? { values: valuesOf } : {}),
     ...(logarithmic
       ? { splits: decades, filter: (_, all) => all, values: (_, all) => all.map(powerOfTen) }
       : {}),
@@ -227,6 +247,8 @@ function makeChart(plot: Plot, width: number): uPlot {
     height: HEIGHT,
     legend: { show: false },
     cursor: { show: false },
+    // Curves keep to their values, not to whole pixels.
+    pxAlign: 0,
     scales: {
       x: { time: false, distr: plot.longTimes ? 3 : 1 },
       y: { distr: plot.logarithmic ? 3 : 1 },
@@ -244,6 +266,26 @@ function makeChart(plot: Plot, width: number): uPlot {
     ],
   };
   return new uPlot(options, plot.data, plot.host);
+}
+
+/** Return the newest time of a plot whose times are too far to be written; null of others. */
+function newestOf(chart: uPlot): number | null {
+  const times = chart.data[0];
+  const [first, last] = [times[0] ?? 0, times[times.length - 1] ?? 0];
+  return Math.abs(last) > FAR * (last - first) && Math.abs(last) > FAR ? last : null;
+}
+
+function labelOf(chart: uPlot, x: string): string {
+  return newestOf(chart) === null ? x : `${x}, from the newest`;
+}
+
+/** Return what is written at the marks of a time axis. */
+function valuesOf(chart: uPlot, marks: number[]): string[] {
+  const newest = newestOf(chart);
+  return marks.map((mark) => {
+    const shown = newest === null ? mark : Number((mark - newest).toPrecision(3));
+    return String(Number(shown.toPrecision(12))).replace("-", "−");
+  });
 }
 
 /** Return at most seven powers of ten between two numbers. */

@@ -13,7 +13,9 @@ import { TrailLine } from "./trail_line.ts";
 import { list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
-const CAPTION = "q = e₁ seen from the body, with lines of spheroconic coordinates.";
+const CAPTION = "q = e₁ seen from the body.";
+
+const NET = "q = e₁ seen from the body, with lines of spheroconic coordinates.";
 
 const ZONE = "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
 
@@ -54,9 +56,9 @@ export class SphereView extends View3D {
         : CAPTION;
     const c2 = torus && motion.n === 3 ? torus.constants[0] : null;
     const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
-    if (I && c2 !== null) this.caption.textContent = motion.body ? WITH_AREA : ZONE;
+    if (I) this.caption.textContent = c2 === null ? NET : motion.body ? WITH_AREA : ZONE;
     const unit = [1, 1, 1];
-    const [plain, shaded] = colours.dark ? ["#243042", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
+    const [plain, shaded] = colours.dark ? ["#2c3a4f", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
     const inside = I && c2 !== null ? zoneOf(I, c2) : null;
     const globe = surface((u, v) => onEllipsoid(u, v, unit), plain, {
       opacity: 0.62,

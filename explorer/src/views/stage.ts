@@ -14,8 +14,9 @@ import {
 import type { Material, Mesh, Object3D } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Sample } from "../evaluator/motion.ts";
+import { Names } from "./names.ts";
 import type { Point } from "./shapes.ts";
-import { BLUE, FONT, theme } from "./theme.ts";
+import { BLUE, theme } from "./theme.ts";
 import { View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
@@ -46,13 +47,15 @@ export abstract class View3D extends View {
   readonly controls: OrbitControls;
   /** The distance that the camera keeps from what it looks at. */
   readonly distance: number;
+  readonly #sky = new HemisphereLight(0xffffff, 0x556677, 1.5);
+  readonly #ambient = new AmbientLight(0xffffff, 0.4);
 
   constructor(name: string, title: string, caption: string, from: [number, number, number]) {
     super(name, title, caption);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(...from);
     this.distance = this.camera.position.length();
-    this.scene.add(new HemisphereLight(0xffffff, 0x556677, 1.5), new AmbientLight(0xffffff, 0.4));
+    this.scene.add(this.#sky, this.#ambient);
     const sun = new DirectionalLight(0xffffff, 1.5);
     sun.position.set(2, -3, 4);
     this.scene.add(sun, this.world);
@@ -102,7 +105,11 @@ export abstract class View3D extends View {
     const ratio = this.fit();
     const { width, height } = this.canvas;
     if (!shared || !context || !width || !height) return;
-    this.scene.background = new Color(theme().background);
+    const { background, dark } = theme();
+    this.scene.background = new Color(background);
+    // On a light page surfaces are as light as their colours.
+    this.#sky.groundColor.set(dark ? 0x556677 : 0xd5dde6);
+    this.#ambient.intensity = dark ? 0.4 : 1;
     this.camera.aspect = width / height;
     // A tall canvas sees as much of the breadth as a square one does.
     this.camera.fov = this.camera.aspect < 1 ? 32 / Math.max(this.camera.aspect, 0.55) : 32;
@@ -120,26 +127,14 @@ export abstract class View3D extends View {
     this.#write(context, ratio);
   }
 
-  /** Write the names, with a rim by which they stand out from lines. */
+  /** Write the names. */
   #write(context: CanvasRenderingContext2D, ratio: number): void {
     const { width, height } = this.canvas;
-    const colours = theme();
-    context.font = `${13 * ratio}px ${FONT}`;
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.lineWidth = 3 * ratio;
-    context.lineJoin = "round";
-    context.strokeStyle = colours.background;
-    context.fillStyle = colours.text;
+    const names = new Names(context, ratio);
     for (const { text, at } of this.labels()) {
       const { x, y, z } = new Vector3(...at).project(this.camera);
       if (Math.abs(x) > 1.1 || Math.abs(y) > 1 || z > 1) continue;
-      // Within the canvas, whole.
-      const half = context.measureText(text).width / 2 + 4 * ratio;
-      const across = Math.min(Math.max((0.5 + 0.5 * x) * width, half), width - half);
-      const place = [across, (0.5 - 0.5 * y) * height] as const;
-      context.strokeText(text, ...place);
-      context.fillText(text, ...place);
+      names.write(text, (0.5 + 0.5 * x) * width, (0.5 - 0.5 * y) * height);
     }
   }
 
