@@ -45,7 +45,7 @@ export class ConstantsView extends View {
   refusal({ torus, motion }: Loaded): string | null {
     if (!torus || !motion.genus) return "The page knows no constants c of this motion.";
     if (motion.body) {
-      return "Where (Ω,γ) or (K,γ) is not zero the I change with the start: no map holds for all starts.";
+      return "With an area constant, (Ω,γ) or (K,γ) not zero, I changes with the start: no map holds for all starts.";
     }
     if (motion.n < 3) return "In two dimensions the energy is the only constant.";
     return motion.n <= 4 && motion.genus === motion.n - 1
