@@ -155,6 +155,26 @@ def test_a_long_motion_is_a_density_and_not_a_solid_ball() -> None:
     assert np.mean(is_coloured(image, COLOURS[2])) < 0.05
 
 
+def test_a_ball_has_the_path_of_its_contact_point_seen_from_above() -> None:
+    ball = vs.RubberBall([0.4, 0.6, 0.9], 0.2, 1, *START)
+    motion = solve(ball, {"start": 0, "stop": 30, "count": 600})
+    figure = motion.plot()
+    assert len(figure.axes) == 4
+    axes = figure.axes[1]
+    pixels(figure)
+    assert axes.get_aspect() == 1
+    x, y = axes.get_lines()[0].get_data()
+    assert np.ptp(x) >= np.ptp(y)
+    # Seen from above: what turns from e_2 to e_3 turns to the left.
+    own, seen = (np.diff(path, axis=0) for path in (motion.position, np.stack([x, y], axis=1)))
+    turn = own[:-1, 0] * own[1:, 1] - own[:-1, 1] * own[1:, 0]
+    shown = seen[:-1, 0] * seen[1:, 1] - seen[:-1, 1] * seen[1:, 0]
+    np.testing.assert_allclose(shown, turn, atol=1e-15)
+    assert np.mean(is_coloured(pixels(motion.plot(outputs=["path"])), COLOURS[0])) > 0.002
+    with pytest.raises(InvalidInput, match=r"required a ball in three dimensions for .* path"):
+        solve(vs.Veselova([3, 2, 1], *START), [0, 1]).plot(outputs=["path"])
+
+
 def test_comparisons_draw_their_difference_and_take_the_same_options() -> None:
     found = vs.compare(vs.Veselova([3, 2, 1], *START), np.linspace(0, 5, 60))
     figure = found.plot(outputs=["difference"], style="print")

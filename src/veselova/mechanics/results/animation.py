@@ -39,7 +39,7 @@ _BOX = np.array(
 ).T / np.sqrt(3)
 
 #: Half the width of the picture of a ball, in radii.
-_WINDOW = 3.0
+_WINDOW = 4.0
 
 #: Frames of the longest film.
 _MOST_FRAMES = 10_000
@@ -221,13 +221,20 @@ class _Ball:
     """The ball on its plane, which the picture follows, with the path of its contact point."""
 
     def __init__(self, axes: Any, shown: Filmed, radius: float) -> None:
+        from matplotlib.colors import LightSource
+
         self._axes = axes
         self._radius = radius
         self._turns = _in_space(shown.series("frame"))
         self._path = shown.series("position")
         self._moving: list[Any] = []
         axes.set_box_aspect((1, 1, 1), zoom=1.5)
-        axes.view_init(elev=24, azim=-60)
+        # From the side, a little from the front: the path is not hidden behind the ball.
+        way = self._path[-1] - self._path[0]
+        azimuth = float(np.degrees(np.arctan2(way[1], way[0]))) - 60
+        axes.view_init(elev=24, azim=azimuth)
+        # Light comes over the left shoulder; its azimuth is counted from the second axis, clockwise.
+        self._light = LightSource(90 - (azimuth - 40), 40)
         axes.set_zlim(*(radius * (1.0 + np.array([-_WINDOW, _WINDOW]))))
         (self._trail,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.4)
 
@@ -237,7 +244,9 @@ class _Ball:
             artist.remove()
         axes = self._axes
         x, y = self._path[k]
-        grid = _surface(self._turns[k], self._radius * np.ones(3), np.eye(3), 17, 33)
+        sphere = _surface(self._turns[k], self._radius * np.ones(3), np.eye(3), 17, 33)
+        # In the order in which normals point outwards, for the light.
+        grid = [part[:, ::-1] for part in sphere]
         octants = np.arange(16)[:, None] // 8 + np.arange(32)[None, :] // 8
         colours = np.where((octants % 2 == 0)[..., None], _rgb("#56B4E9"), _rgb("#F4F7FA"))
         self._moving = [
@@ -250,6 +259,7 @@ class _Ball:
                 cstride=1,
                 linewidth=0,
                 antialiased=False,
+                lightsource=self._light,
             )
         ]
         half = _WINDOW * self._radius

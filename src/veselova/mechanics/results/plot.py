@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 _LEAST_DRAWN = 1e-17
 
 #: Panels besides the series of a problem.
-_PANELS = ("portrait", "drift", "error", "difference")
+_PANELS = ("portrait", "path", "drift", "error", "difference")
 
 #: Style → settings of matplotlib. ``print`` is one column of a journal, 86 mm, with its text at 8
 #: points; fonts are embedded as outlines that journals take.
@@ -133,6 +133,8 @@ def picture(
         for axes, panel in zip(all_axes, panels, strict=True):
             if panel == "portrait":
                 _draw_curve(axes, motion)
+            elif panel == "path":
+                _draw_path(axes, motion.series("position"))
             elif panel == "difference":
                 _draw_difference(axes, motion.times, differences or {}, errors or {}, floor)
             else:
@@ -154,12 +156,14 @@ def _panels(
     """Return the panels that are asked for; raises InvalidInput for others."""
     problem = motion.problem
     in_space = motion.series(problem.portrait)[:1].size == 3
+    on_plane = "position" in problem.outputs and motion.series("position")[:1].size == 2
     if outputs is None and ax is not None:
         return ["portrait" if ax.name == "3d" else problem.portrait]
     if outputs is None:
         last = ["difference"] if compared else []
         middle = "spheroconic" if "spheroconic" in problem.outputs else "drift"
-        return [*(["portrait"] if in_space else []), problem.portrait, middle, *last]
+        first = [*(["portrait"] if in_space else []), *(["path"] if on_plane else [])]
+        return [*first, problem.portrait, middle, *last]
     chosen = [outputs] if isinstance(outputs, str) else list(outputs)
     known = [*problem.outputs, *(_PANELS if compared else _PANELS[:-1])]
     if not chosen or (ax is not None and len(chosen) > 1):
@@ -168,6 +172,9 @@ def _panels(
     for i, name in enumerate(chosen):
         if name not in known:
             raise unknown_name(("outputs", i), name, known)
+    if "path" in chosen and not on_plane:
+        required = "a ball in three dimensions for the panel path"
+        raise InvalidInput(("outputs",), required, problem.title)
     if "portrait" in chosen and not in_space:
         required = "a series of three components for the panel portrait"
         given = f"{problem.portrait} of {motion.series(problem.portrait)[:1].size}"
@@ -194,6 +201,9 @@ def _layout(figure_class: Any, panels: list[str], shared: bool) -> tuple[Figure,
         if panel == "portrait":
             found.append(figure.add_subplot(grid[i], projection="3d"))
             continue
+        if panel == "path":
+            found.append(figure.add_subplot(grid[i]))
+            continue
         found.append(figure.add_subplot(grid[i], sharex=in_time[0] if shared and in_time else None))
         in_time.append(found[-1])
     return figure, found
@@ -217,6 +227,21 @@ def _draw_curve(axes: Any, motion: Portrayable) -> None:
     axes.set_title(title)
 
 
+def _draw_path(axes: Axes, position: Array) -> None:
+    """Draw the path of the contact point in its plane, seen from above, its long side across."""
+    across, up = position.T
+    names = ("e_2", "e_3")
+    if np.ptp(across) < np.ptp(up):
+        across, up, names = -up, across, ("-e_3", "e_2")
+    axes.plot(across, up, color=COLOURS[0])
+    for k, marker in ((0, "o"), (-1, "s")):
+        axes.plot(across[k], up[k], marker, color=COLOURS[1], markersize=4)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title("path of the contact point, from the circle to the square")
+    axes.set_xlabel(f"along ${names[0]}$")
+    axes.set_ylabel(f"along ${names[1]}$")
+
+
 def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
     """Draw components of a series, the drift of the integrals, or the error, over time."""
     times = motion.times
@@ -233,6 +258,8 @@ def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
     axes.margins(x=0)
     if _section(motion) == slice(None):
         axes.label_outer()
+    elif panel not in ("drift", "error"):
+        axes.set_title(f"the first of {len(times)} times", loc="right")
 
 
 def _section(motion: Portrayable) -> slice:

@@ -305,8 +305,9 @@ class Trajectory(SampledMotion):
 
         - ax: axes to draw one panel into; in space (``projection="3d"``) for the panel portrait
         - outputs: the panels: any series, over time; ``portrait``, the curve in space of a series
-          with three components; ``drift``, the relative change of the integrals; ``error``. By
-          default the portrait, its components, and the spheroconic coordinates or the drift
+          with three components; ``path``, that of a ball on its plane; ``drift``, the relative
+          change of the integrals; ``error``. By default the portrait, the path, the components
+          of the portrait, and the spheroconic coordinates or the drift
         - times: those to draw, as ``at`` takes them; None for the trajectory's own
         - style: ``screen``, ``print`` (one column of 86 mm, 8 points), or settings of matplotlib
 
