@@ -144,6 +144,9 @@ def test_the_server_gives_its_schemas(server: Server) -> None:
         assert answer.headers["content-type"] == "application/schema+json"
         assert answer.json() == schema_document(item["name"])
     for item in server.get("/v1/systems").json()["systems"]:
+        # A whole sentence, not the first line of one.
+        assert item["title"].endswith(".")
+        assert 30 < len(item["title"]) < 200
         schema = server.get(item["schema"]).json()
         assert schema["properties"]["system"]["const"] == item["system"]
         assert set(schema["properties"]) == {"system", *item["fields"]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -82,12 +83,18 @@ _OPERATIONS = {
 _TOOLKIT = ("curve", "theta")
 
 
+def _first_sentence(text: str) -> str:
+    """Return the first sentence of a docstring, whose lines are broken anywhere."""
+    paragraph = " ".join(text.strip().split("\n\n")[0].split())
+    return re.split(r"(?<=\.) ", paragraph, maxsplit=1)[0]
+
+
 def _systems() -> list[dict[str, Any]]:
     """Return the systems served, for clients that discover them."""
     return [
         {
             "system": name,
-            "title": (model.__doc__ or "").strip().splitlines()[0],
+            "title": _first_sentence(model.__doc__ or ""),
             "schema": SCHEMA.format(name=model.__name__),
             "fields": [field for field in model.model_fields if field != "system"],
             "engines": {
