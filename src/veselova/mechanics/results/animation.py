@@ -233,7 +233,7 @@ class _Ball:
         way = self._path[-1] - self._path[0]
         azimuth = float(np.degrees(np.arctan2(way[1], way[0]))) - 60
         axes.view_init(elev=24, azim=azimuth)
-        # Light comes over the left shoulder; its azimuth is counted from the second axis, clockwise.
+        # Light comes over the left shoulder; its azimuth is clockwise from the second axis.
         self._light = LightSource(90 - (azimuth - 40), 40)
         axes.set_zlim(*(radius * (1.0 + np.array([-_WINDOW, _WINDOW]))))
         (self._trail,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.4)
