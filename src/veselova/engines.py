@@ -330,4 +330,4 @@ def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
         )
     from veselova.analytic.motion.invariant_torus import torus as torus_of
 
-    return torus_of(on_torus(problem), solution)
+    return torus_of(problem, solution)

@@ -23,6 +23,7 @@ from veselova import InvalidInput, Unsolved
 from veselova.analytic.motion import time_map_balls, torus_solution_balls
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.solve import METHODS, solve
+from veselova.analytic.time_map.fourier_modes import with_slow_phases
 
 SYSTEMS = ("veselova-so3", "rubber-ball", "chaplygin-ball")
 MOVING = [case for case in BODIES if "at-rest" not in case.tags]
@@ -157,12 +158,13 @@ def test_the_mean_velocity_is_that_of_a_long_run(system: str) -> None:
     assert abs(problem.drift.velocity @ momentum[1:]) < 1e-14 * np.linalg.norm(momentum)
 
 
-def resonant(system: str) -> dict[bool, tuple[Any, int]]:
-    """Return balls on resonant tori f_1/f_2 = p/q and their q, by whether they drift across: q is
-    even where c_2 lies on cut 2, p where it lies on cut 1.
+def resonant(system: str, count: int) -> dict[bool, list[tuple[Any, int]]]:
+    """Return balls on resonant tori f_1/f_2 = p/q and their q, so many of those that drift across
+    and of those that do not: q is even where c_2 lies on cut 2, p where it lies on cut 1.
     """
-    found: dict[bool, tuple[Any, int]] = {}
-    for seed in range(4):
+    found: dict[bool, list[tuple[Any, int]]] = {True: [], False: []}
+    orders = ((3, 4), (4, 5), (4, 3), (5, 3), (3, 2), (5, 6), (6, 5), (7, 8), (5, 4))
+    for seed in range(12):
         gamma, *turned = np.random.default_rng(seed).normal(size=(3, 3))
 
         def at(angle: float, gamma: Any = gamma, turned: Any = turned) -> Any:
@@ -176,23 +178,26 @@ def resonant(system: str) -> dict[bool, tuple[Any, int]]:
         angles = np.linspace(0.01, 3.1, 20)
         upper = [vs.torus(at(x)).origins.index("c2") > 2 for x in angles]
         ratios = [ratio(x) for x in angles]
-        for k, (p, q) in itertools.product(range(19), ((3, 4), (4, 5), (4, 3), (5, 3), (3, 2))):
+        for k, (p, q) in itertools.product(range(19), orders):
             drifts = (q if upper[k] else p) % 2 == 0
             between = sorted(ratios[k : k + 2])
             apart = between[1] - between[0] > 0.5
-            if drifts in found or upper[k] != upper[k + 1] or apart:
+            if len(found[drifts]) == count or upper[k] != upper[k + 1] or apart:
                 continue
             if between[0] < p / q < between[1]:
                 angle = brentq(lambda x: ratio(x) - p / q, *angles[k : k + 2], xtol=1e-16)  # noqa: B023
-                found[drifts] = at(float(angle)), q
+                found[drifts].append((at(float(angle)), q))
+        if min(map(len, found.values())) == count:
+            break
     return found
 
 
+@pytest.mark.parametrize("count", [1, slow(10)])
 @pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
-def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str) -> None:
-    found = resonant(system)
-    assert set(found) == {True, False}
-    for drifts, (problem, q) in found.items():
+def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str, count: int) -> None:
+    found = resonant(system, count)
+    assert [len(found[drifts]) for drifts in (True, False)] == [count, count]
+    for drifts, (problem, q) in ((key, row) for key, rows in found.items() for row in rows):
         solution = AreaSolution(problem.on_torus())
         tau1 = abs(2 * q / solution.in_tau1.rates[1])
         time = float(solution.fourier_time_map(False).time(np.array([tau1]))[0])
@@ -201,6 +206,25 @@ def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str) -> No
         measured = (motion.position[1] - motion.position[0]) / time
         assert largest(measured - problem.drift.velocity) < 1e-13
         assert (problem.drift.resonance is not None) == drifts
+
+
+def test_on_a_resonance_modes_that_stand_are_slow_however_small() -> None:
+    gamma = [0.1257302210933933, -0.1321048632913019, 0.6404226504432821]
+    Omega = [0.985227805418071, 1.079852325574649, -0.7806972809635339]
+    problem = BodyCase("resonant", [0.8, 1.2, 2.1], gamma, Omega).problem("rubber-ball")
+    times = np.array([1, 50, 500.0])
+    found, other = (
+        solve(problem, times, time_map="fourier"),
+        solve(problem, times, time_map="panels"),
+    )
+    off = np.max(np.abs(found.frame - other.frame), axis=(1, 2))
+    assert np.all(off <= found.error + other.error)
+    assert np.max(found.error) < 1e-10
+    rates = np.array([3.0, 4.0]) * 0.1
+    modes = np.array([[4, -3], [1, 0], [8, -6], [1, -1]])
+    kept, slow = with_slow_phases(modes, np.array([1e-30, 1, 0, 1e-3]), rates)
+    assert slow.tolist() == [[4, -3]]
+    assert kept.tolist() == [[0, 0, 1], [1, 0, 0], [0, 0, 2], [1, -1, 0]]
 
 
 @pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])

@@ -4,9 +4,13 @@ every door.
 
 from __future__ import annotations
 
+import json
 import math
+import subprocess
+import sys
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +21,9 @@ import veselova as vs
 from conftest import Server
 from rolling_truth import roll
 from veselova import InvalidInput, RubberBall, Unsolved
+from veselova.analytic.motion.mean_drift import may_resonate
 from veselova.analytic.solve import METHODS, solve
+from veselova.service.api.json_documents import torus_of
 
 TIMES = np.linspace(0, 20, 9)
 DATA: dict[str, Any] = {
@@ -259,9 +265,46 @@ def test_the_service_answers_for_a_ball(server: Server) -> None:
     expected = vs.solve(RubberBall(**DATA, position=("1/2", 2)), [0.0, 1.0])
     assert np.allclose(answer["series"]["position"], expected.position, atol=1e-13)
     assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
-    assert server.ask("POST", "/v1/tori", json={"problem": document}).status_code == 200
+    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
+    ball = RubberBall(**DATA)
+    assert torus["drift"] == {"velocity": ball.drift.velocity.tolist(), "resonance": None}
+    with vs.Client(server.url) as client:
+        assert client.torus(ball).as_dict() == vs.torus(ball).as_dict()
     digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
     assert (digits.status_code, "contact point" in digits.text) == (422, True)
+
+
+def test_the_torus_has_the_drift(tmp_path: Path) -> None:
+    drifts = resonant(1, 3 / 4, 1.0958)
+    torus = vs.torus(drifts)
+    assert torus.drift is not None
+    assert torus.drift.resonance == drifts.drift.resonance != None  # noqa: E711
+    assert torus_of(json.loads(json.dumps(torus.as_dict()))).as_dict() == torus.as_dict()
+    file = tmp_path / "ball.json"
+    file.write_text(json.dumps({"problem": RubberBall(**DATA).as_request(), "times": [0, 3]}))
+    run = [sys.executable, "-m", "veselova"]
+    shown = [
+        subprocess.run([*run, command, file], capture_output=True, text=True, check=True).stdout
+        for command in ("torus", "solve")
+    ]
+    assert "Mean velocity of the contact point" in shown[0]
+    assert f"{RubberBall(**DATA).drift.velocity[1]: .12g}" in shown[0]
+    assert "position_1" in shown[1]
+    assert f"{vs.solve(RubberBall(**DATA), [3]).position[0, 1]: .9f}" in shown[1]
+    # a body does not roll, a separatrix has no mean over all times
+    assert vs.torus(vs.VeselovaSO3([1, 1.5, 2], DATA["gamma"], DATA["Omega"])).drift is None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_resonances_are_ruled_out_only_where_there_are_none(seed: int) -> None:
+    """Frequencies f with M·f = 0 to rounding, and random ones."""
+    rng = np.random.default_rng(seed)
+    f = rng.uniform(0.2, 1, 2 + seed % 2)
+    assert not may_resonate(f)
+    order = rng.integers(-40, 41, f.size)
+    order[-1] = 37
+    f[-1] = -(order[:-1] @ f[:-1]) / order[-1]
+    assert may_resonate(f)
 
 
 def test_a_ball_that_twists_is_integrated_by_all_formulations() -> None:

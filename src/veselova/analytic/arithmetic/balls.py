@@ -23,7 +23,7 @@ from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
 from veselova.mechanics.core.budget import acquire, checkpoint, iterate
 from veselova.tunings import MANY_NODES
 
-__all__ = ["Balls", "balls"]
+__all__ = ["Balls", "balls", "least_square"]
 
 #: Derived: guard digits within the working precision.
 _GUARD = 6
@@ -388,3 +388,11 @@ def balls(digits: int, certified: bool = True) -> Balls:
     which takes half of them.
     """
     return Balls(digits, certified)
+
+
+def least_square(rows: list[list[int]]) -> int:
+    """Return the least square of a length in a reduced basis of the lattice that g integer rows
+    span: at most 2^(g−1) times that of any vector.
+    """
+    reduced = flint.fmpz_mat(rows).lll().tolist()
+    return min(sum(int(x) ** 2 for x in row) for row in reduced)

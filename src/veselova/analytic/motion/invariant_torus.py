@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,22 +13,25 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.orbit_period import close_orbit
 from veselova.analytic.motion.torus_solution import Solution
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.torus import Torus
-from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.torus_problem import TorusProblem, on_torus
 
 __all__ = ["actions", "torus"]
 
 Array = NDArray[np.float64]
 
 
-def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
+def torus(given: Problem, solution: Solution | None = None) -> Torus:
     """Return the invariant torus on which a motion runs, and where it starts there; ``solution``:
-    that of the problem.
+    that of the problem on the torus.
 
     Directions that do not move belong to no torus: the curve is that of the moving part. Raises
     Unsolved at rest.
     Digits: periods and T to about 1e-15 relative, tested for n = 2…8.
     """
+    problem = on_torus(given)
     solution = solution or solution_of(problem)
     curve = solution.curve
     moving = solution.moving
@@ -70,7 +74,19 @@ def torus(problem: TorusProblem, solution: Solution | None = None) -> Torus:
         mean_rate=solution.mean_rate / root,
         regime=solution.regime,
         close_orbit=partial(close_orbit, problem),
+        drift=_drift(given, solution),
     )
+
+
+def _drift(given: Problem, solution: Solution) -> Drift | None:
+    """Return how a ball drifts, where that takes about as long as the torus."""
+    if "position" not in given.outputs or solution.separatrices:
+        return None
+    # Bodies need none of this, and a first torus is faster without it.
+    from veselova.analytic.motion.mean_drift import MOST_PHASES, drift
+
+    ball: Any = given
+    return drift(ball, solution) if solution.curve.genus <= MOST_PHASES else None
 
 
 def _signs(problem: TorusProblem) -> NDArray[np.int64]:

@@ -33,6 +33,9 @@ _MOST_MODES = 1_000_000
 #: beyond, m·z has to be a phase of its own.
 SLOW = 4.0
 
+#: Derived: part of Σ|m_s f_s| below which m·f may be zero: roundings of its products and its sum.
+_STANDING = 8 * np.finfo(float).eps
+
 
 @dataclass(frozen=True)
 class TorusSeries:
@@ -65,11 +68,13 @@ def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Intege
     """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
 
     ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
-    too much of that, the mode is a multiple of a slow combination.
+    too much of that, the mode is a multiple of a slow combination. So is one that may stand,
+    however little it moves.
     """
-    slow = (pull * np.max(np.abs(rates)) > SLOW * np.pi * np.abs(modes @ rates)) & (
-        np.count_nonzero(modes, axis=1) > 1
-    )
+    pace = np.abs(modes @ rates)
+    pulled = pull * np.max(np.abs(rates)) > SLOW * np.pi * pace
+    standing = pace <= _STANDING * (np.abs(modes) @ np.abs(rates))
+    slow = (pulled | standing) & (np.count_nonzero(modes, axis=1) > 1)
     if not slow.any():
         return modes, modes[:0]
     multiples = np.gcd.reduce(modes[slow], axis=1)

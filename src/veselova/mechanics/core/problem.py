@@ -49,7 +49,7 @@ class Problem(ABC):
     derived: ClassVar[tuple[str, ...]] = ()
     bounded: ClassVar[tuple[str, ...]]
 
-    #: The series that tables and pictures show.
+    #: The series that pictures show.
     portrait: ClassVar[str]
 
     #: Engines that serve the system, with their methods, and the formulations that the numerical
@@ -129,6 +129,11 @@ class Problem(ABC):
     def has_torus(self) -> bool:
         """Return whether the motion runs on a torus that ``torus`` describes, or rests."""
         return self.has_tori
+
+    @property
+    def tabulated(self) -> str:
+        """Return the series that tables of a motion show."""
+        return self.portrait
 
     @property
     def semiaxes(self) -> Array | None:

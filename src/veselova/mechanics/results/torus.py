@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
 
 __all__ = ["Torus"]
@@ -44,6 +45,8 @@ class Torus:
       start 1e-40 away)
     - close_orbit: the time in which the phases go round so many times along the orbit, and whether
       the attitude is then the same; None for a torus from a document
+    - drift: the mean velocity of the contact point of a ball, of up to three phases (``ball.drift``
+      has it for more); None on a separatrix and for what does not roll
     """
 
     n: int
@@ -65,6 +68,7 @@ class Torus:
     close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(
         default=None, repr=False
     )
+    drift: Drift | None = None
 
     def resonance(self, max_order: int = 12, tolerance: float = 1e-9) -> Resonance:
         """Return the integer relations k·f = 0 between the frequencies, |k_s| ≤ max_order, where
@@ -108,13 +112,16 @@ class Torus:
         return time if returned else self.close_orbit(2 * windings)[0]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the torus as a JSON-ready dictionary (arrays as nested lists)."""
-        names = [f.name for f in fields(self) if f.name != "close_orbit"]
+        """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` where
+        there is one.
+        """
+        names = [f.name for f in fields(self) if f.name not in ("close_orbit", "drift")]
         values = {name: getattr(self, name) for name in names}
-        return {
+        found = {
             name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v
             for name, v in values.items()
         }
+        return found if self.drift is None else {**found, "drift": self.drift.as_dict()}
 
     def _repr_html_(self) -> str:
         rows = "".join(

@@ -137,6 +137,11 @@ class RollingBall(RigidBody):
         """Return the length in which errors of frame and contact point together are measured."""
         return self.ball.size
 
+    @property
+    def tabulated(self) -> str:
+        """Return the contact point."""
+        return "position"
+
     @cached_property
     def drift(self) -> Drift:
         """Return the mean velocity of the contact point, its direction, and the resonance if there

@@ -202,6 +202,11 @@ class RollingBallN(Problem):
         length = inverse_length(self._exact_gamma, _BITS)
         return self._torus_of(tuple(length * x for x in self._exact_rate))
 
+    @property
+    def tabulated(self) -> str:
+        """Return the contact point."""
+        return "position"
+
     @cached_property
     def drift(self) -> Drift:
         """Return the mean velocity of the contact point, its direction, and the resonance if there

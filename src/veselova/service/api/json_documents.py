@@ -16,6 +16,7 @@ from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import InternalContradiction
 from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
@@ -179,6 +180,8 @@ def comparison_of(problem: Problem, document: Mapping[str, Any]) -> Comparison:
 def torus_of(document: Mapping[str, Any]) -> Torus:
     """Return the torus of a document."""
     values = dict(document)
+    if (drift := values.pop("drift", None)) is not None:
+        values["drift"] = Drift.from_dict(drift)
     for name, value in values.items():
         if isinstance(value, list) and name != "origins":
             values[name] = np.array(value, dtype=np.int64 if name == "signs" else np.float64)

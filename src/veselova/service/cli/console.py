@@ -12,6 +12,7 @@ from rich.table import Table
 
 from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.comparison import Comparison
+from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
@@ -91,10 +92,10 @@ def print_trajectory(
     """
     console.print(_describe(trajectory), highlight=False)
     problem = trajectory.problem
-    series = trajectory.series(problem.portrait)
+    series = trajectory.series(problem.tabulated)
     rows = series.reshape(series.shape[0], -1)
     names = [
-        problem.portrait + "".join(f"_{i + 1}" for i in index)
+        problem.tabulated + "".join(f"_{i + 1}" for i in index)
         for index in np.ndindex(series.shape[1:])
     ]
     more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
@@ -195,6 +196,8 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     for s, row in enumerate(zip(*columns, strict=True), start=1):
         table.add_row(str(s), *(f"{x:.15g}" for x in row))
     console.print(table)
+    if torus.drift is not None:
+        _print_mean_velocity(console, torus.drift)
     if torus.periods is not None:
         _print_matrix(console, "Periods a (basis λ^(k−1)dλ/2w)", torus.periods)
     _print_matrix(
@@ -202,6 +205,14 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
         f"T, Riemann matrix iT (asymmetry {torus.riemann_matrix_residual:.1e})",
         torus.riemann_matrix,
     )
+
+
+def _print_mean_velocity(console: Console, drift: Drift) -> None:
+    heading(console, "Mean velocity of the contact point")
+    table = make_table(*(f"along e_{k}" for k in range(2, 2 + drift.velocity.size)), "resonance M")
+    resonance = "none" if drift.resonance is None else " ".join(map(str, drift.resonance))
+    table.add_row(*(f"{x: z.12g}" for x in drift.velocity), resonance)
+    console.print(table)
 
 
 def _print_matrix(console: Console, title: str, matrix: Any) -> None:

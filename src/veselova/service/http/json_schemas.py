@@ -16,6 +16,7 @@ from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.mechanics.results.curve import QUASI_PERIODS
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.http.drift_schema import DRIFT
 from veselova.service.http.ensemble_schema import ensemble_schema
 from veselova.service.http.job_document import JobDocument, JobList
 from veselova.service.workers.tasks import TASKS
@@ -54,10 +55,14 @@ _NESTED = {"type": "array", "items": {}, "description": "nested arrays of pairs"
 _BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 
 
-def _object(properties: dict[str, Any], required: list[str] | None = None) -> dict[str, Any]:
+def _object(
+    properties: dict[str, Any],
+    required: list[str] | None = None,
+    optional: dict[str, Any] | None = None,
+) -> dict[str, Any]:
     return {
         "type": "object",
-        "properties": properties,
+        "properties": {**properties, **(optional or {})},
         "required": list(properties) if required is None else required,
     }
 
@@ -183,7 +188,8 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "phases": _NUMBERS,
             "mean_rate": {"type": "number"},
             "regime": {"type": "string"},
-        }
+        },
+        optional={"drift": DRIFT},
     ),
     "ClosedForm": {name: part for name, part in CLOSED_FORM.items() if name != "$schema"},
     "Curve": _object(

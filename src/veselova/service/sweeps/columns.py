@@ -54,6 +54,8 @@ def columns_of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
     for name in _NUMBERS:
         if (value := getattr(found, name)) is not None:
             yield from components(name, np.asarray(value).tolist())
+    if found.drift is not None:
+        yield from components("mean_velocity", found.drift.velocity.tolist())
     yield "mean_rate", found.mean_rate
     yield "regime", found.regime
     yield "origins", " ".join(found.origins)
