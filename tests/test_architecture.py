@@ -197,6 +197,55 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
                     assert words[2] in allowed | {chapter}, f"{chapter}/{path.name} imports {name}"
 
 
+#: File → what stands above it and is asked for when a method is called, by name or inside it.
+UPWARD = {
+    "mechanics/results/trajectory.py": {
+        "veselova.conditioning",
+        "veselova.mechanics.systems.catalogue",
+        "veselova.motion_page",
+        "veselova.notebook",
+    },
+    "mechanics/systems/rolling_ball.py": {"veselova.engines"},
+    "mechanics/systems/rolling_ball_n.py": {"veselova.engines"},
+    "analytic/compiled/__main__.py": {
+        "veselova.analytic.motion.atlas",
+        "veselova.analytic.motion.ensemble",
+    },
+}
+
+
+def _asked_by_name(tree: ast.AST) -> list[str]:
+    """Return the modules whose names are given to ``import_module``."""
+    return [
+        node.args[0].value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).endswith("import_module")
+        and isinstance(node.args[0], ast.Constant)
+    ]
+
+
+def _stands_above(name: str, part: str, chapter: str) -> bool:
+    words = name.split(".")
+    if words[:2] != ["veselova", part]:
+        return words[0] == "veselova" and not _permitted(name, ALLOWED[part])
+    order = list(CHAPTERS.get(part, {}))
+    later = order[order.index(chapter) :] if chapter in order else []
+    return len(words) > 2 and words[2] in later and words[2] != chapter
+
+
+def test_what_is_asked_for_upwards_is_listed() -> None:
+    found: dict[str, set[str]] = {}
+    for part in ALLOWED:
+        for path in (ROOT / part).rglob("*.py"):
+            tree = ast.parse(path.read_text())
+            names = {*_split_imports(path)[1], *_asked_by_name(tree)}
+            chapter = path.parent.name
+            if above := {name for name in names if _stands_above(name, part, chapter)}:
+                found[path.relative_to(ROOT).as_posix()] = above
+    assert found == UPWARD
+
+
 @pytest.mark.parametrize(("library", "room"), [("mpmath", "arithmetic.py"), ("flint", "balls.py")])
 def test_only_one_file_touches_precision(library: str, room: str) -> None:
     engine = sorted((ROOT / "analytic").rglob("*.py"))
