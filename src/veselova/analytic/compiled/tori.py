@@ -184,7 +184,7 @@ def _set_inverse(series: Array, inverse: Array) -> None:
 def _set_weights(
     tables: Tables, s: int, below: Array, forms: Array, weights: Array, genus: int
 ) -> None:
-    """Fill the weights w_k of cut s, (g, J): TorusRate.weights."""
+    """Fill the weights w_k of cut s, (g, J): TorusFunction.weights."""
     count = below.size
     end, unit = tables.points[0, 2 * s + 1], tables.points[0, 2 * s + 2]
     sign = 1.0 if (genus - s) % 2 == 1 else -1.0

@@ -57,10 +57,6 @@ class CrossComponent(SeriesComponent):
         """
         return 0.0 if self.is_lower else -0.25
 
-    def at(self, psi: Values) -> Values:
-        """Not a product of functions of one angle: taken from the frame instead."""
-        raise NotImplementedError
-
     @cached_property
     def row_sizes(self) -> Array:
         """Return the largest entry of each row at the nodes of the forms, (2,)."""

@@ -31,7 +31,7 @@ from veselova.analytic.time_map.fourier_modes import (
     with_slow_phases,
 )
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import TimeMap, TorusRate
+from veselova.analytic.time_map.rate import TimeMap, TorusFunction, TorusRate
 from veselova.mechanics.core.budget import checkpoint
 
 __all__ = [
@@ -377,7 +377,7 @@ class ColumnsForModes(Generic[T]):
     turn by one of ψ
     """
 
-    def __init__(self, rate: TorusRate[Any], made: Callable[[Values, Values, int], T]) -> None:
+    def __init__(self, rate: TorusFunction[Any], made: Callable[[Values, Values, int], T]) -> None:
         self._rate = rate
         self._made = made
         self._form(0.0)

@@ -24,7 +24,15 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.linear_flow import LinearFlow
 
-__all__ = ["TIME_RATE_POWERS", "TimeMap", "TimeRate", "TorusRate", "rate_factor", "time_rate"]
+__all__ = [
+    "TIME_RATE_POWERS",
+    "TimeMap",
+    "TimeRate",
+    "TorusFunction",
+    "TorusRate",
+    "rate_factor",
+    "time_rate",
+]
 
 Array = NDArray[np.float64]
 
@@ -35,15 +43,13 @@ TIME_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 @dataclass(frozen=True)
-class TorusRate(ABC, Generic[P]):
-    """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion."""
+class TorusFunction(ABC, Generic[P]):
+    """A function on the torus of one motion, scale times one whose Fourier coefficients are
+    determinants of one-variable integrals.
+    """
 
     inversion: AbelJacobi[P]
     scale: Any
-
-    @abstractmethod
-    def at(self, psi: Values) -> Values:
-        """Return dt/dτ₁ at angles of shape (N, g)."""
 
     @abstractmethod
     def _weight_forms(self, s: int, psi: Values) -> Values:
@@ -61,8 +67,8 @@ class TorusRate(ABC, Generic[P]):
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
 
-        The torus measure is the determinant of the forms over det a, so the mean of dt/dτ₁ ·
-        e^{−2πi m·z} over the torus is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the
+        The torus measure is the determinant of the forms over det a, so the mean of the function
+        times e^{−2πi m·z} is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the
         weights carrying a⁻¹: one-variable integrals only.
         """
         genus = self.inversion.periods.genus
@@ -89,12 +95,21 @@ class TorusRate(ABC, Generic[P]):
 
     @cached_property
     def mean(self) -> Any:
-        """Return F_0, the mean of dt/dτ₁ over the torus, in the arithmetic of the periods."""
+        """Return F_0, the mean over the torus, in the arithmetic of the periods."""
         periods = self.inversion.periods
         means = [
             np.sum(self._weights(self._weight_at_nodes(s)), axis=-1) for s in range(periods.genus)
         ]
         return self.scale * periods.arithmetic.determinant(np.stack(means, axis=-1))
+
+
+@dataclass(frozen=True)
+class TorusRate(TorusFunction[P]):
+    """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion."""
+
+    @abstractmethod
+    def at(self, psi: Values) -> Values:
+        """Return dt/dτ₁ at angles of shape (N, g)."""
 
 
 @dataclass(frozen=True)

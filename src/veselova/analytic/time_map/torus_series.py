@@ -30,7 +30,7 @@ from veselova.analytic.time_map.fourier_modes import (
     with_slow_phases,
 )
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import TorusRate
+from veselova.analytic.time_map.rate import TorusFunction
 
 __all__ = ["NormalComponent", "SeriesComponent", "SeriesIntegral", "find_series"]
 
@@ -47,7 +47,7 @@ _BLOCK = 400_000
 
 
 @dataclass(frozen=True)
-class SeriesComponent(TorusRate[Periods]):
+class SeriesComponent(TorusFunction[Periods]):
     """A function on the torus whose Fourier coefficients are determinants, of period 2 in the phase
     of one cut and without mean.
 
