@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -55,6 +56,8 @@ def serving(states: int) -> Iterator[None]:
 
 def _load() -> bool:
     """Load the loops; return False without numba."""
+    if _LOOPS in sys.modules:
+        return True
     if importlib.util.find_spec("numba") is None:
         return False
     importlib.import_module(_LOOPS)
@@ -80,7 +83,7 @@ def compiled_loops(wanted: bool = True) -> Iterator[None]:
     double precision, where A's are apart, nothing is at rest and no separatrix is near; NumPy does
     the rest. ``provenance.details`` of a trajectory then has ``compiled``. Both ways bound the true
     error by ``error``, and differ by less than both errors together (tested for A's within a factor
-    of 100, t up to 10⁵). A motion takes 0.1 ms and 5 µs a time, in place of 4 ms.
+    of 100, t up to 10⁵). A motion of few times takes a tenth of the time.
 
     The first block of a process loads numba (extra ``fast``), half a second; the first of a version
     compiles for half a minute, unless ``python -m veselova.analytic.compiled`` has. Results depend

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,8 +27,10 @@ def compiled_motion(problem: TorusProblem, grid: TimeGrid) -> States | None:
         return None
     exact = problem.exact
     data = [*exact.A, *exact.q, *exact.q_dot]
-    doubles: list[Any] = [float(x) for x in data]
-    if doubles != data:  # compared exactly
+    doubles = [float(x) for x in data]
+    if any(
+        x.as_integer_ratio() != y.as_integer_ratio() for x, y in zip(doubles, data, strict=True)
+    ):
         return None
     A, q, q_dot = np.array(doubles).reshape(3, 1, -1)
     frames = None if exact.natural else problem.frame[None]
