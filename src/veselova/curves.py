@@ -13,6 +13,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,17 +21,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.abel_images import Halves, image_of
-from veselova.analytic.curve.nodal_forms import difference_product
+from veselova.analytic.curve.nodal_forms import normalized_differentials
+from veselova.analytic.curve.quasi_periods import legendre_residual, quasi_periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
+from veselova.analytic.curve.thomae import thomae_constants
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
     curve_outputs,
-    exact_points,
     points_with_sheets,
+    rows_of_points,
     torus_points,
 )
 from veselova.mechanics.core.decimals import (
@@ -89,8 +92,8 @@ class RealHyperelliptic:
 
     Cycle a_s goes round ``cuts[s]``, a bounded interval over which w is real; b_s meets it once.
     Raises InvalidInput for repeated, complex or too few branch points. Accuracy:
-    ``riemann_matrix_error``; tested for g = 1 … 10 and gaps to 1e-12 against quadrature with 30
-    digits.
+    ``riemann_matrix_error``; tested for g = 1 … 10 against quadrature with 30 digits, and for gaps
+    to 1e-30 and offsets against ball arithmetic.
     """
 
     def __init__(
@@ -212,15 +215,12 @@ class RealHyperelliptic:
     @cached_property
     def normalized_differentials(self) -> Array:
         """Return c, (g, g): v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js."""
-        a = self.periods.a
-        # rows are of different units
-        sizes = np.max(np.abs(a), axis=1)
-        with np.errstate(over="ignore"):
-            inverse = np.linalg.inv(a / sizes[:, None]) / sizes
-        if not np.all(np.isfinite(inverse)):
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = normalized_differentials(self._curve)
+        if not (np.all(np.isfinite(found)) and np.all(np.any(found, axis=0))):
             reason = "a coefficient leaves the range of a float; take branch points in other units"
             raise Unsolved("beyond-floats", reason)
-        return np.asarray(inverse, dtype=np.float64)
+        return found
 
     @cached_property
     def riemann_matrix(self) -> Complex:
@@ -268,7 +268,7 @@ class RealHyperelliptic:
         found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
         return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
 
-    @property
+    @cached_property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
         """Return ω, ω', η, η' (g, g): half the periods over a_s and b_s (columns) of du_k, and of
         −dr_k, rows k = 1 … g.
@@ -278,16 +278,14 @@ class RealHyperelliptic:
         one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are
         2g+2.
         """
-        return self._curve.quasi_periods()
+        return quasi_periods(self._curve, self._halves)
 
     @property
     def legendre_residual(self) -> float:
-        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over ½π: Legendre's relation between periods of the first
-        and second kind, a check.
+        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over the largest entries of both rows, or over ½π where
+        that is more: Legendre's relation between ``quasi_periods``, a check.
         """
-        omega, omega_prime, eta, eta_prime = self._curve.quasi_periods(in_nu=False)
-        found = (omega @ eta_prime.T - omega_prime @ eta.T) / (np.pi / 2)
-        return float(np.max(np.abs(np.abs(found) - np.eye(self.genus))))
+        return legendre_residual(self._curve, self._halves)
 
     @cached_property
     def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
@@ -334,23 +332,24 @@ class RealHyperelliptic:
         real torus R^g/Z^g.
 
         z = Σ_s ∫ of the normalised differentials to (λ_s, w_s), each from the end of cut s with the
-        lower number in order of
-        ``cuts``: ``torus`` is the way back. Raises InvalidInput for bad points. Accuracy: 1e-13.
+        lower number in order of ``cuts``: ``torus`` is the way back. Raises InvalidInput for bad
+        points. Accuracy: 1e-13 of z, less where branch points over many orders of magnitude cancel.
+        λ is rounded to a double: of the place on a cut of relative width 1e-12 four digits remain
+        (``invert_decimals`` has them all).
         """
         exact, single = torus_points(z, self.genus)
         rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
         curve = self._curve
         psi = curve.inversion.invert(rows - np.floor(rows))
         below, above = curve.periods.roots_on_cuts(psi)
-        nu = np.array(
+        points = np.array(
             [
-                curve.nu(2 * s + 1, left**2, right**2)
+                curve.lambda_between(2 * s + 1, left**2, right**2)
                 for s, (left, right) in enumerate(zip(below, above, strict=True))
             ]
         ).T
         turns = np.arange(self.genus, 0, -1) - 1
         signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
-        points = curve.to_lambda(nu)
         return (points[0], signs[0]) if single else (points, signs)
 
     def invert_decimals(self, z: ArrayLike | Sequence[Any]) -> Decimals | None:
@@ -368,7 +367,7 @@ class RealHyperelliptic:
         """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
         inverse of ``invert``.
         """
-        rows = [exact_points(row) for row in (points if np.ndim(points) == 2 else [points])]
+        rows, single = rows_of_points(points)
         wanted = f"rows of {self.genus} numbers, the signs of w"
         directions = np.atleast_2d(complex_array(signs, ("signs",), wanted).real)
         if any(len(row) != self.genus for row in rows) or directions.shape != (
@@ -379,46 +378,28 @@ class RealHyperelliptic:
                 ("points",), f"rows of {self.genus} points with as many signs", show(points)
             )
         curve = self._curve
-        both = [[curve.to_mu(point) for point in row] for row in rows]
-        exact = [[real for real, _ in row] for row in both]
-        for i, row in enumerate(both):
-            for s, (mu, imaginary) in enumerate(row):
-                if imaginary or not curve.betas[2 * s + 1] <= mu <= curve.betas[2 * s + 2]:
-                    low, high = self.cuts[s]
-                    raise InvalidInput(
-                        ("points", i, s),
-                        f"a number on cut {s + 1}, {low:.6g} … {high:.6g}",
-                        show(rows[i][s]),
-                    )
+        faults = Faults()
+        exact = []
+        for i, row in enumerate(rows):
+            found = [curve.mu_on_cut(s, point) for s, point in enumerate(row, start=1)]
+            exact.append([mu or Fraction(0) for mu in found])
+            for s in np.flatnonzero([mu is None for mu in found]).tolist():
+                low, high = self.cuts[s]
+                required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
+                faults.add(("points", i, s), required, show(_plain(row[s])))
+        faults.require_none()
         upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
         z = curve.inversion.map(curve.angles(exact, upwards))
-        return np.asarray(np.mod(z, 1.0)[0] if np.ndim(points) == 1 else np.mod(z, 1.0))
+        return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 
     def thomae(self) -> tuple[ThomaeConstant, ...]:
         """Return Thomae's values of |θ[η_S](0)|⁴ for all sets S of g+1 among 2g+1 branch points; of
         2g+2 the last is left out.
 
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
-        Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 4: 1e-11.
+        Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 6: 1e-12.
         """
-        curve = self._curve
-        sizes = np.abs(curve.periods.curve.differences).tolist()
-        over_cuts = [
-            2 * curve.monomial_integrals(2 * s - 1, self.genus - 1)
-            for s in range(1, self.genus + 1)
-        ]
-        periods = np.stack(over_cuts, axis=1) / (2 * np.pi)
-        determinant = float(np.linalg.det(periods))
-        eta = np.array(self._halves)
-        shift = np.sum(eta[1::2], axis=0)
-        found = []
-        for subset in iterate(self._subsets):
-            epsilon, delta = (np.sum(eta[list(subset)], axis=0) + shift) % 1
-            characteristic = tuple(epsilon.tolist()), tuple(delta.tolist())
-            named = tuple(sorted(curve.order[j] for j in subset))
-            value = determinant**2 * difference_product(sizes, subset)
-            found.append(ThomaeConstant(named, characteristic, value))
-        return tuple(found)
+        return thomae_constants(self._curve, self._halves, self._subsets)
 
     @cached_property
     def _subsets(self) -> list[tuple[int, ...]]:
@@ -428,6 +409,11 @@ class RealHyperelliptic:
             reason = f"genus {self.genus} has {count} partitions, {_MOST_SUBSETS} are served"
             raise Unsolved("too-many-terms", reason)
         return list(itertools.combinations(range(2 * self.genus + 1), self.genus + 1))
+
+
+def _plain(point: Fraction | complex) -> Any:
+    """Return a point as a float where it is one."""
+    return float(point) if isinstance(point, Fraction) and float(point) == point else point
 
 
 def _without_i(values: Complex) -> Array:

@@ -302,6 +302,7 @@ def broken(**changes: Any) -> str:
         ("[1]", "document"),
         (broken(format="veselova.closed-form/9"), "document.format"),
         (broken(phases="missing"), "phases"),
+        (broken(characteristics=[]), "document.characteristics: required a list of"),
         (broken(genus=True), "document.genus"),
         (broken(genus=3), "document."),
         (broken(modes=[[1]]), "document."),

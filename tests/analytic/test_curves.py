@@ -213,6 +213,93 @@ def test_thomaes_formula_gives_the_theta_constants(count: int, sign: int) -> Non
     assert len(named) == len(predicted)
 
 
+NARROW = [("8", 2), ("12", 0), ("15", 3), ("30", 1)]
+
+
+def narrow_points(count: int, place: int, digits: str) -> list[str]:
+    """Return exact branch points, two of them so near to each other."""
+    random = np.random.default_rng([12, count, place])
+    points = [Fraction(b) for b in np.cumsum(random.uniform(0.1, 2, count)) - 3]
+    points[place + 1] = points[place] + Fraction(f"1e-{digits}")
+    return [str(b) for b in points]
+
+
+@pytest.mark.parametrize(("digits", "place"), NARROW)
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("count", [5, 6])
+def test_images_and_inverses_beside_near_branch_points_are_those_of_ball_arithmetic(
+    count: int, sign: int, digits: str, place: int
+) -> None:
+    """Complex points on all scales down to the gap; λ as near as doubles are."""
+    points = narrow_points(count, place, digits)
+    curve = curves.RealHyperelliptic(points, sign)
+    fine = curves.RealHyperelliptic(points, sign, digits=20)
+    near = float(Fraction(points[place]))
+    places = [2.3 - 1.1j, near + 1e-9j, near - 1e-3 - 1e-3j, near + 0.2 + 1e-12j, near - 1e-15j]
+    w = [1 + 0.3j] * len(places)
+    images = fine.abel_decimals(places, w)
+    assert images is not None
+    wanted = images.midpoints["abel"].astype(float)
+    for image, other in zip(curve.abel(places, w), wanted, strict=True):
+        assert off_lattice(image - other[:, 0] - 1j * other[:, 1], curve.riemann_matrix) < 1e-12
+    z = np.random.default_rng(13).uniform(size=(3, 2))
+    found, signs = curve.invert(z)
+    exact = fine.invert_decimals(z)
+    assert exact is not None
+    off = np.abs(found - exact.midpoints["points"].astype(float))
+    assert np.max(off) < 1e-14 * np.max(np.abs(curve.branch_points))
+    assert curve.torus(found, signs).shape == (3, 2)  # a rounding beyond a cut is no fault
+
+
+def test_inverses_of_points_of_many_orders_are_those_of_ball_arithmetic() -> None:
+    """λ is as exact as its distance to the nearer branch point, also with 2g+2 of them."""
+    points = ["1e-30", "3e-30", "2e-18", "5e-7", "0.3", "8", "2e9", "7e15"]
+    for given, sign in ((points, -1), (points[1:], 1)):
+        curve = curves.RealHyperelliptic(given, sign, digits=62)
+        found, signs = curve.invert([0.1, 0.2, 0.3])
+        exact = curve.invert_decimals([0.1, 0.2, 0.3])
+        assert exact is not None
+        assert np.allclose(found, exact.midpoints["points"][0].astype(float), rtol=1e-14, atol=0)
+        assert np.allclose(curve.torus(found.tolist(), signs), [0.1, 0.2, 0.3], atol=1e-13)
+
+
+HARD = [
+    narrow_points(6, 4, "12"),
+    narrow_points(7, 1, "15"),
+    narrow_points(8, 2, "9"),
+    [str(1000 + Fraction(b)) for b in narrow_points(11, 3, "1")],
+    ["1e-9", "3e-8", "2e-5", "0.1", "0.3", "8", "200", "7e5"],
+    ["-6", "1e-9", "3e-8", "2e-5", "0.1", "0.3", "8", "200", "7e5"],
+]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("points", HARD)
+def test_all_numbers_of_ill_conditioned_curves_are_those_of_ball_arithmetic(
+    points: list[str], sign: int
+) -> None:
+    """Gaps, offsets and orders of magnitude, at which sums over monomials cancel."""
+    curve = curves.RealHyperelliptic(points, sign)
+    decimals = curves.RealHyperelliptic(points, sign, digits=17).decimals
+    assert decimals is not None
+    exact = {name: decimals.midpoints[name].astype(float) for name in decimals.midpoints}
+    omega, omega_prime, eta, eta_prime = curve.quasi_periods
+    for name, found, axis in (
+        ("a_periods", curve.periods.a, 1),
+        ("b_periods", curve.periods.b.imag, 1),
+        ("normalized_differentials", curve.normalized_differentials, 0),
+        ("omega", omega.imag, 1),
+        ("omega_prime", omega_prime.real, 1),
+        ("eta", eta.imag, 1),
+        ("eta_prime", eta_prime.real, 1),
+    ):
+        off = np.max(np.abs(found - exact[name]), axis=axis)
+        assert np.max(off / np.max(np.abs(exact[name]), axis=axis)) < 2e-12, name
+    powers = np.array([constant.fourth_power for constant in curve.thomae()])
+    assert np.allclose(powers, exact["thomae"], rtol=1e-12, atol=0)
+    assert curve.legendre_residual < 1e-12
+
+
 @pytest.mark.parametrize(("count", "sign"), CASES)
 def test_legendres_relation_holds(count: int, sign: int) -> None:
     curve = curves.RealHyperelliptic(branch_points(np.random.default_rng([7, count]), count), sign)
@@ -279,6 +366,8 @@ def test_other_bad_arguments_are_named() -> None:
         (lambda: curve.abel([float("nan")], [1]), "points"),
         (lambda: curve.torus([0.5, 3.5], [1, 1]), "points"),
         (lambda: curve.torus([1.5], [1]), "points"),
+        (lambda: curve.torus([[1.5, 3.5], [1.5]], [[1, 1], [1, 1]]), "points"),
+        (lambda: curve.torus([[1.5, 3.5], 2], [1, 1]), "points"),
     ):
         with pytest.raises(InvalidInput) as caught:
             call()

@@ -13,9 +13,22 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from veselova.analytic.curve.real_hyperelliptic import RealCurve
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["difference_product", "monomials", "powers", "second_kind"]
+from veselova.analytic.curve.real_hyperelliptic import RealCurve, square_root_parts
+
+__all__ = [
+    "difference_product",
+    "monomials",
+    "nodal_polynomials",
+    "normalized_differentials",
+    "pairs_on_one_side",
+    "powers",
+    "second_kind",
+]
+
+Array = NDArray[np.float64]
 
 #: Rows of rationals.
 Matrix = list[list[Fraction]]
@@ -71,6 +84,19 @@ def monomials(curve: RealCurve) -> Matrix:
     return rows
 
 
+def normalized_differentials(curve: RealCurve) -> Array:
+    """Return c, (g, g), in doubles: v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js; not finite,
+    or a column of zeros, beyond doubles.
+    """
+    root = square_root_parts(curve.square_of_scale)
+    scale = Fraction(root[0]) * Fraction(2) ** root[1] * (-2 if curve.reverses else 2)
+    try:
+        rows = np.array([[float(x / scale) for x in row] for row in nodal_polynomials(curve)])
+    except OverflowError:
+        rows = np.full((curve.genus, curve.genus), np.inf)
+    return np.asarray(curve.periods.inverse_cycles @ rows)
+
+
 def second_kind(genus: int, branch_points: Sequence[Fraction]) -> Matrix:
     """Return the coefficients of ν^j dν/y, j = 0 … 2g−1, in du_k = ν^{k−1}dν/y, and in −dr_k =
     −Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} ν^j dν/4y, (2g, 2g), for y² = 4Π(ν−ν_j) = Σ m_i ν^i.
@@ -87,8 +113,45 @@ def second_kind(genus: int, branch_points: Sequence[Fraction]) -> Matrix:
     return rows
 
 
+def nodal_polynomials(curve: RealCurve) -> Matrix:
+    """Return the coefficients (g, g) of λ^k dλ/w, k = 0 … g−1, in p_1 dμ/v … p_g dμ/v times c: the
+    inverse of ``monomials``.
+
+    (e−λ)^{g−1} p(1/(e−λ)) is the polynomial where there are 2g+2 branch points.
+    """
+    sign = -1 if curve.reverses else 1
+    unit = curve.root_of_unit**2
+    # a factor μ−ζ as a polynomial in λ, with 2g+2 branch points times e−λ
+    constants = [curve.centre + unit * zero for zero in _zeros(curve)]
+    one = [Fraction(1)]
+    if curve.is_even:
+        e = curve.points[-1]
+        one = [e, Fraction(-1)]
+        factors = [[(sign - e * x) / unit, x / unit] for x in constants]
+    else:
+        factors = [[-x / unit, sign / unit] for x in constants]
+    rows = []
+    for k in range(curve.genus):
+        row = [Fraction(1)]
+        for factor in [one if l == k else factor for l, factor in enumerate(factors)]:
+            row = _multiply(row, factor)
+        rows.append(row + [Fraction(0)] * (curve.genus - len(row)))
+    return rows
+
+
+def _multiply(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Fraction]:
+    found = [Fraction(0)] * (len(first) + len(second) - 1)
+    for (i, x), (j, y) in itertools.product(enumerate(first), enumerate(second)):
+        found[i + j] += x * y
+    return found
+
+
+def pairs_on_one_side(count: int, subset: Sequence[int]) -> list[tuple[int, int]]:
+    """Return all i < j that are both in a subset of 0 … count−1, or both outside."""
+    rest = [j for j in range(count) if j not in subset]
+    return [*itertools.combinations(subset, 2), *itertools.combinations(rest, 2)]
+
+
 def difference_product(sizes: Sequence[Sequence[Any]], subset: Sequence[int]) -> Any:
     """Return Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j| from all |β_i−β_j|, numbers of one kind."""
-    rest = [j for j in range(len(sizes)) if j not in subset]
-    pairs = itertools.chain(itertools.combinations(subset, 2), itertools.combinations(rest, 2))
-    return math.prod(sizes[i][j] for i, j in pairs)
+    return math.prod(sizes[i][j] for i, j in pairs_on_one_side(len(sizes), subset))

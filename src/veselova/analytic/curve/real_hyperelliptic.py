@@ -14,7 +14,7 @@ that near branch points keep their digits.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -27,24 +27,28 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
 from veselova.analytic.curve.interval import Interval
+from veselova.analytic.curve.path_integrals import from_end, from_infinity, midpoints
 from veselova.analytic.curve.periods import Periods
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import over_common_denominator
 
-__all__ = ["SMALLEST_GAP", "RealCurve"]
+__all__ = ["SMALLEST_GAP", "RealCurve", "square_root_parts"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Budget: nodes of Gauss' rule on a path, at first and at most, and the relative change at which it
-#: has converged.
-_FEWEST_NODES = 32
-_MOST_NODES = 1024
-_QUADRATURE = 1e-13
+#: Derived: what rounding to a double moves a number by, relative to it.
+_ROUNDING = Fraction(1, 2**52)
 
 #: The nearest two β's over the span of all: below it products of elliptic integrals leave the range
 #: of a double.
 SMALLEST_GAP = Fraction(1, 10**100)
+
+
+class _PeriodsOfCurve(Periods):
+    """Periods whose ill-conditioned angles have a remedy of their own."""
+
+    without_angles = "invert_decimals serves with more digits"
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,8 @@ class RealCurve:
         origins = tuple(
             BranchPoint("c" if j % 2 == 0 and j < 2 * g else "I", j) for j in range(2 * g + 1)
         )
-        return Periods(Curve(DOUBLE, np.array([float(b) for b in betas]), differences, origins))
+        curve = Curve(DOUBLE, np.array([float(b) for b in betas]), differences, origins)
+        return _PeriodsOfCurve(curve)
 
     @cached_property
     def inversion(self) -> AbelJacobi[Periods]:
@@ -156,17 +161,36 @@ class RealCurve:
         right = float(self.nus[number + 1]) - unit * above
         return np.where(below <= above, left, right)
 
-    def to_lambda(self, nu: Array) -> Array:
-        """Return λ at ν."""
-        nu = -nu if self.reverses else nu
-        return np.asarray(float(self.points[-1]) - 1 / nu if self.is_even else nu)
+    def lambda_between(self, number: int, below: Array, above: Array) -> Array:
+        """Return λ at distances in μ from both ends of the interval [β_number, β_{number+1}], from
+        the end that is nearer in λ.
 
-    def weights(self, nu: Array, highest: int) -> Array:
-        """Return c·λ^k, times |ν|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
-        the forms λ^k dλ/w over dμ/v.
+        ν−ν_j = (λ−b_j)ν/(e−b_j) where there are 2g+2 branch points.
         """
-        point = self.to_lambda(nu)
-        common = self.scale * (np.abs(nu) ** (self.genus - 1) if self.is_even else np.ones_like(nu))
+        unit = float(self.root_of_unit**2)
+        left, right = (self.points[self.order[j]] for j in (number, number + 1))
+        from_left = unit * below
+        from_right = -unit * above
+        if self.is_even:
+            nu = self.nu(number, below, above)
+            from_left = from_left / nu * float(self.points[-1] - left)
+            from_right = from_right / nu * float(self.points[-1] - right)
+        elif self.reverses:
+            from_left, from_right = -from_left, -from_right
+        point: Array = np.where(
+            np.abs(from_left) <= np.abs(from_right),
+            float(left) + from_left,
+            float(right) + from_right,
+        )
+        return np.asarray(np.clip(point, float(min(left, right)), float(max(left, right))))
+
+    def weights(self, number: int, below: Array, above: Array, highest: int) -> Array:
+        """Return c·λ^k, times |ν|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
+        the forms λ^k dλ/w over dμ/v on the interval [β_number, β_{number+1}].
+        """
+        point = self.lambda_between(number, below, above)
+        nu = np.abs(self.nu(number, below, above))
+        common = self.scale * (nu ** (self.genus - 1) if self.is_even else np.ones_like(nu))
         return np.stack([common * point**k for k in range(highest + 1)])
 
     def integrals(self, number: int, highest: int) -> Array:
@@ -179,55 +203,23 @@ class RealCurve:
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
         density = measure / np.prod(of_gaps, axis=-2)
-        weights = self.weights(self.nu(number, below, above), highest)
+        weights = self.weights(number, below, above, highest)
         return np.asarray(2 * np.pi * np.mean(weights * density, axis=-1))
 
-    def monomial_integrals(self, number: int, highest: int, in_nu: bool = False) -> Array:
-        """Return ∫ μ^k dμ/√|R| over the interval [β_number, β_{number+1}], k = 0 … highest.
-
-        ``in_nu``: the same in ν.
+    def nu_integrals(self, number: int, highest: int, sizes: bool = False) -> Array:
+        """Return ∫ ν^k dν/√Π|ν−ν_j| over the interval [β_number, β_{number+1}], or of |ν|^k, k = 0
+        … highest.
         """
         interval = Interval(self.periods.curve, number)
         nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
         below, above = interval.distances(nodes)
         measure, of_gaps = interval.measure(below, above)
-        point = self.periods.curve.branch_points[number] + below
-        if in_nu:
-            measure = measure * _square_root(self.root_of_unit ** (2 - 4 * self.genus))
-            point = self.nu(number, below, above)
-        powers = point ** np.arange(highest + 1)[:, None]
+        measure = measure * _square_root(self.root_of_unit ** (2 - 4 * self.genus))
+        point = self.nu(number, below, above)
+        powers = (np.abs(point) if sizes else point) ** np.arange(highest + 1)[:, None]
         return np.asarray(
             2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1)
         )
-
-    def quasi_periods(self, in_nu: bool = True) -> tuple[Complex, Complex, Complex, Complex]:
-        """Return ω, ω', η, η', half the periods of du_k = x^{k−1}dx/y and −dr_k over a_s and b_s,
-        (g, g), y² = 4Π(x−x_j), where x is ν, or else μ.
-
-        dr_k = Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} x^j dx/4y for y² = Σ m_i x^i (Baker): differentials
-        of the second kind.
-        """
-        g = self.genus
-        m = 4 * np.poly(np.array([float(b) for b in (self.nus if in_nu else self.betas)]))[::-1]
-        kinds = np.zeros((2 * g, 2 * g))
-        kinds[:g, :g] = np.eye(g)
-        for k in range(1, g + 1):
-            for j in range(k, 2 * g + 1 - k):
-                kinds[g + k - 1, j] = -(j + 1 - k) * m[j + 1 + k] / 4
-        over = [
-            kinds @ self.monomial_integrals(number, 2 * g - 1, in_nu) for number in range(2 * g)
-        ]
-        # y = 2iv on cuts; on gaps v is i√|R| as in the b-periods of the first kind.
-        a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1) / 2j
-        b = (
-            np.cumsum(
-                np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1), axis=1
-            )
-            / 2
-        )
-        first = np.asarray(a, dtype=complex)
-        second = np.asarray(b, dtype=complex)
-        return first[:g], second[:g], first[g:], second[g:]
 
     def cycles(self, highest: int) -> tuple[Array, Array]:
         """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 …
@@ -267,6 +259,23 @@ class RealCurve:
             real, imaginary = -real, -imaginary
         unit = self.root_of_unit**2
         return (real - self.centre) / unit, imaginary / unit
+
+    def mu_on_cut(self, s: int, point: Fraction | complex) -> Fraction | None:
+        """Return μ of a point on cut s = 1 … g, None for any other.
+
+        Beyond an end by a rounding of a double it counts as that end: doubles need not lie on a
+        narrow cut.
+        """
+        if not isinstance(point, Fraction):
+            return None
+        for j in (2 * s - 1, 2 * s):
+            end = self.points[self.order[j]]
+            if abs(point - end) <= abs(end) * _ROUNDING:
+                beyond = (point > end) == ((j % 2 == 0) != self.reverses)
+                if beyond:
+                    return self.betas[j]
+        mu, _ = self.to_mu(point)
+        return mu if self.betas[2 * s - 1] <= mu <= self.betas[2 * s] else None
 
     def real_matrix(self) -> Array:
         """Return T of the Riemann matrix iT."""
@@ -309,97 +318,36 @@ class RealCurve:
 
         The sheet is that of the returned v, which is v up to a positive factor.
         """
+        betas = self.betas
+        differences = self.periods.curve.differences
+        middle = (betas[0] + betas[-1]) / 2
+        squares = [(mu[0] - b) ** 2 + mu[1] ** 2 for b in betas]
+        far = (mu[0] - middle) ** 2 + mu[1] ** 2 > (betas[-1] - betas[0]) ** 2
+        j = squares.index(min(squares))
         try:
-            target = complex(*map(float, mu))
+            target = complex(float(mu[0] - (middle if far else betas[j])), float(mu[1]))
         except OverflowError:
             reason = "a point is too far from the branch points for doubles"
             raise Unsolved("beyond-floats", reason) from None
-        betas = self.periods.curve.branch_points
-        zeros = (betas[2:-1:2] + betas[3::2]) / 2
-        centre = (betas[0] + betas[-1]) / 2
-        radius = (betas[-1] - betas[0]) / 2
-        if math.hypot(target.real - centre, target.imag) > 2 * radius:
-            # t = (μ−c)^{−1/2}: v = i t^{−2g−1} Π√(1+(c−β)t²), and each root stays away from its
-            # branch line.
-            end = 1 / np.sqrt(complex(target - centre))
-            powers = np.full(self.genus, 2)
-            powers[-1] = 0
+        if far:
+            from_middle = (differences[0] + differences[-1]) / 2
+            part, v = from_infinity(target, from_middle, midpoints(from_middle))
+            return None, self.periods.inverse_cycles @ part, v
+        part, v = from_end(target, j, differences[j], midpoints(differences[j]))
+        return j, self.periods.inverse_cycles @ part, v
 
-            def over_t(t: Complex) -> Complex:
-                square = (t * t)[:, None]
-                forms = (
-                    _without_each(np.asarray(1 + square * (centre - zeros), dtype=complex))
-                    * t ** powers[:, None]
-                )
-                return np.asarray(
-                    1j * forms / np.prod(np.sqrt(1 + square * (centre - betas)), axis=1)
-                )
 
-            # its phase alone names the sheet: powers of far points leave the range of a double
-            turn = (end / abs(end)) ** (-2 * self.genus - 1)
-            v = 1j * turn * np.prod(np.sqrt(1 + end**2 * (centre - betas)))
-            return None, self.periods.inverse_cycles @ _integral(over_t, end), complex(v)
-        j = int(np.argmin(np.abs(target - betas)))
-        start = betas[j]
-        below = betas[:j]
-        above = betas[j + 1 :]
-        # x = √(μ−β_j): v² = −x² Π_{<}(μ−β) Π_{>}(μ−β), and each root below stays away from its
-        # branch line.
-        unit = 1j if len(above) % 2 == 0 else 1.0
-        end = np.sqrt(complex(target - start))
-
-        def roots(x: Complex) -> Complex:
-            at = (start + x * x)[:, None]
-            return np.asarray(
-                unit * np.prod(np.sqrt(at - below), axis=1) * np.prod(np.sqrt(above - at), axis=1),
-                dtype=complex,
-            )
-
-        def over_x(x: Complex) -> Complex:  # dμ/(2v) = dx/(v/x)
-            return np.asarray(
-                _without_each(np.asarray((start + x * x)[:, None] - zeros, dtype=complex))
-                / roots(x)
-            )
-
-        v = end * roots(np.array([end]))[0]
-        return j, self.periods.inverse_cycles @ _integral(over_x, end), complex(v)
+def square_root_parts(value: Fraction) -> tuple[float, int]:
+    """Return m and e of the root m·2^e of a positive number, correctly rounded but for its last
+    bit.
+    """
+    exponent = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    return math.sqrt(value / Fraction(4) ** exponent), exponent
 
 
 def _square_root(value: Fraction) -> float:
-    """Return the root of a positive number, correctly rounded but for its last bit, 0 or infinity
-    beyond the range of doubles.
-    """
-    exponent = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    """Return such a root, 0 or infinity beyond the range of doubles."""
     try:
-        return math.ldexp(math.sqrt(value / Fraction(4) ** exponent), exponent)
+        return math.ldexp(*square_root_parts(value))
     except OverflowError:
         return math.inf
-
-
-def _without_each(factors: Complex) -> Complex:
-    """Return the products of factors (N, g−1) without the k-th, k < g, and of all of
-    them, (g, N).
-    """
-    count = factors.shape[1]
-    products = [np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(count)]
-    return np.stack([*products, np.prod(factors, axis=1)])
-
-
-def _integral(integrand: Callable[[Complex], Complex], end: complex) -> Complex:
-    """Return the integrals from 0 straight to ``end`` of functions (g, N), by Gauss' rule with
-    twice the nodes until it stays.
-    """
-    previous = None
-    size = _FEWEST_NODES
-    while size <= _MOST_NODES:
-        nodes, weights = np.polynomial.legendre.leggauss(size)
-        total = integrand(np.asarray(end * (nodes + 1) / 2, dtype=complex)) @ weights * end / 2
-        if previous is not None and np.max(np.abs(total - previous)) <= _QUADRATURE * np.max(
-            np.abs(total)
-        ):
-            return np.asarray(total)
-        previous = total
-        size = 2 * size
-    raise Unsolved(
-        "narrow-gap", "the path to a point passes too near a branch point for its quadrature"
-    )

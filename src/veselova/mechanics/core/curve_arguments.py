@@ -23,6 +23,7 @@ __all__ = [
     "curve_rows",
     "exact_points",
     "points_with_sheets",
+    "rows_of_points",
     "torus_points",
 ]
 
@@ -182,15 +183,35 @@ def points_with_sheets(
     return found, sheets
 
 
+def rows_of_points(given: Any) -> tuple[list[list[Fraction | complex]], bool]:
+    """Return rows of points λ, and whether one alone was given; raises InvalidInput, with all
+    faults.
+    """
+    rows = _items(given, ("points",), "a list of numbers, or rows of them")
+    single = _is_flat(rows)
+    faults = Faults()
+    found = [
+        faults.attempt(exact_points, row, ("points",) if single else ("points", i))
+        for i, row in enumerate([rows] if single else rows)
+    ]
+    faults.require_none()
+    return [row for row in found if row is not None], single
+
+
+def _is_flat(items: list[Any]) -> bool:
+    """Return whether no item is a row itself."""
+    return not any(
+        isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in items
+    )
+
+
 def torus_points(z: Any, genus: int) -> tuple[list[tuple[Fraction, ...]], bool]:
     """Return points of R^g/Z^g, exact, and whether one alone was given; raises InvalidInput, with
     all faults.
     """
     required = f"a vector of {genus} finite real numbers, or rows of them"
     rows = _items(z, ("z",), required)
-    single = not any(
-        isinstance(row, (Sequence, np.ndarray)) and not isinstance(row, str) for row in rows
-    )
+    single = _is_flat(rows)
     faults = Faults()
     found = []
     for i, row in enumerate([rows] if single else rows):

@@ -244,6 +244,9 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     n = _length(document, "A", None)
     count = _length(document, "modes", None)
     functions = _length(document, "characteristics", None)
+    if not functions:
+        required = "a list of characteristics, the denominator's first"
+        raise InvalidInput(("document", "characteristics"), required, "an empty list")
     shapes: dict[str, tuple[int, ...]] = {
         "riemann_matrix": (g, g),
         "phases": (g,),
