@@ -227,6 +227,20 @@ def test_on_a_resonance_modes_that_stand_are_slow_however_small() -> None:
     assert kept.tolist() == [[0, 0, 1], [1, 0, 0], [0, 0, 2], [1, -1, 0]]
 
 
+@pytest.mark.parametrize("kind", [vs.RubberBall, vs.ChaplyginBall])
+@pytest.mark.parametrize("mass", [1e-12, 1e6, 1e12])
+def test_the_spin_of_a_heavy_ball_is_not_lost_in_its_momentum(kind: Any, mass: float) -> None:
+    problem = kind(["0.4", "0.6", "0.9"], mass, 1, ["0.6", 0, "0.8"], ["0.8", 1, "0.3"])
+    found, fine = vs.solve(problem, ["1"]), vs.solve(problem, ["1"], digits=20).decimals
+    assert fine is not None
+    off = largest(found.Omega - fine.midpoints["Omega"].astype(float))
+    assert off < 1e-12
+    at_start = problem.angular_velocity(problem.frame[None])[0]
+    assert largest(at_start - problem.Omega) < 4e-15
+    states = vs.closed_form(problem).at([1.0])
+    assert largest(states.Omega - found.Omega) <= 1e-12 + 10 * states.error[0]
+
+
 @pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
 def test_upright_momentum_makes_no_way(system: str) -> None:
     problem = CASES["momentum-upright"].problem(system)

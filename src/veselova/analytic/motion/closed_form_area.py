@@ -64,7 +64,7 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
         "form": form.tolist(),
-        "constant": 0.0 if twists else float(momentum[0]),
+        "constant": 0.0 if twists else body.linear,
     }
     if not isinstance(body, RollingBall):
         return {"area": area}

@@ -92,14 +92,17 @@ class ChaplyginBall(RollingBall):
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
         D(BK,γ)/(Bγ,Iγ).
         """
-        K = frame @ (self.frame.T @ self.derive("momentum", self.start)[0])
-        return self._solve(K, frame[..., 0])
+        in_space = self.frame.T @ self.derive("momentum", self.start)[0]
+        # (K,γ) = (IΩ,γ), without the rounding of DΩ
+        in_space[0] = self.gamma @ self.ball.tensor @ self.Omega
+        return self._solve(frame @ in_space, frame[..., 0], in_space[0])
 
-    def _solve(self, vector: Array, gamma: Array) -> Array:
-        """Return (J − Dγγᵀ)⁻¹x = Bx + D(Bx,γ)/(Bγ,Iγ) Bγ, for x and γ (..., 3)."""
+    def _solve(self, vector: Array, gamma: Array, along: Any) -> Array:
+        """Return (J − Dγγᵀ)⁻¹x = Bx + D(Bx,γ)/(Bγ,Iγ) Bγ, for x and γ (..., 3); along: (x,γ)."""
         free = vector @ self.inverse
         across = gamma @ self.inverse
-        share = float(self.ball.added) * np.sum(free * gamma, axis=-1)
+        # D(Bx,γ) = (x,γ) − (IBx,γ), without cancellation where D is large beside I
+        share = along - np.sum(free @ self.ball.tensor * gamma, axis=-1)
         # 1 − D(Bγ,γ), without cancellation where I is small beside D
         share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
         return np.asarray(free + share[..., None] * across)
@@ -123,7 +126,8 @@ class ChaplyginBall(RollingBall):
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""
-        return self._solve(np.cross(Omega @ self.ball.tensor, Omega), gamma)
+        torque = np.cross(Omega @ self.ball.tensor, Omega)
+        return self._solve(torque, gamma, np.sum(torque * gamma, axis=-1))
 
     def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
         moments = balls.of(self.moments)

@@ -16,7 +16,7 @@ from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.rigid_body_flow import angular_velocity, momentum
+from veselova.mechanics.flows.rigid_body_flow import momentum
 from veselova.mechanics.geometry.sphere import (
     INPUT_TOLERANCE,
     exact_cross,
@@ -146,10 +146,20 @@ class VeselovaSO3(RigidBody):
         return self.area_class(AreaData.of(self), digits)
 
     def angular_velocity(self, frame: Array) -> Array:
-        """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0."""
+        """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0.
+
+        The component of 𝔪 along γ is (Ω,γ), which is constant: in a heavy ball the others are so
+        large that their rounding would exceed it.
+        """
         start = momentum(self.inertia, self.Omega, self.gamma, constrained=True)
-        m = frame @ (self.frame.T @ start)
-        return angular_velocity(self.inverse, m, frame[..., 0], constrained=True)
+        in_space = self.frame.T @ start
+        in_space[0] = self.linear
+        gamma = frame[..., 0]
+        free = frame @ in_space @ self.inverse
+        across = gamma @ self.inverse
+        share = self.linear - np.sum(free * gamma, axis=-1)
+        share = share / np.sum(across * gamma, axis=-1)
+        return np.asarray(free + share[..., None] * across)
 
     @cached_property
     def _near_rank_one(self) -> Veselova:
