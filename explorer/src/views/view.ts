@@ -56,6 +56,9 @@ export interface Curves {
   lines: { name: string; colour: string; dashed?: boolean; points: [number, number][] }[];
 }
 
+/** The height in units of length beyond which a view is large. */
+const LARGE = 420;
+
 export abstract class View {
   readonly name: string;
   readonly title: string;
@@ -101,7 +104,10 @@ export abstract class View {
     return [];
   }
 
-  /** Give the canvas as many pixels as its place has; return the pixels of one unit of length. */
+  /**
+   * Give the canvas as many pixels as its place has; return the pixels of one unit of length, which
+   * grows with a large view: its names are read from afar.
+   */
   protected fit(): number {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const width = Math.round(this.canvas.clientWidth * ratio);
@@ -110,7 +116,7 @@ export abstract class View {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    return ratio;
+    return ratio * Math.min(1.6, Math.max(1, this.canvas.clientHeight / LARGE));
   }
 }
 
