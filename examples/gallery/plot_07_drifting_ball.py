@@ -2,10 +2,10 @@ r"""
 A drifting ball
 ===============
 
-A ball that neither slips nor twists obeys Veselova's equations. Along the horizontal part of its
-momentum its centre moves at a constant speed, and across it the path sways: here regularly, and in
-bursts for a start near a separatrix. The path is known in closed form, so the position after a
-million units of time costs no more than the first.
+A ball that neither slips nor twists obeys Veselova's equations. Its centre goes on at a constant
+speed, across its momentum K, and sways beside that line: here regularly, and in bursts for a start
+near a separatrix. The path is known in closed form, so the position after a million units of time
+costs no more than the first.
 """
 
 import numpy as np
@@ -56,5 +56,5 @@ for axis, curve, colour, title in zip(axes[1:], (path, burst), (BLUE, RED), titl
     axis.plot(*curve.T, color=colour, linewidth=1.3)
     axis.set(ylabel="across", xlim=(0, curve[-1, 0]))
     axis.set_title(title, loc="right", fontsize=10)
-axes[2].set_xlabel("along the momentum")
+axes[2].set_xlabel("along the mean velocity")
 plt.show()
