@@ -105,6 +105,34 @@ def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
             agree(found, "q_prime", row, moving, 50)
 
 
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_a_point_released_from_rest_has_fifty_digits(n: int) -> None:
+    A, q, _ = POINTS[n]
+    problem = vs.NeumannSystem(A, q, ["0"] * n)
+    found = decimals(problem, ["1.7"], digits=50)
+    position, moving = neumann_at(A, q, ["0"] * n, Fraction("1.7"), 50)
+    agree(found, "q", 0, position, 50)
+    agree(found, "q_prime", 0, moving, 50)
+    assert float(np.max(vs.solve(problem, [1.7], certified=True).error)) < 1e-14
+
+
+@pytest.mark.parametrize("places", [3, 40, 166])
+def test_a_point_released_beside_the_top_has_thirty_digits(places: int) -> None:
+    """q_1 = sin θ with θ'' = ½ sin θ cos θ, from the top: 2θ is the angle of a pendulum, whose
+    modulus is cos θ_0.
+    """
+    problem = vs.NeumannSystem(["2", "1"], [f"1e-{places}", "1"], ["0", "0"], normalize=True)
+    t = places * 325 // 100
+    found = decimals(problem, [t], digits=30)
+    with mpmath.workdps(3 * places + 60):
+        start = mpmath.mpf(10) ** -places
+        m = 1 / (1 + start**2)
+        along, at = mpmath.sqrt(0.5) * t, {"m": m}
+        cosine = mpmath.ellipfun("sn", mpmath.ellipk(m) - along, **at) * mpmath.sqrt(m)
+        sine = mpmath.ellipfun("dn", mpmath.ellipk(m) - along, **at)
+        agree(found, "q", 0, [sine, cosine], 30)
+
+
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 def test_a_geodesic_has_fifty_digits(n: int) -> None:
     problem = geodesic(n)

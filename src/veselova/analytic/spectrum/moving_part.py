@@ -97,21 +97,26 @@ class Moving:
         """Return whether q_i and q̇_i are both below √share of |q| and |q̇|, or of |q|√I where q̇
         is Neumann's and may vanish.
         """
-        q_total = sum(self.q_squared, Fraction())
-        v_total = sum(self.v_squared, Fraction())
-        if self.time == "tau1":
-            v_total += q_total / self.unit
+        q_total, v_total = self._totals
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
 
     @property
     def least_share(self) -> Fraction:
-        """Return the least part that a direction has in |q|² or |q̇|², whichever is larger."""
-        q_total = sum(self.q_squared, Fraction())
-        v_total = sum(self.v_squared, Fraction())
+        """Return the least part that a direction has in |q|² or |q̇|², whichever is larger; against
+        what ``hardly_moves`` takes.
+        """
+        q_total, v_total = self._totals
         return min(
             max(q / q_total, v / v_total)
             for q, v in zip(self.q_squared, self.v_squared, strict=True)
         )
+
+    @property
+    def _totals(self) -> tuple[Fraction, Fraction]:
+        """Return |q|², and |q̇|², with |q|²I where q̇ is Neumann's and may vanish."""
+        q_total = sum(self.q_squared, Fraction())
+        v_total = sum(self.v_squared, Fraction())
+        return q_total, v_total + q_total / self.unit if self.time == "tau1" else v_total
 
     def lift_axis(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much
