@@ -150,6 +150,28 @@ def test_beside_an_equilibrium_the_point_stays(
     assert compare(problem, [-1, 0, 2]).agrees
 
 
+@pytest.mark.parametrize("small", ["1e-150", "1e-200", "1e-300"])
+def test_beside_a_saddle_the_point_leaves_at_last(small: str) -> None:
+    """Along one direction it is stable, along the other it is not: e^(0.4t) outgrows any start."""
+    problem = NeumannSystem([3, 2, 1], [small, 1, small], [0, 0, 0])
+    alone = NeumannSystem([3, 2], [small, 1], [0, 0])
+    for t in (1300, 1e6):
+        with pytest.raises(Unsolved, match="no-digit-left"):
+            solve(problem, [t])
+        found, expected = (solve(p, [t], digits=20).q[0] for p in (problem, alone))
+        assert np.max(np.abs(found[:2] - expected)) < 1e-15
+        assert abs(found[2]) < 1e-100
+
+
+@pytest.mark.parametrize("asked", [{"digits": 20}, {"certified": True}])
+def test_digits_beside_a_stable_equilibrium_are_refused_with_what_answers(
+    asked: dict[str, Any],
+) -> None:
+    problem = NeumannSystem(["1", "1/2"], [1, 0], [0, "1e-200"])
+    with pytest.raises(Unsolved, match=r"at-rest: .*; 15 digits, not certified, are those of rest"):
+        solve(problem, [1.0], **asked)
+
+
 def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
     """Beside an equilibrium no phase matters, and entries of the frame are products of n ratios."""
     _, make = adversarial_system(np.random.default_rng([901, 314]), "neumann", 8)

@@ -118,7 +118,9 @@ def solve(
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
         return motion_of_body(problem, solve(point, grid, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
-        return _separable_motion(problem, grid, method, time_map, beyond_double(digits, certified))
+        if beyond_double(digits, certified):
+            raise _needs_doubles(digits, f"system {problem.system} with a potential")
+        return _separable_motion(problem, grid, method, time_map)
     if not beyond_double(digits, certified):
         return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
     _require_options(method, time_map, digits, certified)
@@ -184,8 +186,9 @@ def _require_digits(problem: AreaBody, digits: int, certified: bool) -> None:
 
 def _needs_doubles(digits: int, what: str) -> InvalidInput:
     """Return the refusal of more than doubles for something."""
-    field, given = ("digits", str(digits)) if digits > FEWEST_DIGITS else ("certified", "true")
-    return InvalidInput((field,), f"{FEWEST_DIGITS}, not certified, for {what}", given)
+    if digits > FEWEST_DIGITS:
+        return InvalidInput(("digits",), f"{FEWEST_DIGITS}, not certified, for {what}", str(digits))
+    return InvalidInput(("certified",), f"false, with {FEWEST_DIGITS} digits, for {what}", "true")
 
 
 def _require_exact_axes(problem: AreaBody, digits: int, certified: bool) -> None:
@@ -210,22 +213,14 @@ def _separable_motion(
     grid: TimeGrid,
     method: str | None,
     time_map: str | None,
-    beyond: bool,
 ) -> Trajectory:
-    """Return the motion in a separable potential; it has one method, one choice of time maps and 15
-    digits.
-    """
+    """Return the motion in a separable potential; it has one method and no choice of time maps."""
     for field, given, allowed in (
         ("method", method, (None, "angles")),
         ("time_map", time_map, (None,)),
-        ("digits", beyond, (False,)),
     ):
         if given not in allowed:
-            required = {
-                "method": "angles",
-                "time_map": "none",
-                "digits": f"{FEWEST_DIGITS}, not certified,",
-            }[field]
+            required = {"method": "angles", "time_map": "none"}[field]
             raise InvalidInput((field,), f"{required} for system {problem.system}", show(given))
     return (
         BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)

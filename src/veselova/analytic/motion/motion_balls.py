@@ -84,7 +84,7 @@ class MotionInBalls:
             any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)
         ):
             return self._resting(asked, began)
-        solution = solution_of(self.problem)
+        solution = self._in_doubles()
         plan = EvaluationPlan.of(solution, grid)
         time_map = plan.make_time_map(solution)
         reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
@@ -112,6 +112,16 @@ class MotionInBalls:
         raise Unsolved(
             "no-digit-left", f"{self.digits} digits were not reached with {working} working digits"
         )
+
+    def _in_doubles(self) -> Solution:
+        """Return the solution in doubles, from which that in balls begins."""
+        try:
+            return solution_of(self.problem)
+        except Unsolved as refusal:
+            if refusal.outcome == "at-rest":  # beside a stable equilibrium
+                further = f"; {FEWEST_DIGITS} digits, not certified, are those of rest"
+                raise Unsolved(refusal.outcome, f"{refusal.reason}{further}") from None
+            raise
 
     def _cheaper(self, coarse: Solution) -> str:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix

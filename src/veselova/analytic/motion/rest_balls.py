@@ -39,8 +39,8 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
     else:
         raise Unsolved(
             "at-rest",
-            "q_dot = 0: a resting body's natural frame is known in double precision only; "
-            "give a frame",
+            "nothing moves, and a resting body's natural frame is known in double precision only; "
+            "give a frame, or ask for 15 digits, not certified",
         )
     points = (
         resting_spheroconic(moving, xp) / xp.number(moving.unit)

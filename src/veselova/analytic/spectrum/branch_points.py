@@ -158,8 +158,9 @@ def resolve_spectrum(
         closed = [j for j, width in enumerate(found.widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | coincident)))
-        j = closed[0]
-        ends = found.branch_points[closed[0] : closed[0] + 2]
+        # Cuts first: what is left beside a saddle when its stable directions are frozen is no rest.
+        j = next((j for j in closed if j % 2 == 1), closed[0])
+        ends = found.branch_points[j : j + 2]
         # between c_1 = 0 and the least I, which is no separatrix
         if j == 0 and moving.time != "tau1":
             raise Unsolved(
