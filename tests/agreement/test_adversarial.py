@@ -172,6 +172,21 @@ def test_digits_beside_a_stable_equilibrium_are_refused_with_what_answers(
         solve(problem, [1.0], **asked)
 
 
+def test_beside_an_unstable_equilibrium_what_the_data_leave_open_at_the_start_is_no_error() -> None:
+    """Neighbours begin a few roundings away, and the error counts how they part."""
+    found = []
+    for i in (2, 143, 226, 293):
+        name, make = adversarial_system(np.random.default_rng([7301, i]), "neumann", 2 + i % 7)
+        problem = make()
+        parts = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * (1.0 if i % 4 == 0 else 0.3)
+        motion = solve(problem, parts * time_unit(problem))
+        off, allowed = against_truth(name, motion, PATIENCE_S)
+        assert name == "near an unstable equilibrium"
+        assert np.all(off <= 0.5 * allowed)
+        found.append(pessimism(motion, off))
+    assert np.median(found) < 100
+
+
 def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
     """Beside an equilibrium no phase matters, and entries of the frame are products of n ratios."""
     _, make = adversarial_system(np.random.default_rng([901, 314]), "neumann", 8)

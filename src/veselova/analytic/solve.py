@@ -284,7 +284,10 @@ class _TorusMotion(Motion[TorusProblem]):
         )
         evaluators = (self._evaluator, *neighbours)
         return DepartureBound(
-            partial(_with_neighbours, evaluators, self.time_map), self.problem.turning, NO_DIGIT
+            partial(_with_neighbours, evaluators, self.time_map),
+            2 * float(_DATA_ROUNDING),  # an axis is lifted by twice as much on one side
+            self.problem.turning,
+            NO_DIGIT,
         )
 
     @property

@@ -2,8 +2,9 @@
 
 A start a rounding away leaves the separatrix like e^(rate·|t|), and comes back to it when all
 motions dwell at the same equilibrium. What is lost on the way stays lost. So the bound is the
-largest difference from neighbouring motions at fixed instants up to the one after |t|; it never
-decreases with |t|, and no other time that is asked for enters it.
+largest difference from neighbouring motions at fixed instants up to the one after |t|, less that at
+the start, where nothing is lost; it never decreases with |t|, and no other time that is asked for
+enters it.
 """
 
 from __future__ import annotations
@@ -34,12 +35,14 @@ class DepartureBound:
 
     - motions: instants (N,) → the frames of the motion and of its neighbours, each (N, n, n),
       and the error of the motion's evaluation there, (N,)
+    - apart: how far the neighbours are from the motion at t = 0
     - turning: radians a unit of time
     - lost: the difference beyond which nothing is known; instants after the first such one are
       not evaluated
     """
 
     motions: Callable[[Array], tuple[Sequence[Array], Array]]
+    apart: float
     turning: float
     lost: float
     _known: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False)
@@ -71,7 +74,8 @@ class DepartureBound:
             differences = np.max(
                 [np.max(np.abs(other - first), axis=(1, 2)) for other in others], axis=0
             )
-            found = np.stack([_BETWEEN * differences, error], axis=1)[in_order]
+            parted = np.maximum(differences - self.apart, 0)
+            found = np.stack([_BETWEEN * parted, error], axis=1)[in_order]
             found = np.vstack([bounds[-1:], np.nan_to_num(found, nan=np.inf)])
             largest = np.maximum.accumulate(found)[-further.size :]
             selected = int(np.searchsorted(largest[:, 0], self.lost, side="right")) + 1
