@@ -163,6 +163,15 @@ def test_beside_a_saddle_the_point_leaves_at_last(small: str) -> None:
         assert abs(found[2]) < 1e-100
 
 
+def test_integration_beside_a_saddle_is_refused_without_a_warning() -> None:
+    problem = NeumannSystem([3, 2, 1], ["1e-200", 1, "1e-200"], [0, 0, 0])
+    with (
+        warnings.catch_warnings(action="error"),
+        pytest.raises(Unsolved, match="no-digit-left"),
+    ):
+        solve(problem, [200.0], "numeric", "dop853")
+
+
 @pytest.mark.parametrize("asked", [{"digits": 20}, {"certified": True}])
 def test_digits_beside_a_stable_equilibrium_are_refused_with_what_answers(
     asked: dict[str, Any],

@@ -68,16 +68,18 @@ class _Run:
         if self._flow.clearance(state) <= 0:
             raise self._flow.ending(start, state)
         outputs = wanted if wanted.size and wanted[-1] == stop else np.append(wanted, stop)
-        answer = solve_ivp(
-            self._stoppable if has_budget() else self._flow.vector_field,
-            (start, stop),
-            state,
-            method="DOP853",
-            t_eval=outputs,
-            rtol=self._tolerance,
-            atol=self._tolerance / 10,
-            events=None if self._flow.endless else _Ending(self._flow),
-        )
+        # Where a state stands SciPy divides zero by zero, and takes a smaller step.
+        with np.errstate(invalid="ignore"):
+            answer = solve_ivp(
+                self._stoppable if has_budget() else self._flow.vector_field,
+                (start, stop),
+                state,
+                method="DOP853",
+                t_eval=outputs,
+                rtol=self._tolerance,
+                atol=self._tolerance / 10,
+                events=None if self._flow.endless else _Ending(self._flow),
+            )
         if answer.status == 1:
             raise self._flow.ending(float(answer.t_events[0][0]), answer.y_events[0][0])
         if not answer.success:
