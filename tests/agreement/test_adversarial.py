@@ -206,6 +206,16 @@ def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
     assert np.all(off <= 0.5 * allowed)
 
 
+def test_the_natural_frame_of_a_nearly_round_ellipsoid_is_known_to_the_last_bit() -> None:
+    """Its constants are 1e-10 apart: what a step of refinement leaves is divided by that."""
+    _, make = adversarial_system(np.random.default_rng([7401, 571]), "ellipsoid-geodesic", 6)
+    problem = make()
+    found = solve(problem, np.array([-3, 0, 1.2]) * time_unit(problem))
+    off, allowed = against_truth("nearly round", found, PATIENCE_S)
+    assert np.all(off <= 0.5 * allowed)
+    assert np.max(np.abs(found.frame[1] - problem.frame)) < 1e-15
+
+
 def test_two_closed_cuts_beside_one_another_are_served() -> None:
     """Widths of 1e-200 have no product among doubles; half as narrow counts as closed."""
     problem = NeumannSystem(["1", "1/2", "1/3"], [1, "1e-100", 0], [0, 0, "1e-100"])

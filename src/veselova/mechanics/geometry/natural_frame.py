@@ -22,9 +22,10 @@ Array = NDArray[np.float64]
 #: Bits after the point in refinement.
 _BITS = 320
 
-#: Steps of refinement; one that turns by less than 2^−_ENOUGH is the last.
-_STEPS = 5
-_ENOUGH = 35
+#: Steps of refinement; one is the last where the square of its turn, over the least distance of
+#: constants, is below 2^−_ENOUGH: that is what it leaves.
+_STEPS = 6
+_ENOUGH = 70
 
 #: The largest turn from which it converges: where constants are nearer than 1e-14 of the largest,
 #: the frame stays as it is.
@@ -87,9 +88,10 @@ def refine(
 
     Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS
     bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
-    which squares the turn. Normals whose constants nearly coincide are not turned into each
-    other. A frame at rest or of high dimension is returned as it is. ``rate_squared`` is
-    (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem where it is left out.
+    which squares the turn, over the distance of the constants. Normals whose constants nearly
+    coincide are not turned into each other. A frame at rest or of high dimension is returned as it
+    is. ``rate_squared`` is (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem
+    where it is left out.
     """
     if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
@@ -117,7 +119,8 @@ def refine(
         if largest_turn > int(_LARGEST_TURN * 2**_BITS):
             return frame
         N = N + _product(N, turn)
-        if largest_turn < 1 << (_BITS - _ENOUGH):
+        nearest = np.min(np.where((one != 0) | close, 1 << _BITS, np.abs(distance)))
+        if largest_turn * largest_turn < nearest << (_BITS - _ENOUGH):
             break
     else:
         return frame
